@@ -1,0 +1,46 @@
+"""Metaheuristics for bounded, constrained minimisation of objectives that are evaluated in batches.
+
+Independent of any problem and of CasADi: an objective is anything that follows `BatchObjective`.
+
+    result = minimize(objective, ParticleSwarm(population=50), evaluations=10_000, seed=1)
+    result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
+"""
+
+from metaheuristics.ant_colony import AntColony
+from metaheuristics.ant_colony_grid import AntColonyGrid
+from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty
+from metaheuristics.errors import SearchError
+from metaheuristics.genetic import GeneticAlgorithm
+from metaheuristics.genetic_operators import Flip, Polynomial, SimulatedBinary, SinglePoint
+from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
+from metaheuristics.minimize import minimize
+from metaheuristics.particle_swarm import ParticleSwarm
+from metaheuristics.registry import ALGORITHMS, algorithm
+from metaheuristics.result import History, Interrupted, Result
+
+__all__ = [
+    "ALGORITHMS",
+    "Algorithm",
+    "AntColony",
+    "AntColonyGrid",
+    "BatchObjective",
+    "ConstraintHandling",
+    "Deb",
+    "EpsilonLevel",
+    "Flip",
+    "GeneticAlgorithm",
+    "History",
+    "Interrupted",
+    "ParticleSwarm",
+    "Polynomial",
+    "Result",
+    "Rule",
+    "Search",
+    "SearchError",
+    "SimulatedBinary",
+    "SinglePoint",
+    "Start",
+    "StaticPenalty",
+    "algorithm",
+    "minimize",
+]

@@ -1,0 +1,117 @@
+"""Calls of the objective: checked, timed and counted, with the best so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+from metaheuristics.constraint_handling import FEASIBILITY, mark_failed
+from metaheuristics.errors import SearchError
+from metaheuristics.interface import Array, BatchObjective
+from metaheuristics.result import History
+
+Observer = Callable[[Array, Array, Array], object]
+"""Receives X (P, n), f (P,) and violation (P,) of a generation; f and violation are infinite where failed."""
+
+
+class Evaluator:
+    """Evaluates generations of one run and keeps its record.
+
+    Attributes:
+        evaluations: Evaluations so far, failed ones included.
+        failed: Failed evaluations so far.
+        objective_time_s: Time spent in the objective so far [s].
+        best_x: (n,) best point so far by the feasibility rules.
+        best: Its violation and objective, which compare as the rules do.
+        stagnation: Generations since the best last improved.
+    """
+
+    def __init__(self, objective: BatchObjective, observe: Observer | None) -> None:
+        """Start the clock.
+
+        Args:
+            objective: What to evaluate.
+            observe: Called after each generation; None for nothing.
+        """
+        self._objective = objective
+        self._observe = observe
+        self._started = perf_counter()
+        self._history: list[tuple[int, float, float, float]] = []
+        self.evaluations = 0
+        self.failed = 0
+        self.objective_time_s = 0.0
+        self.best_x: Array = np.empty(0)
+        self.best = (np.inf, np.inf)
+        self.stagnation = 0
+
+    @property
+    def generations(self) -> int:
+        """Generations recorded so far."""
+        return len(self._history)
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the start [s]."""
+        return perf_counter() - self._started
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Evaluate a generation, record it and show it to the observer.
+
+        Args:
+            X: (P, n) points, P >= 1.
+
+        Returns:
+            (P,) objectives and (P,) violations, new arrays, infinite where failed.
+
+        Raises:
+            SearchError: The objective does not return two arrays of P numbers, or a violation is negative.
+        """
+        shown = X.view()
+        shown.flags.writeable = False
+        before = perf_counter()
+        answer = self._objective(shown)
+        self.objective_time_s += perf_counter() - before
+        f, violation, failed = mark_failed(*_checked_answer(answer, len(X)))
+
+        self.evaluations += len(X)
+        self.failed += int(np.count_nonzero(failed))
+        leader = FEASIBILITY.best(f, violation)
+        found = (float(violation[leader]), float(f[leader]))
+        self.stagnation += 1
+        if found < self.best or not self._history:
+            self.best, self.best_x, self.stagnation = found, X[leader].copy(), 0
+        self._history.append((self.evaluations, self.best[1], self.best[0], self.elapsed_s))
+        if self._observe is not None:
+            self._observe(shown, f, violation)
+        return f, violation
+
+    def history(self) -> History:
+        """Give the record so far as arrays."""
+        columns = [np.array(column) for column in zip(*self._history, strict=True)]
+        for column in columns:
+            column.setflags(write=False)
+        evaluations, objective, violation, elapsed_s = columns
+        return History(evaluations=evaluations, objective=objective, violation=violation, elapsed_s=elapsed_s)
+
+
+def _checked_answer(answer: object, count: int) -> tuple[Array, Array]:
+    """Turn what the objective returned into f and violation, or say what is wrong with it."""
+    wanted = f"the objective must return (f, violation), two arrays of shape ({count},) for {count} points"
+    if not isinstance(answer, tuple) or len(answer) != 2:
+        raise SearchError(f"{wanted}; it returned {type(answer).__name__}: return a tuple of two arrays")
+    try:
+        f, violation = np.asarray(answer[0], dtype=np.float64), np.asarray(answer[1], dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SearchError(f"{wanted}; it returned something else than real numbers: {error}") from error
+    if f.shape != (count,) or violation.shape != (count,):
+        raise SearchError(f"{wanted}; got shapes {f.shape} and {violation.shape}: give one number per row of X")
+    negative = violation < 0.0
+    if negative.any():
+        row = int(negative.argmax())
+        raise SearchError(
+            f"the violation must be >= 0, zero if and only if feasible; row {row} has {violation[row]}: "
+            "sum max(0, g) over the constraints g <= 0"
+        )
+    return f, violation

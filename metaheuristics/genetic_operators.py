@@ -1,0 +1,218 @@
+"""Crossover and mutation of real-coded genetic algorithms.
+
+An operator is a frozen dataclass of settings that draws random numbers; its formula is a pure function of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from metaheuristics.interface import Array
+from metaheuristics.settings import check_number
+
+_CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
+
+
+class Crossover(Protocol):
+    """Makes two children of two parents."""
+
+    def __call__(
+        self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator, /
+    ) -> tuple[Array, Array]:
+        """Cross each row of A with the same row of B.
+
+        Args:
+            A: (M, n) first parents.
+            B: (M, n) second parents.
+            lower: (n,) lower bounds.
+            upper: (n,) upper bounds.
+            rng: Source of randomness.
+
+        Returns:
+            (M, n) and (M, n) children within the bounds, new arrays.
+        """
+
+
+class Mutation(Protocol):
+    """Changes points at random."""
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator, /) -> Array:
+        """Mutate.
+
+        Args:
+            X: (P, n) points.
+            lower: (n,) lower bounds.
+            upper: (n,) upper bounds.
+            rng: Source of randomness.
+
+        Returns:
+            (P, n) points within the bounds, a new array.
+        """
+
+
+def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
+    """Spread two children about two parents, the spread limited by the bounds.
+
+    Args:
+        A: (M, n) first parents.
+        B: (M, n) second parents.
+        lower: (n,) lower bounds.
+        upper: (n,) upper bounds.
+        index: Distribution index; larger keeps children nearer to the parents.
+        u: (M, n) random numbers in [0, 1).
+
+    Returns:
+        (M, n) the lower and (M, n) the upper child in each variable. Where the parents are equal, so are the children.
+
+    Source:
+        Deb, Agrawal (1995), Simulated binary crossover; bounded form as in Deb's NSGA-II code (crossover.c).
+    """
+    low, high = np.minimum(A, B), np.maximum(A, B)
+    gap = high - low
+    apart = gap > _CLOSE * (upper - lower)
+    safe_gap = np.where(apart, gap, 1.0)
+
+    def spread(room: Array) -> Array:
+        alpha = 2.0 - (1.0 + 2.0 * room / safe_gap) ** -(index + 1.0)
+        inner = u * alpha
+        return np.where(inner <= 1.0, inner, 1.0 / (2.0 - inner)) ** (1.0 / (index + 1.0))
+
+    middle = 0.5 * (low + high)
+    first = np.clip(middle - 0.5 * spread(low - lower) * gap, lower, upper)
+    second = np.clip(middle + 0.5 * spread(upper - high) * gap, lower, upper)
+    return np.where(apart, first, low), np.where(apart, second, high)
+
+
+def polynomial(X: Array, lower: Array, upper: Array, index: float, u: Array) -> Array:
+    """Shift every variable by a polynomially distributed step that cannot cross the bounds.
+
+    Args:
+        X: (P, n) points.
+        lower: (n,) lower bounds.
+        upper: (n,) upper bounds.
+        index: Distribution index; larger makes smaller steps.
+        u: (P, n) random numbers in [0, 1); 0.5 leaves the variable as it is.
+
+    Returns:
+        (P, n) points, a new array.
+
+    Source:
+        Deb, Goyal (1996), A combined genetic adaptive search; bounded form as in Deb's NSGA-II code (mutation.c).
+    """
+    width = upper - lower
+    power = index + 1.0
+    down = u <= 0.5
+    room = np.where(down, X - lower, upper - X) / np.where(width > 0.0, width, 1.0)
+    half = np.where(down, u, 1.0 - u)
+    step = 1.0 - (2.0 * half + (1.0 - 2.0 * half) * (1.0 - room) ** power) ** (1.0 / power)
+    return np.clip(X + np.where(down, -step, step) * width, lower, upper)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SimulatedBinary:
+    """Simulated binary crossover (SBX).
+
+    Attributes:
+        index: Distribution index.
+        probability: Chance that a pair is crossed at all.
+        variable_probability: Chance that a variable of a crossed pair is; it also exchanges sides with chance 0.5.
+
+    Raises:
+        SearchError: A setting is not allowed.
+    """
+
+    index: float = 2.0
+    probability: float = 0.9
+    variable_probability: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_number(self, "index", at_least=0.0)
+        check_number(self, "probability", at_least=0.0, at_most=1.0)
+        check_number(self, "variable_probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Cross pairs; see `Crossover`."""
+        u, choice, side = rng.random((3, *A.shape))
+        low, high = simulated_binary(A, B, lower, upper, self.index, u)
+        crossed = (rng.random((len(A), 1)) < self.probability) & (choice < self.variable_probability)
+        swap = side < 0.5
+        return np.where(crossed, np.where(swap, low, high), A), np.where(crossed, np.where(swap, high, low), B)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SinglePoint:
+    """Single-point crossover: from a random position on, two parents exchange their variables.
+
+    Attributes:
+        probability: Chance that a pair is crossed. With one variable there is nothing to exchange.
+
+    Raises:
+        SearchError: The probability is not allowed.
+    """
+
+    probability: float = 0.8
+
+    def __post_init__(self) -> None:
+        check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Cross pairs; see `Crossover`."""
+        pairs, n = A.shape
+        cut = 1 + np.floor(rng.random((pairs, 1)) * (n - 1))  # 1..n-1
+        tail = (rng.random((pairs, 1)) < self.probability) & (np.arange(n) >= cut)
+        return np.where(tail, B, A), np.where(tail, A, B)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Polynomial:
+    """Polynomial mutation.
+
+    Attributes:
+        index: Distribution index.
+        probability: Chance that a variable mutates; None for 1 / n.
+
+    Raises:
+        SearchError: A setting is not allowed.
+    """
+
+    index: float = 20.0
+    probability: float | None = None
+
+    def __post_init__(self) -> None:
+        check_number(self, "index", at_least=0.0)
+        if self.probability is not None:
+            check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+        """Mutate; see `Mutation`."""
+        u, choice = rng.random((2, *X.shape))
+        probability = 1.0 / X.shape[1] if self.probability is None else self.probability
+        return np.where(choice < probability, polynomial(X, lower, upper, self.index, u), X)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Flip:
+    """Mutation that mirrors a variable at the middle of its range.
+
+    Attributes:
+        probability: Chance that a variable mutates.
+
+    Raises:
+        SearchError: The probability is not allowed.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), section 5.4: s -> (0.05 + 0.13) - s.
+    """
+
+    probability: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+        """Mutate; see `Mutation`."""
+        flipped = np.clip(lower + upper - X, lower, upper)  # the clip only removes rounding
+        return np.where(rng.random(X.shape) < self.probability, flipped, X)

@@ -1,0 +1,121 @@
+"""What the loop in `minimize.py` needs of an objective and of an algorithm.
+
+The loop owns everything that must be equal for all algorithms: the starting points, the count of evaluations, the
+marking of failed evaluations, the constraint handling and the record. An algorithm only proposes points (`ask`) and
+learns from them (`tell`), so an adapter to another package is a small class with these two methods.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from metaheuristics.constraint_handling import Rule
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+class BatchObjective(Protocol):
+    """An objective to be minimised within bounds, called on many points at once.
+
+    Attributes are read once, before the first call.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The n names of the variables."""
+
+    @property
+    def lower(self) -> Array:
+        """(n,) lower bounds, finite."""
+
+    @property
+    def upper(self) -> Array:
+        """(n,) upper bounds, finite and >= lower; equal bounds fix a variable."""
+
+    def __call__(self, X: Array, /) -> tuple[Array, Array]:
+        """Evaluate points.
+
+        Args:
+            X: (P, n) points within the bounds, read-only. P varies from call to call.
+
+        Returns:
+            (P,) objective values, and (P,) total constraint violations: >= 0, and zero if and only if the point is
+            feasible. A NaN or an infinite value in either marks the evaluation of that point as failed.
+        """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class Start:
+    """All that an algorithm is given at the start of a run.
+
+    Attributes:
+        lower: (n,) lower bounds, read-only.
+        upper: (n,) upper bounds, read-only.
+        initial: (P, n) starting points, read-only; P is the population of the algorithm. The first `ask` returns them.
+        evaluations: Budget of the run, a hint for algorithms that plan ahead.
+        rng: The only source of randomness of the search.
+    """
+
+    lower: Array
+    upper: Array
+    initial: Array
+    evaluations: int
+    rng: np.random.Generator
+
+
+class Search(Protocol):
+    """A run in progress: `ask`, evaluate, `tell`, `stop`, and again."""
+
+    def ask(self) -> Array:
+        """Propose points.
+
+        Returns:
+            (P, n) points within the bounds. The search must not change the array afterwards; P may vary.
+        """
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule, /) -> None:
+        """Learn from the points asked last.
+
+        The loop tells whole generations only: when the budget cuts one short, or any stopping criterion holds, the
+        run ends without telling, as nothing would be asked afterwards.
+
+        Args:
+            X: (P, n) points of the last `ask`.
+            f: (P,) objective values; infinity where the evaluation failed, never NaN.
+            violation: (P,) total constraint violations; infinity where the evaluation failed, never NaN.
+            rule: The only way to compare points, valid for this generation: a rule may tighten as the run proceeds.
+        """
+
+    def stop(self) -> tuple[str, ...]:
+        """Say why the search cannot usefully go on.
+
+        Returns:
+            Reasons in words; empty to go on.
+        """
+
+
+class Algorithm(Protocol):
+    """Settings of a search algorithm, immutable; each `start` begins an independent run."""
+
+    @property
+    def name(self) -> str:
+        """Short name, as in the registry."""
+
+    @property
+    def population(self) -> int:
+        """Number of starting points that it wants."""
+
+    def start(self, start: Start, /) -> Search:
+        """Begin a run.
+
+        Args:
+            start: Bounds, starting points, budget and generator.
+
+        Returns:
+            The search, ready to be asked.
+        """

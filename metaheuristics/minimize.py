@@ -1,0 +1,116 @@
+"""The only loop: ask, evaluate, record, tell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from metaheuristics.constraint_handling import ConstraintHandling, Deb
+from metaheuristics.evaluation import Evaluator, Observer
+from metaheuristics.interface import Algorithm, Array, BatchObjective, Start
+from metaheuristics.preparation import check_limits, checked_bounds, checked_seed, child, entropy, starting_points
+from metaheuristics.result import Interrupted, Result
+
+_DEB = Deb()
+
+
+def minimize(
+    objective: BatchObjective,
+    algorithm: Algorithm,
+    *,
+    evaluations: int = 10_000,
+    seed: int | np.random.SeedSequence = 0,
+    handling: ConstraintHandling = _DEB,
+    target: float | None = None,
+    stagnation: int | None = None,
+    time_limit_s: float | None = None,
+    initial: ArrayLike | None = None,
+    observe: Observer | None = None,
+) -> Result:
+    """Minimise an objective within bounds and constraints.
+
+    The starting points are uniform within the bounds and depend on the seed alone: runs of different algorithms with
+    equal seed are paired, and with different populations the first rows agree. Equal arguments give a bit-identical
+    result, unless time_limit_s ends the run.
+
+    Args:
+        objective: What to minimise; it must not depend on the order of calls.
+        algorithm: Settings of the search.
+        evaluations: Budget. It is never exceeded: of the last generation only the first rows that fit are evaluated.
+        seed: A whole number >= 0, or a SeedSequence, which is not consumed.
+        handling: How constraints enter the comparisons within the search. The best point is reported by Deb's rules
+            in any case.
+        target: Stop once a feasible point has an objective <= target.
+        stagnation: Stop after so many generations without a better best.
+        time_limit_s: Stop after the first generation that ends beyond this time [s].
+        initial: (R, n) points within the bounds that replace the first R starting points, R <= population.
+        observe: Called after each generation with X, f and violation, which it may keep but must not change; f and
+            violation are infinite where the evaluation failed.
+
+    Returns:
+        The result: there is always a best point, and the reasons why the run ended.
+
+    Raises:
+        SearchError: An argument is not allowed, or the objective answers with wrong shapes.
+        Interrupted: Ctrl-C after at least one generation; carries the partial result.
+    """
+    lower, upper = checked_bounds(objective)
+    check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
+    sequence = checked_seed(seed)
+    start = Start(
+        lower=lower,
+        upper=upper,
+        initial=starting_points(lower, upper, algorithm.population, initial, child(sequence, 0)),
+        evaluations=evaluations,
+        rng=np.random.default_rng(child(sequence, 1)),
+    )
+    evaluate = Evaluator(objective, observe)
+    search = algorithm.start(start)
+    initial_violation: Array | None = None
+
+    def limits_reached() -> list[str]:
+        violation, f = evaluate.best
+        reached = {
+            "evaluation budget used": evaluate.evaluations >= evaluations,
+            "target reached": target is not None and violation == 0.0 and f <= target,
+            f"no better point in {stagnation} generations": evaluate.stagnation >= (stagnation or np.inf),
+            "time limit reached": evaluate.elapsed_s >= (time_limit_s or np.inf),
+        }
+        return [reason for reason, holds in reached.items() if holds]
+
+    def result(reasons: list[str]) -> Result:
+        all_failed = evaluate.failed == evaluate.evaluations
+        evaluate.best_x.setflags(write=False)
+        return Result(
+            x=evaluate.best_x,
+            objective=evaluate.best[1],
+            violation=evaluate.best[0],
+            evaluations=evaluate.evaluations,
+            failed_evaluations=evaluate.failed,
+            generations=evaluate.generations,
+            history=evaluate.history(),
+            reasons=tuple(reasons + ["every evaluation failed"] * all_failed),
+            time_s=evaluate.elapsed_s,
+            objective_time_s=evaluate.objective_time_s,
+            algorithm=algorithm,
+            handling=handling,
+            seed_entropy=entropy(sequence),
+            seed_spawn_key=tuple(sequence.spawn_key),
+        )
+
+    try:
+        while True:
+            X = search.ask()[: evaluations - evaluate.evaluations]
+            f, violation = evaluate(X)
+            if initial_violation is None:
+                initial_violation = violation
+            reasons = limits_reached()
+            if not reasons:
+                search.tell(X, f, violation, handling.rule(evaluate.evaluations / evaluations, initial_violation))
+                reasons = list(search.stop())
+            if reasons:
+                return result(reasons)
+    except KeyboardInterrupt as interrupt:
+        if not evaluate.generations:
+            raise
+        raise Interrupted(result(["interrupted"])) from interrupt

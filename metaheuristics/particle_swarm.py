@@ -1,0 +1,134 @@
+"""Particle swarm optimisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from metaheuristics.constraint_handling import Rule
+from metaheuristics.interface import Array, Start
+from metaheuristics.settings import check_count, check_number
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ParticleSwarm:
+    """Global-best particle swarm with damped inertia, limited velocity and reflection of velocity at the bounds.
+
+    Particles start at rest. The whole swarm moves, is evaluated as one batch, and only then are the bests updated
+    (synchronous). Yarpiz updates the global best within the sweep, after every particle (asynchronous), which a batch
+    evaluation cannot do; all else, including the defaults, is as there.
+
+    Attributes:
+        population: Number of particles.
+        inertia: Share of the velocity kept in the first iteration (w).
+        inertia_damping: Factor on the inertia after every iteration (wdamp); 1 for constant inertia.
+        cognitive: Pull towards a particle's own best (c1).
+        social: Pull towards the swarm's best (c2).
+        velocity_limit: Largest speed in a variable, as a share of its range, per iteration.
+
+    Raises:
+        SearchError: A setting is not allowed.
+
+    Source:
+        Kennedy, Eberhart (1995), Particle swarm optimization; Yarpiz project YPEA102 (Heris 2015), the code used by
+        Gupta, Pratihar, Deb (2023), section 5.
+    """
+
+    population: int = 50
+    inertia: float = 1.0
+    inertia_damping: float = 0.99
+    cognitive: float = 1.5
+    social: float = 2.0
+    velocity_limit: float = 0.1
+    name: ClassVar[str] = "pso"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=1)
+        check_number(self, "inertia", at_least=0.0)
+        check_number(self, "inertia_damping", above=0.0, at_most=1.0)
+        check_number(self, "cognitive", at_least=0.0)
+        check_number(self, "social", at_least=0.0)
+        check_number(self, "velocity_limit", above=0.0, at_most=1.0)
+
+    def start(self, start: Start) -> ParticleSwarmSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return ParticleSwarmSearch(self, start)
+
+
+def move(X: Array, V: Array, to_own: Array, to_swarm: Array, inertia: float, limit: Array) -> tuple[Array, Array]:
+    """Move particles by one iteration, regardless of the bounds.
+
+    Args:
+        X: (P, n) positions.
+        V: (P, n) velocities, per iteration.
+        to_own: (P, n) random weight times the way to the particle's own best.
+        to_swarm: (P, n) random weight times the way to the swarm's best.
+        inertia: Share of the velocity kept.
+        limit: (n,) largest speed.
+
+    Returns:
+        (P, n) positions and (P, n) velocities, new arrays.
+
+    Source:
+        Kennedy, Eberhart (1995), with the inertia weight of Shi, Eberhart (1998).
+    """
+    V = np.clip(inertia * V + to_own + to_swarm, -limit, limit)
+    return X + V, V
+
+
+def reflect(X: Array, V: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Put particles back on the bounds that they crossed, with the velocity reversed in those variables.
+
+    Args:
+        X: (P, n) positions.
+        V: (P, n) velocities.
+        lower: (n,) lower bounds.
+        upper: (n,) upper bounds.
+
+    Returns:
+        (P, n) positions within the bounds and (P, n) velocities, new arrays.
+    """
+    inside = np.clip(X, lower, upper)
+    return inside, np.where(inside == X, V, -V)
+
+
+class ParticleSwarmSearch:
+    """A run of `ParticleSwarm`; see `Search`."""
+
+    def __init__(self, settings: ParticleSwarm, start: Start) -> None:
+        """Put the particles at rest on the starting points, with bests that any success will beat."""
+        self._settings = settings
+        self._start = start
+        self._limit = settings.velocity_limit * (start.upper - start.lower)
+        self._inertia = settings.inertia
+        self._X = start.initial
+        self._V = np.zeros_like(start.initial)
+        self._own_X = start.initial
+        self._own_f = np.full(len(start.initial), np.inf)
+        self._own_violation = np.full(len(start.initial), np.inf)
+
+    def ask(self) -> Array:
+        """Return the positions of the particles, (P, n)."""
+        return self._X
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Update the bests and move; see `Search.tell`."""
+        improved = rule.better(f, violation, self._own_f, self._own_violation)
+        self._own_X = np.where(improved[:, None], X, self._own_X)
+        self._own_f = np.where(improved, f, self._own_f)
+        self._own_violation = np.where(improved, violation, self._own_violation)
+        leader = self._own_X[rule.best(self._own_f, self._own_violation)]
+
+        settings, start = self._settings, self._start
+        r1, r2 = start.rng.random((2, *X.shape))
+        to_own = settings.cognitive * r1 * (self._own_X - X)
+        to_swarm = settings.social * r2 * (leader - X)
+        moved, V = move(X, self._V, to_own, to_swarm, self._inertia, self._limit)
+        self._X, self._V = reflect(moved, V, start.lower, start.upper)
+        self._inertia *= settings.inertia_damping
+
+    def stop(self) -> tuple[str, ...]:
+        """Return no reason: a swarm never gives up."""
+        return ()

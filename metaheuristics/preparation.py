@@ -1,0 +1,133 @@
+"""Before the loop: arguments checked, seeds split, starting points drawn."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from metaheuristics.errors import SearchError
+from metaheuristics.interface import Algorithm, Array, BatchObjective
+
+
+def checked_bounds(objective: BatchObjective) -> tuple[Array, Array]:
+    """Copy the bounds.
+
+    Args:
+        objective: Its names and bounds are read.
+
+    Returns:
+        (n,) lower and (n,) upper bounds, read-only.
+
+    Raises:
+        SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
+    """
+    names = tuple(objective.names)
+    lower, upper = np.array(objective.lower, dtype=np.float64), np.array(objective.upper, dtype=np.float64)
+    if not names or lower.shape != (len(names),) or upper.shape != (len(names),):
+        raise SearchError(
+            f"bounds must have shape (n,) with one name per variable and n >= 1; got {len(names)} names, "
+            f"lower of shape {lower.shape}, upper of shape {upper.shape}"
+        )
+    for name, low, high in zip(names, lower.tolist(), upper.tolist(), strict=True):
+        if not (low <= high and math.isfinite(high - low)):  # NaN fails too
+            raise SearchError(
+                f"variable {name!r}: bounds must be finite with lower <= upper, got {low} and {high}; "
+                "equal bounds fix a variable"
+            )
+    lower.setflags(write=False)
+    upper.setflags(write=False)
+    return lower, upper
+
+
+def check_limits(
+    algorithm: Algorithm,
+    evaluations: int,
+    target: float | None,
+    stagnation: int | None,
+    time_limit_s: float | None,
+) -> None:
+    """Check the stopping criteria of `minimize`.
+
+    Raises:
+        SearchError: One of them is not allowed; the budget must hold at least the starting points.
+    """
+    if not isinstance(evaluations, Integral) or evaluations < algorithm.population:
+        raise SearchError(
+            f"evaluations must be a whole number >= the population of {algorithm.name!r}, {algorithm.population}, got "
+            f"{evaluations!r}: raise the budget or take a smaller population"
+        )
+    if target is not None and math.isnan(target):
+        raise SearchError("target must be a number or None, got nan")
+    if stagnation is not None and (not isinstance(stagnation, Integral) or stagnation < 1):
+        raise SearchError(
+            f"stagnation must be a whole number of generations >= 1, or None for never, got {stagnation!r}"
+        )
+    if time_limit_s is not None and not time_limit_s > 0.0:
+        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {time_limit_s!r}")
+
+
+def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
+    """Wrap a seed, unless it is wrapped.
+
+    Raises:
+        SearchError: It is neither a whole number >= 0 nor a SeedSequence.
+    """
+    if isinstance(seed, np.random.SeedSequence):
+        return seed
+    if not isinstance(seed, Integral) or seed < 0:
+        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {seed!r}")
+    return np.random.SeedSequence(int(seed))
+
+
+def child(parent: np.random.SeedSequence, index: int) -> np.random.SeedSequence:
+    """Give the child that a first `spawn` would, without counting it as spawned in the parent."""
+    spawn_key = (*parent.spawn_key, index)
+    return np.random.SeedSequence(parent.entropy, spawn_key=spawn_key, pool_size=parent.pool_size)
+
+
+def entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
+    """Give the entropy of a seed as plain data."""
+    parts: list[int] | int = np.asarray(sequence.entropy, dtype=object).tolist()
+    return tuple(map(int, parts)) if isinstance(parts, list) else int(parts)
+
+
+def starting_points(
+    lower: Array, upper: Array, population: int, given: ArrayLike | None, seed: np.random.SeedSequence
+) -> Array:
+    """Draw uniform points and put the given ones first.
+
+    Args:
+        lower: (n,) lower bounds.
+        upper: (n,) upper bounds.
+        population: Number of points, P.
+        given: (R, n) points that replace the first R, R <= P; None for none.
+        seed: Determines the draws. They fill row by row, so that the first rows do not depend on P.
+
+    Returns:
+        (P, n) points, read-only.
+
+    Raises:
+        SearchError: The given points have another shape or lie outside the bounds.
+    """
+    draws = np.random.default_rng(seed).random((population, len(lower)))
+    points = np.clip(lower + draws * (upper - lower), lower, upper)
+    if given is not None:
+        rows = np.array(given, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
+            raise SearchError(
+                f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "
+                f"algorithm; got {rows.shape}"
+            )
+        outside = ~((rows >= lower) & (rows <= upper))  # NaN is outside too
+        if outside.any():
+            row, column = np.argwhere(outside)[0].tolist()
+            raise SearchError(
+                f"initial row {row}, variable {column}: {rows[row, column]} is outside the bounds "
+                f"{lower[column]}..{upper[column]}; clip the points or widen the bounds"
+            )
+        points[: len(rows)] = rows
+    points.setflags(write=False)
+    return points

@@ -1,0 +1,83 @@
+"""Validation of settings: one message form for all of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, fields
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+from metaheuristics.errors import SearchError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def check_number(
+    settings: DataclassInstance,
+    name: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+) -> None:
+    """Check that a setting is a finite number within limits.
+
+    Args:
+        settings: Dataclass that holds the setting.
+        name: Name of the field to check.
+        above: Exclusive lower limit.
+        at_least: Inclusive lower limit.
+        at_most: Inclusive upper limit.
+
+    Raises:
+        SearchError: It is not a number, not finite, or outside the limits.
+    """
+    value: Any = getattr(settings, name)
+    limits = [f"> {above}"] if above is not None else []
+    limits += [f">= {at_least}"] if at_least is not None else []
+    limits += [f"<= {at_most}"] if at_most is not None else []
+    allowed = " ".join(["a finite number", " and ".join(limits)]).strip()
+    number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    if (
+        not number
+        or (above is not None and value <= above)
+        or (at_least is not None and value < at_least)
+        or (at_most is not None and value > at_most)
+    ):
+        raise bad_setting(settings, name, allowed)
+
+
+def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_most: int | None = None) -> None:
+    """Check that a setting is a whole number within limits.
+
+    Args:
+        settings: Dataclass that holds the setting.
+        name: Name of the field to check.
+        at_least: Inclusive lower limit.
+        at_most: Inclusive upper limit; None for no limit.
+
+    Raises:
+        SearchError: It is not a whole number or outside the limits.
+    """
+    value = getattr(settings, name)
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or value < at_least or (at_most is not None and value > at_most):
+        upper = "" if at_most is None else f" and <= {at_most}"
+        raise bad_setting(settings, name, f"a whole number >= {at_least}{upper}")
+
+
+def bad_setting(settings: DataclassInstance, name: str, allowed: str) -> SearchError:
+    """Describe a setting that is not allowed; the caller raises the error.
+
+    Args:
+        settings: Dataclass that holds the setting.
+        name: Name of the field.
+        allowed: What is allowed, to follow "must be".
+
+    Returns:
+        The error, which names setting, value, what is allowed and the default as a way out.
+    """
+    message = f"{type(settings).__name__}: {name} must be {allowed}, got {getattr(settings, name)!r}"
+    default = next(field.default for field in fields(settings) if field.name == name)
+    return SearchError(message if default is MISSING else f"{message}; leave it out for the default, {default!r}")

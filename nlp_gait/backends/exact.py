@@ -1,0 +1,71 @@
+"""A problem under the exact interpretation, as one CasADi function: what is compiled, searched and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import MX
+
+from nlp_gait.problems.gait_problem import GaitProblem, constraint_rows
+from nlp_gait.symbolic.nonsmooth import Exact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExactModel:
+    """Exact function of a problem and the names of its outputs.
+
+    Attributes:
+        function: (x, p) to ``cost`` (sign * objective: what is minimised), ``violation`` (sum over all rows, each divided
+            by its scale), ``g`` (m,), and ``lower``, ``upper`` (m,), ``indexes``.
+        row_names: (m,) names of the constraint rows; the last n are the variables' bounds.
+        row_units: (m,).
+        index_names: names of the indexes.
+    """
+
+    function: ca.Function
+    row_names: tuple[str, ...]
+    row_units: tuple[str, ...]
+    index_names: tuple[str, ...]
+
+
+def exact_model(problem: GaitProblem) -> ExactModel:
+    """Exact function of a problem, built once for all copies that differ in parameter values only."""
+    return problem.built("exact", lambda: _build(problem))
+
+
+def _build(problem: GaitProblem) -> ExactModel:
+    point = problem.symbols()
+    assembly = problem.assemble(point, Exact())
+    values, lowers, uppers, scales, names, units = [], [], [], [], [], []
+    for constraint in assembly.constraints:
+        value, lower, upper = constraint_rows(constraint)
+        values.append(value)
+        lowers.append(lower)
+        uppers.append(upper)
+        scales.append(MX(ca.DM.ones(value.shape[0]) * constraint.scale))
+        names += constraint.row_names
+        units += [constraint.unit] * value.shape[0]
+    # The bounds of x are rows too: a candidate outside them is infeasible like any other.
+    n, k = len(problem.variables), len(problem.parameters)
+    values.append(point.x)
+    lowers.append(point.p[k - 2 * n : k - n])
+    uppers.append(point.p[k - n :])
+    scales.append(MX(ca.DM(problem.scale)))
+    names += [f"bounds[{name}]" for name in problem.names]
+    units += [variable.unit for variable in problem.variables]
+
+    g, lower, upper, scale = (ca.vertcat(*parts) for parts in (values, lowers, uppers, scales))
+    excess = ca.fmax(ca.fmax(lower - g, g - upper), 0)
+    outputs = {
+        "cost": problem.objective.sign * assembly.objective,
+        "violation": ca.sum1(excess / scale),
+        "g": g,
+        "lower": lower,
+        "upper": upper,
+        "indexes": ca.vertcat(*assembly.indexes.values()),
+    }
+    function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
+    return ExactModel(
+        function=function, row_names=tuple(names), row_units=tuple(units), index_names=tuple(assembly.indexes)
+    )

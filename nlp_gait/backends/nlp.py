@@ -1,0 +1,138 @@
+"""A problem under the lifted interpretation, as an NLP over scaled variables.
+
+    minimise  sign * objective(x, s)   over z in [0, 1]^n and the lifted variables s
+    subject to the problem's rows, and the rows that tie s to the expressions it stands for,
+
+with x = default lower bound + z * default range. Samples are mapped, never unrolled.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from casadi import MX
+
+from nlp_gait.errors import LiftedSenseError
+from nlp_gait.problems.gait_problem import Array, GaitProblem, Point, constraint_rows
+from nlp_gait.symbolic.nonsmooth import Lift, Lifted
+
+# A derivative below this is zero for the check of the lifting's sense.
+SENSE_TOLERANCE = 1e-12
+# Points at which that check is made: fixed fractions of the default ranges, away from the bounds.
+SENSE_POINTS = (0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NlpModel:
+    """NLP of a problem.
+
+    Attributes:
+        nlp: CasADi's dictionary: x = (z, s), p = (problem parameters, sigmoid width), f, g.
+        variables: n, the number of problem variables.
+        row_names: names of the problem's rows, the first rows of g.
+        row_units: their units.
+        offset: (n,) x at z = 0.
+        scale: (n,) range of x.
+        row_bounds: function p -> (lower, upper) of the problem's rows.
+        lift_start: function (z, p, width) -> s at the exact values.
+        lifted: number of lifted variables.
+        lift_rows: number of rows that tie them.
+        smoothed: True if a jump was smoothed, so that the width matters.
+        build_s: time it took to build [s].
+    """
+
+    nlp: dict[str, MX]
+    variables: int
+    row_names: tuple[str, ...]
+    row_units: tuple[str, ...]
+    offset: Array
+    scale: Array
+    row_bounds: ca.Function
+    lift_start: ca.Function
+    lifted: int
+    lift_rows: int
+    smoothed: bool
+    build_s: float
+
+
+def nlp_model(problem: GaitProblem) -> NlpModel:
+    """NLP of a problem, built once for all copies that differ in parameter values only.
+
+    Raises:
+        LiftedSenseError: the problem lifts a function where the reformulation would not be exact.
+    """
+    return problem.built("nlp", lambda: _build(problem))
+
+
+def _build(problem: GaitProblem) -> NlpModel:
+    started = time.perf_counter()
+    n = len(problem.variables)
+    offset = np.array([variable.lower for variable in problem.variables])
+    symbols = problem.symbols()
+    z, p, width = MX.sym("z", n), symbols.p, MX.sym("width")
+    ops = Lifted(width)
+    assembly = problem.assemble(Point(x=offset + problem.scale * z, p=p, positions=symbols.positions), ops)
+
+    rows = [constraint_rows(constraint) for constraint in assembly.constraints]
+    values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
+    bounds = ca.Function("row_bounds", [p], [lower, upper])
+    cost = problem.objective.sign * assembly.objective
+    if ops.lifts:
+        _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds)
+    lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
+    ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
+    return NlpModel(
+        nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
+        variables=n,
+        row_names=tuple(name for constraint in assembly.constraints for name in constraint.row_names),
+        row_units=tuple(c.unit for c in assembly.constraints for _ in range(c.value.shape[0])),
+        offset=offset,
+        scale=problem.scale,
+        row_bounds=bounds,
+        lift_start=_lift_start(ops.lifts, [z, p, width]),
+        lifted=lifted.shape[0],
+        lift_rows=ties.shape[0],
+        smoothed=ops.smoothed,
+        build_s=time.perf_counter() - started,
+    )
+
+
+def _lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
+    """Function of the inputs to the exact values of all lifted variables; a lift may contain earlier ones."""
+    values: list[MX] = []
+    for i, lift in enumerate(lifts):
+        earlier = [other.variable for other in lifts[:i]]
+        values += ca.graph_substitute([lift.value], earlier, values) if earlier else [lift.value]
+    return ca.Function("lift_start", inputs, [ca.vertcat(*values)])
+
+
+def _check_sense(
+    problem: GaitProblem, lifts: list[Lift], inputs: MX, cost: MX, values: MX, bounds: ca.Function
+) -> None:
+    """Lifting is exact only if moving a lifted variable away from its exact value never helps.
+
+    Checked by the sign of the first derivatives of the cost and of each row, at points inside the bounds.
+    """
+    variables = ca.vertcat(*(lift.variable for lift in lifts))
+    away = np.concatenate([np.full(lift.variable.shape[0], 1.0 if lift.from_above else -1.0) for lift in lifts])
+    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(ca.vertcat(cost, values), variables)])
+    lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
+    # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
+    hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower)])
+    two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper)])
+    for share in SENSE_POINTS:
+        at = np.concatenate([np.full(len(problem.variables), share), problem.p, [1e-3]])
+        slope = np.array(slopes(at, np.zeros(len(away))))
+        helps = slope * away * hurts[:, None] < -SENSE_TOLERANCE
+        helps |= two_sided[:, None] & (np.abs(slope) > SENSE_TOLERANCE)
+        if helps.any():
+            row = int(np.argwhere(helps)[0][0])
+            where = "the objective" if row == 0 else f"constraint row {row - 1}"
+            raise LiftedSenseError(
+                f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "
+                "NLP would be wrong; use abs only where it is minimised or bounded from above, min only where it is "
+                "maximised or bounded from below, and ops.step for a true jump"
+            )

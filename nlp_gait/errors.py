@@ -1,0 +1,48 @@
+"""Errors that a user can act on: each says what, the value, what is allowed and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class GaitError(Exception):
+    """Root of every error that this package raises on purpose."""
+
+
+class UnknownNameError(GaitError):
+    """A problem, robot, variable, parameter, algorithm or option that does not exist."""
+
+
+class RobotDataError(GaitError):
+    """Robot data that is damaged or physically impossible."""
+
+
+class InputError(GaitError):
+    """A value that is not allowed: wrong length, not finite, outside its bounds, bounds inverted."""
+
+
+class CompilerError(GaitError):
+    """The compiled backend was demanded and cannot be had."""
+
+
+class LiftedSenseError(GaitError):
+    """A non-smooth operation was lifted where the reformulation is not exact."""
+
+
+class OutputError(GaitError):
+    """A result cannot be written where it was asked for."""
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    """Error for an unknown name, with the nearest known ones.
+
+    Args:
+        kind: what was looked up, for example ``"problem"``.
+        name: what the user gave.
+        known: all allowed names.
+    """
+    choices = sorted(known)
+    near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
+    return UnknownNameError(f"unknown {kind} {name!r}; {hint}")

@@ -1,0 +1,32 @@
+"""Gait problems by name."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.problems.gait_problem import GaitProblem
+from nlp_gait.problems.nao_ssp import nao_ssp
+
+PROBLEMS: dict[str, Callable[..., GaitProblem]] = {"nao-ssp": nao_ssp}
+
+
+def load(name: str, **options: str | int | float | bool) -> GaitProblem:
+    """Problem by name, built with the given options; the others keep their defaults.
+
+    Raises:
+        UnknownNameError: no such problem or option.
+        InputError: a value that the option does not allow.
+    """
+    if name not in PROBLEMS:
+        raise unknown("problem", name, PROBLEMS)
+    make = PROBLEMS[name]
+    known = inspect.signature(make).parameters
+    for option in options:
+        if option not in known:
+            raise unknown(f"option of {name}", option, known)
+    return make(**options)
+
+
+__all__ = ["PROBLEMS", "GaitProblem", "InputError", "load"]

@@ -1,0 +1,178 @@
+"""NAO's single support phase: least mean power (Gupta, Pratihar, Deb 2023, sections 3.1 and 4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+from casadi import DM, MX, SX
+
+from nlp_gait.problems.gait_problem import Array, Assembly, GaitProblem, Objective, Point, Signals, Variable
+from nlp_gait.problems.nao import (
+    GRAVITY,
+    LEAST_DURATION,
+    Derivatives,
+    Loader,
+    Loads,
+    Phase,
+    Plan,
+    Planner,
+    arm_joints,
+    leg_joints,
+    nao,
+)
+from nlp_gait.problems.nao_limits import assemble_phase, phase_parameters
+from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.balance import zmp_of_wrench
+from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, stack
+
+# Section 4.1 and Table 3 [m]: the left foot supports, the right foot swings.
+SUPPORT_XY = (0.06, 0.05)
+SWING_X, SWING_Y = (0.0, 0.12), -0.05
+HIP_X, HIP_Y = (0.03, 0.09), 0.025
+MEAN_DBM = (0.05, 0.02)
+ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
+    "LShoulderPitch": (2.0, 1.0),
+    "LElbowRoll": (-0.42, -0.64),
+    "RShoulderPitch": (1.0, 2.0),
+    "RElbowRoll": (0.64, 0.42),
+}
+
+VARIABLES = (
+    Variable(name="hip_height_m", unit="m", lower=0.25, upper=0.31, description="x1, torso origin at both ends"),
+    Variable(name="hip_vz_start_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x2, vertical velocity"),
+    Variable(name="hip_vz_end_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x3"),
+    Variable(name="hip_vx_start_m_s", unit="m/s", lower=0.001, upper=0.2, description="x4, sagittal velocity"),
+    Variable(name="hip_vx_end_m_s", unit="m/s", lower=0.001, upper=0.2, description="x5"),
+    Variable(name="hip_vy_start_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x6, lateral velocity"),
+    Variable(name="hip_vy_end_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x7"),
+    Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
+    Variable(name="single_support_time_s", unit="s", lower=0.4, upper=4.0, description="x9"),
+)
+
+
+def nao_ssp(
+    *,
+    robot: str = "nao-v5",
+    intervals: int = 10,
+    derivatives: Derivatives = "analytic",
+    rotational_inertia: bool = True,
+    samples_per_interval: int = 1,
+) -> GaitProblem:
+    """Single support of NAO.
+
+    Args:
+        robot: name or file of the robot.
+        intervals: equal parts of the phase over which torques may change by the limit.
+        derivatives: analytic, or finite differences of the sampled angles as in the paper.
+        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
+        samples_per_interval: above 1 for a grid that is denser than the intervals.
+    """
+    model = nao(robot, rotational_inertia)
+    phase = Phase(
+        robot=model,
+        variables=len(VARIABLES),
+        duration="single_support_time_s",
+        plan=_planner(model),
+        loads=_loads(model),
+        intervals=intervals * samples_per_interval,
+        derivatives=derivatives,
+    )
+    foot = model.feet["left"]
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        samples = phase.samples(point, ops)
+        dbm = single_support_margins(samples.zmp, SUPPORT_XY, foot, ops)
+        return assemble_phase(point, ops, samples, dbm, samples_per_interval)
+
+    def refine(factor: int) -> GaitProblem:
+        return nao_ssp(
+            robot=robot,
+            intervals=intervals,
+            derivatives=derivatives,
+            rotational_inertia=rotational_inertia,
+            samples_per_interval=samples_per_interval * factor,
+        )
+
+    def signals(x: Array, p: Array) -> Signals:
+        return phase.signals(problem.symbols(), x, p)
+
+    problem = GaitProblem(
+        name="nao-ssp",
+        title="NAO, single support: least mean power",
+        options={
+            "robot": robot,
+            "intervals": intervals,
+            "derivatives": derivatives,
+            "rotational_inertia": rotational_inertia,
+        },
+        variables=VARIABLES,
+        own_parameters=phase_parameters(model, MEAN_DBM),
+        objective=Objective(name="power", unit="W"),
+        assemble=assemble,
+        refine=refine,
+        signals=signals,
+    )
+    return problem
+
+
+def _planner(robot: Robot) -> Planner:
+    """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
+    ankle_height = robot.feet["left"].ankle_height_m
+
+    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
+        height, vz0, vz1, vx0, vx1, vy0, vy1, lift, duration = ca.vertsplit(x)
+        T = ca.fmax(duration, LEAST_DURATION)
+        hip = stack(
+            cubic(SX(HIP_X[0]), SX(HIP_X[1]), vx0, vx1, T, phase),
+            cubic(SX(HIP_Y), SX(HIP_Y), vy0, vy1, T, phase),
+            cubic(height, height, vz0, vz1, T, phase),
+        )
+        support = stack(constant(SUPPORT_XY[0]), constant(SUPPORT_XY[1]), constant(ankle_height))
+        forward = cubic(SX(SWING_X[0]), SX(SWING_X[1]), SX(0), SX(0), T, phase)
+        rise = parabola_lift(forward, *SWING_X, lift)
+        swing = stack(forward, constant(SWING_Y), rise._replace(position=rise.position + ankle_height))
+        left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
+        right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
+        return Plan(
+            joints={**left, **right, **arm_joints(ARM_SWING, T, phase)},
+            hip=hip.position,
+            ankles={"L": support.position, "R": swing.position},
+            reach=ca.vertcat(left_reach, right_reach),
+        )
+
+    return plan
+
+
+def _loads(robot: Robot) -> Loader:
+    """Torques of the whole tree from the support foot, and the ZMP from the ground's wrench on that foot."""
+    foot = robot.feet["left"]
+    tree = tree_from(robot, foot.link)
+
+    def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
+        q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
+        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY)
+        offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
+        return Loads(torques, DM(SUPPORT_XY) + offset)
+
+    return loads
+
+
+def single_support_margins(
+    zmp: MX, support_xy: tuple[float, float], foot: Foot, ops: Nonsmooth
+) -> tuple[MX, MX]:
+    """Balance margins in x and y, (1, N + 1) each [m].
+
+    In x the distance to the sole's edge on that side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.
+    Outside the sole the paper's zero is continued below zero, so that an infeasible gait says how far outside it is.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (21), (22).
+    """
+    x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
+    dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
+    dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T
+    return dbm_x, dbm_y

@@ -1,0 +1,169 @@
+"""Read robot files: one JSON object a robot, which may extend another and replace some of its records."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot
+
+SCHEMA = 1
+
+T = TypeVar("T")
+
+_DATA = resources.files("nlp_gait.robots") / "data"
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    return tuple(sorted(entry.name.removesuffix(".json") for entry in _DATA.iterdir() if entry.name.endswith(".json")))
+
+
+@cache
+def load_robot(name_or_path: str) -> Robot:
+    """Robot by its name, or from a file (a path that ends in ``.json``).
+
+    Raises:
+        UnknownNameError: no such robot.
+        RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
+    """
+    return _robot(_merged(name_or_path))
+
+
+def _merged(name_or_path: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
+    raw = _read(name_or_path)
+    base_name = raw.get("extends")
+    if base_name is None:
+        return raw
+    if base_name in seen or not isinstance(base_name, str):
+        raise RobotDataError(f"robot {name_or_path!r}: 'extends' must name another robot, got {base_name!r}")
+    base = _merged(base_name, (*seen, name_or_path))
+    merged = {**base, **raw}
+    for group in ("links", "joints", "feet", "sources"):
+        merged[group] = {**base.get(group, {}), **raw.get(group, {})}
+    return merged
+
+
+def _read(name_or_path: str) -> dict[str, Any]:
+    if name_or_path.endswith(".json"):
+        try:
+            text = Path(name_or_path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise RobotDataError(f"robot file {name_or_path!r} cannot be read: {error}") from error
+    elif name_or_path in robot_names():
+        text = (_DATA / f"{name_or_path}.json").read_text(encoding="utf-8")
+    else:
+        raise unknown("robot", name_or_path, robot_names())
+    try:
+        raw = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise RobotDataError(f"robot file {name_or_path!r} is not valid JSON: {error}") from error
+    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
+        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+        raise RobotDataError(f"robot file {name_or_path!r}: 'schema' must be {SCHEMA}, got {found!r}")
+    return raw
+
+
+def _robot(raw: Mapping[str, Any]) -> Robot:
+    name = _get(raw, "name", str, "robot")
+    owner = f"robot {name!r}"
+    links = {key: _link(key, value) for key, value in _records(raw, "links", owner)}
+    joints = {key: _joint(key, value) for key, value in _records(raw, "joints", owner)}
+    feet = {key: _foot(key, value) for key, value in _records(raw, "feet", owner)}
+    return Robot(
+        name=name,
+        description=str(raw.get("description", "")),
+        sources={str(k): str(v) for k, v in dict(raw.get("sources", {})).items()},
+        root=_get(raw, "root", str, owner),
+        links=links,
+        joints=joints,
+        feet=feet,
+    )
+
+
+def _link(name: str, raw: Mapping[str, Any]) -> Link:
+    owner = f"link {name!r}"
+    return Link(
+        name=name,
+        mass_kg=_number(raw, "mass_kg", owner),
+        com_m=_numbers(raw, "com_m", 3, owner),  # type: ignore[arg-type]
+        inertia_com_kgm2=_numbers(raw, "inertia_com_kgm2", 6, owner),  # type: ignore[arg-type]
+    )
+
+
+def _joint(name: str, raw: Mapping[str, Any]) -> Joint:
+    owner = f"joint {name!r}"
+    axis = _numbers(raw, "axis", 3, owner)
+    length = math.hypot(*axis)
+    if not 0.99 < length < 1.01:  # published axes are rounded (0.7071); a larger error is a mistake
+        raise RobotDataError(f"{owner}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
+    limits = _numbers(raw, "limits_rad", 2, owner)
+    planning = _numbers(raw, "planning_limits_rad", 2, owner) if "planning_limits_rad" in raw else limits
+    motor = raw.get("motor")
+    return Joint(
+        name=name,
+        parent=_get(raw, "parent", str, owner),
+        child=_get(raw, "child", str, owner),
+        origin_m=_numbers(raw, "origin_m", 3, owner),  # type: ignore[arg-type]
+        axis=tuple(a / length for a in axis),  # type: ignore[arg-type]
+        limits_rad=limits,  # type: ignore[arg-type]
+        planning_limits_rad=planning,  # type: ignore[arg-type]
+        velocity_limit_rad_s=_number(raw, "velocity_limit_rad_s", owner),
+        torque_limit_Nm=_number(raw, "torque_limit_Nm", owner),
+        motor=None if motor is None else _motor(motor, owner),
+    )
+
+
+def _motor(raw: Any, owner: str) -> Motor:
+    if not isinstance(raw, dict):
+        raise RobotDataError(f"{owner}: 'motor' must be an object, got {raw!r}")
+    ratings = ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm")
+    return Motor(make=_get(raw, "make", str, owner), **{key: _number(raw, key, owner) for key in ratings})
+
+
+def _foot(side: str, raw: Mapping[str, Any]) -> Foot:
+    owner = f"foot {side!r}"
+    extents = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
+    polygon = raw.get("sole_polygon_m", [])
+    if not isinstance(polygon, list):
+        raise RobotDataError(f"{owner}: sole_polygon_m must be a list of [x, y], got {polygon!r}")
+    corners = tuple(_numbers({"corner": c}, "corner", 2, f"{owner}: sole_polygon_m") for c in polygon)
+    return Foot(
+        link=_get(raw, "link", str, owner),
+        sole_polygon_m=corners,  # type: ignore[arg-type]
+        **{key: _number(raw, key, owner) for key in extents},
+    )
+
+
+def _records(raw: Mapping[str, Any], group: str, owner: str) -> list[tuple[str, Mapping[str, Any]]]:
+    records = raw.get(group)
+    if not isinstance(records, dict) or not all(isinstance(r, dict) for r in records.values()):
+        raise RobotDataError(f"{owner}: {group!r} must be an object of records by name, got {type(records).__name__}")
+    return list(records.items())
+
+
+def _get(raw: Mapping[str, Any], key: str, kind: type[T], owner: str) -> T:
+    value = raw.get(key)
+    if not isinstance(value, kind):
+        raise RobotDataError(f"{owner}: {key!r} must be a {kind.__name__}, got {value!r}")
+    return value
+
+
+def _number(raw: Mapping[str, Any], key: str, owner: str) -> float:
+    value = raw.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise RobotDataError(f"{owner}: {key!r} must be a finite number, got {value!r}")
+    return float(value)
+
+
+def _numbers(raw: Mapping[str, Any], key: str, count: int, owner: str) -> tuple[float, ...]:
+    value = raw.get(key)
+    if not isinstance(value, list) or len(value) != count:
+        raise RobotDataError(f"{owner}: {key!r} must be a list of {count} numbers, got {value!r}")
+    return tuple(_number({key: item}, key, owner) for item in value)

@@ -1,0 +1,118 @@
+"""A robot's links as seen from any link held fixed, for example the support foot."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.robots.robot import Joint, Link, Robot, Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """Link in a tree that starts at the fixed link; its reference point is the joint through which it is reached.
+
+    Attributes:
+        link: mass and inertia, in link axes.
+        parent: index of the body before it; -1 for the fixed one.
+        joint: joint to that body; None for the fixed one.
+        direction: +1 if the joint is passed from its parent to its child link, else -1.
+        offset_m: from the parent's reference point to this one, in the parent's axes [m].
+        com_offset_m: from the reference point to the centre of mass, in link axes [m].
+    """
+
+    link: Link
+    parent: int
+    joint: Joint | None
+    direction: int
+    offset_m: Vector
+    com_offset_m: Vector
+
+
+def tree_from(robot: Robot, fixed_link: str) -> tuple[Body, ...]:
+    """Bodies ordered from the fixed link outwards, parents before children.
+
+    The fixed link's reference point is its frame's origin.
+    """
+    if fixed_link not in robot.links:
+        raise InputError(f"robot {robot.name!r} has no link {fixed_link!r}")
+    neighbours: dict[str, list[tuple[str, Joint]]] = {name: [] for name in robot.links}
+    for joint in robot.joints.values():
+        neighbours[joint.parent].append((joint.child, joint))
+        neighbours[joint.child].append((joint.parent, joint))
+    bodies: list[Body] = []
+    waiting: list[tuple[str, int, Joint | None, Vector]] = [(fixed_link, -1, None, (0.0, 0.0, 0.0))]
+    while waiting:
+        name, parent, joint, parent_reference = waiting.pop()
+        forward = joint is None or joint.child == name
+        # The joint's centre lies at its origin in the parent's frame and at zero in the child's.
+        centre_in_parent = (0.0, 0.0, 0.0) if joint is None or not forward else joint.origin_m
+        reference = (0.0, 0.0, 0.0) if joint is None or forward else joint.origin_m
+        link = robot.links[name]
+        bodies.append(
+            Body(
+                link=link,
+                parent=parent,
+                joint=joint,
+                direction=1 if forward else -1,
+                offset_m=_minus(centre_in_parent, parent_reference),
+                com_offset_m=_minus(link.com_m, reference),
+            )
+        )
+        index = len(bodies) - 1
+        waiting += [(to, index, via, reference) for to, via in reversed(neighbours[name]) if via is not joint]
+    return tuple(bodies)
+
+
+def weld(robot: Robot, joints: Collection[str]) -> Robot:
+    """The same robot with some joints locked at zero: their child links become one with the parents.
+
+    Masses add up, centres of mass and inertias are combined by the parallel-axis theorem.
+    """
+    links = dict(robot.links)
+    kept = dict(robot.joints)
+    # From the leaves inwards, so that a welded child already holds what was welded to it.
+    by_depth = sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child)))
+    for name in by_depth:
+        joint = kept.pop(name)
+        links[joint.parent] = _welded(links[joint.parent], links.pop(joint.child), joint.origin_m)
+        for other in [j for j in kept.values() if j.parent == joint.child]:
+            kept[other.name] = replace(other, parent=joint.parent, origin_m=_plus(joint.origin_m, other.origin_m))
+    return replace(robot, links=links, joints=kept)
+
+
+def point_masses(robot: Robot) -> Robot:
+    """The same robot with every link's inertia about its centre of mass set to zero."""
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    links: Mapping[str, Link] = {n: replace(link, inertia_com_kgm2=zero) for n, link in robot.links.items()}
+    return replace(robot, links=links)
+
+
+def inertia_matrix(link: Link) -> np.ndarray:
+    """(3, 3) inertia about the centre of mass, link axes [kg m^2]."""
+    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def _welded(parent: Link, child: Link, origin: Vector) -> Link:
+    mass = parent.mass_kg + child.mass_kg
+    coms = [np.array(parent.com_m), np.array(child.com_m) + np.array(origin)]
+    com = (parent.mass_kg * coms[0] + child.mass_kg * coms[1]) / mass
+    inertia = np.zeros((3, 3))
+    for link, c in zip((parent, child), coms, strict=True):
+        r = c - com
+        inertia += inertia_matrix(link) + link.mass_kg * (r @ r * np.eye(3) - np.outer(r, r))
+    x, y, z = com.tolist()
+    ixx, ixy, ixz, _, iyy, iyz, _, _, izz = inertia.flatten().tolist()
+    return Link(name=parent.name, mass_kg=mass, com_m=(x, y, z), inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _plus(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

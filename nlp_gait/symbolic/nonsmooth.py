@@ -1,0 +1,126 @@
+"""The four operations at which a gait model is not smooth, in two interpretations.
+
+A problem is assembled once, against ``Nonsmooth``. ``Exact`` gives what the papers evaluate: it is compiled, searched and
+judged. ``Lifted`` gives an NLP that IPOPT can solve: absolute values and minima become variables with inequalities, an
+exact reformulation where the sense allows it (see ``backends/nlp.py``, which checks the sense); only a true jump is smoothed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import casadi as ca
+from casadi import MX, SX
+
+# Keeps the slope of acos finite where its argument reaches 1 to machine precision.
+LEAST_SINE_SQUARED = 1e-16
+# The lifted acos is continued by its tangent from here at the latest, should the user ask for a smaller reach margin.
+LEAST_REACH_MARGIN = 1e-6
+
+
+class Angle(NamedTuple):
+    """acos of an argument and its first and second derivative with respect to it."""
+
+    value: SX
+    first: SX
+    second: SX
+
+
+class Nonsmooth(Protocol):
+    """What a problem may use beside smooth functions."""
+
+    def acos(self, argument: SX, margin: SX) -> Angle:
+        """acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""
+
+    def abs(self, v: MX) -> MX:
+        """Elementwise |v|."""
+
+    def min(self, a: MX, b: MX) -> MX:
+        """Elementwise minimum."""
+
+    def step(self, switch: MX, below: MX, above: MX) -> MX:
+        """Elementwise: ``below`` where switch < 0, else ``above``."""
+
+
+class Exact:
+    """The functions as the papers mean them."""
+
+    def acos(self, argument: SX, margin: SX) -> Angle:
+        """Argument clamped to [-1, 1]: every reachable pose is exact, an unreachable one finite and still."""
+        clamped = ca.fmax(-1, ca.fmin(1, argument))
+        reachable = ca.fabs(argument) <= 1
+        sine_squared = ca.fmax(1 - clamped * clamped, LEAST_SINE_SQUARED)
+        first = -reachable / ca.sqrt(sine_squared)
+        return Angle(ca.acos(clamped), first, first * clamped / sine_squared)
+
+    def abs(self, v: MX) -> MX:
+        """|v|."""
+        return ca.fabs(v)
+
+    def min(self, a: MX, b: MX) -> MX:
+        """Minimum."""
+        return ca.fmin(a, b)
+
+    def step(self, switch: MX, below: MX, above: MX) -> MX:
+        """A true jump, written without a branch so that it vectorises."""
+        return below + (switch >= 0) * (above - below)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lift:
+    """New NLP variables that stand for a non-smooth expression.
+
+    Attributes:
+        variable: (k, 1) symbols.
+        value: (k, 1) what they equal at the exact function (a start value, in terms of x and earlier lifts).
+        rows: (r, 1) expressions that must be >= 0.
+        from_above: True if the variable may only exceed the exact value (abs), False if only fall short of it (min).
+    """
+
+    variable: MX
+    value: MX
+    rows: MX
+    from_above: bool
+
+
+class Lifted:
+    """Absolute values and minima as variables with inequalities; a jump as a sigmoid.
+
+    Args:
+        width: width of the sigmoid in units of the switch (an NLP parameter).
+    """
+
+    def __init__(self, width: MX) -> None:
+        self.width = width
+        self.lifts: list[Lift] = []
+        self.smoothed = False
+
+    def acos(self, argument: SX, margin: SX) -> Angle:
+        """acos continued by its tangents beyond +-(1 - margin): smooth, with a slope that draws a solver back."""
+        limit = 1 - ca.fmax(margin, LEAST_REACH_MARGIN)
+        clamped = ca.fmax(-limit, ca.fmin(limit, argument))
+        inside = ca.fabs(argument) <= limit
+        sine_squared = 1 - clamped * clamped
+        first = -1 / ca.sqrt(sine_squared)
+        return Angle(
+            ca.acos(clamped) + first * (argument - clamped), first, inside * first * clamped / sine_squared
+        )
+
+    def abs(self, v: MX) -> MX:
+        """A variable s with s >= v and s >= -v."""
+        s = MX.sym(f"abs_{len(self.lifts)}", v.shape[0])
+        self.lifts.append(Lift(variable=s, value=ca.fabs(v), rows=ca.vertcat(s - v, s + v), from_above=True))
+        return s
+
+    def min(self, a: MX, b: MX) -> MX:
+        """A variable d with d <= a and d <= b."""
+        d = MX.sym(f"min_{len(self.lifts)}", a.shape[0])
+        self.lifts.append(Lift(variable=d, value=ca.fmin(a, b), rows=ca.vertcat(a - d, b - d), from_above=False))
+        return d
+
+    def step(self, switch: MX, below: MX, above: MX) -> MX:
+        """A sigmoid between the two branches."""
+        self.smoothed = True
+        share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
+        return below + share * (above - below)

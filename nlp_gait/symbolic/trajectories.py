@@ -1,0 +1,70 @@
+"""Trajectories with analytic first and second time derivatives."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from casadi import SX
+
+
+class Motion(NamedTuple):
+    """A quantity with its first and second time derivative (scalars or vectors of one unit: u, u/s, u/s^2)."""
+
+    position: SX
+    velocity: SX
+    acceleration: SX
+
+
+def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX, phase: SX) -> Motion:
+    """Cubic polynomial in time through given end positions and end velocities.
+
+    Args:
+        start: position at phase 0 [u].
+        end: position at phase 1 [u].
+        start_velocity: velocity at phase 0 [u/s].
+        end_velocity: velocity at phase 1 [u/s].
+        duration: time from phase 0 to phase 1 [s]; must not be zero.
+        phase: time / duration.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four boundary conditions each), in Hermite form.
+    """
+    rise, v0, v1 = end - start, start_velocity * duration, end_velocity * duration
+    c2 = 3 * rise - 2 * v0 - v1
+    c3 = v0 + v1 - 2 * rise
+    return Motion(
+        start + phase * (v0 + phase * (c2 + phase * c3)),
+        (v0 + phase * (2 * c2 + 3 * phase * c3)) / duration,
+        (2 * c2 + 6 * phase * c3) / duration**2,
+    )
+
+
+def parabola_lift(along: Motion, start: float, end: float, height: SX) -> Motion:
+    """Height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
+
+    Args:
+        along: horizontal motion of the foot [m].
+        start: where the foot leaves the ground [m].
+        end: where it lands [m].
+        height: greatest height [m].
+
+    Source:
+        Gupta, Pratihar, Deb (2023), Table 3, row 2, with Z_A(x_f) = 0 in place of the misprinted Z_A(x_i + S_L) = 0:
+        with Z'(x_m) = 0 the cubic has no third-order term.
+    """
+    half = (end - start) / 2
+    offset = (along.position - (start + end) / 2) / half
+    rate, bend = along.velocity / half, along.acceleration / half
+    return Motion(height * (1 - offset**2), -2 * height * offset * rate, -2 * height * (rate**2 + offset * bend))
+
+
+def constant(value: float) -> Motion:
+    """A quantity that does not move."""
+    return Motion(SX(value), SX(0), SX(0))
+
+
+def stack(*motions: Motion) -> Motion:
+    """Motions one below the other as one vector motion."""
+    from casadi import vertcat
+
+    return Motion(*(vertcat(*parts) for parts in zip(*motions, strict=True)))

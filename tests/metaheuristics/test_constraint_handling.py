@@ -1,0 +1,105 @@
+"""Constraint rules are total preorders, and each prefers what its definition says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from metaheuristics import ConstraintHandling, Deb, EpsilonLevel, SearchError, StaticPenalty
+from metaheuristics.constraint_handling import mark_failed
+from metaheuristics.interface import Array
+
+HANDLINGS: list[ConstraintHandling] = [Deb(), StaticPenalty(weight=2.0), EpsilonLevel()]
+every_rule = pytest.mark.parametrize("handling", HANDLINGS, ids=lambda handling: handling.name)
+
+# Few distinct values, so that ties of all kinds occur; and everything that marks a failure.
+value = st.sampled_from([-2.0, -1.0, 0.0, 1.0, 1.5, np.nan, np.inf, -np.inf]) | st.floats(-1e6, 1e6)
+violation = st.sampled_from([0.0, 0.0, 0.5, 1.0, 2.0, np.nan, np.inf]) | st.floats(0.0, 1e6)
+populations = st.lists(st.tuples(value, violation), min_size=1, max_size=12)
+progress = st.floats(0.0, 1.0)
+repeatable = settings(derandomize=True, deadline=None)
+
+
+def columns(population: list[tuple[float, float]]) -> tuple[Array, Array]:
+    """Split into f and violation."""
+    f, v = np.array(population, dtype=float).T
+    return f, v
+
+
+@every_rule
+@repeatable
+@given(population=populations, progress=progress)
+def test_order_agrees_with_pairs(
+    handling: ConstraintHandling, population: list[tuple[float, float]], progress: float
+) -> None:
+    f, v, failed = mark_failed(*columns(population))
+    rule = handling.rule(progress, v)
+    better = rule.better(f[:, None], v[:, None], f, v)
+    order = rule.order(f, v)
+    assert sorted(order) == list(range(len(f))) and rule.best(f, v) == order[0]
+    assert not (better & better.T).any()  # asymmetric
+    # A strict weak order, listed best first: nothing later is better than anything earlier ...
+    in_order = better[np.ix_(order, order)]
+    assert not np.tril(in_order).any()
+    # ... and "neither is better" is transitive: the classes of equals are blocks along the order.
+    equal = ~(in_order | in_order.T)
+    classes = np.cumsum(~np.concatenate([[True], np.diagonal(equal, 1)]))
+    np.testing.assert_array_equal(equal, classes[:, None] == classes)
+    # Failed evaluations come last, all equal.
+    assert not failed[order[: len(f) - failed.sum()]].any()
+    assert better[np.ix_(~failed, failed)].all() and not better[failed].any()
+
+
+@repeatable
+@given(population=populations)
+def test_deb(population: list[tuple[float, float]]) -> None:
+    f, v, failed = mark_failed(*columns(population))
+    better = Deb().rule(0.5, v).better(f[:, None], v[:, None], f, v)
+    for i in np.flatnonzero(~failed):
+        for j in np.flatnonzero(~failed):
+            if v[i] == 0.0 and v[j] == 0.0:
+                assert better[i, j] == (f[i] < f[j])
+            elif v[i] != v[j]:
+                assert better[i, j] == (v[i] < v[j])
+
+
+def test_marking_copies_and_marks_both() -> None:
+    f, v = np.array([1.0, np.nan, 2.0, -np.inf]), np.array([0.0, 0.0, np.inf, 1.0])
+    marked_f, marked_v, failed = mark_failed(f, v)
+    assert failed.tolist() == [False, True, True, True]
+    assert marked_f.tolist() == [1.0, np.inf, np.inf, np.inf] and marked_v.tolist() == [0.0, np.inf, np.inf, np.inf]
+    assert np.isnan(f[1]) and v[0] == 0.0
+
+
+def test_penalty_weighs_violation() -> None:
+    rule = StaticPenalty(weight=2.0).rule(0.0, np.zeros(1))
+    assert rule.order(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.4, 0.6])).tolist() == [1, 0, 2]
+
+
+def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
+    handling = EpsilonLevel(share=0.5, exponent=2.0, control=0.8)
+    initial = np.array([4.0, 1.0, np.inf, 3.0, 2.0])  # finite ones sorted: 1, 2, 3, 4; a share of a half gives 3
+    assert handling.epsilon(0.0, initial) == 3.0
+    assert handling.epsilon(0.4, initial) == 3.0 * 0.5**2
+    assert handling.epsilon(0.8, initial) == handling.epsilon(1.0, initial) == 0.0
+    assert handling.epsilon(0.0, np.array([np.inf])) == 0.0
+    f, v = np.array([0.0, 1.0, 2.0]), np.array([2.9, 0.0, 3.1])
+    assert handling.rule(0.0, initial).order(f, v).tolist() == [0, 1, 2]
+    assert handling.rule(0.9, initial).order(f, v).tolist() == [1, 0, 2]
+
+
+@pytest.mark.parametrize(
+    ("factory", "settings", "message"),
+    [
+        (StaticPenalty, {"weight": 0.0}, r"StaticPenalty: weight must be a finite number > 0\.0, got 0\.0"),
+        (StaticPenalty, {"weight": np.nan}, "weight"),
+        (EpsilonLevel, {"share": 1.5}, "share must be .* >= 0.0 and <= 1.0, got 1.5"),
+        (EpsilonLevel, {"exponent": -1.0}, "exponent"),
+        (EpsilonLevel, {"control": 0.0}, "control"),
+    ],
+)
+def test_bad_settings(factory: type, settings: dict[str, float], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        factory(**settings)

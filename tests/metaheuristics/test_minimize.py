@@ -1,0 +1,175 @@
+"""The loop: budget, pairing, stopping, interruption, checks of arguments and answers."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from metaheuristics import AntColony, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
+from metaheuristics.interface import Algorithm, Array
+from tests.metaheuristics.problems import Function, disc, infeasible, sphere
+
+SWARM = ParticleSwarm(population=10)
+
+
+def first_generation(algorithm: Algorithm, seed: int | np.random.SeedSequence) -> Array:
+    """Starting points of a run."""
+    generations: list[Array] = []
+    minimize(
+        disc(), algorithm, evaluations=algorithm.population, seed=seed, observe=lambda X, f, v: generations.append(X)
+    )
+    return generations[0]
+
+
+def test_starting_points_depend_on_the_seed_alone() -> None:
+    swarm, genetic = first_generation(ParticleSwarm(), 7), first_generation(GeneticAlgorithm(), 7)
+    np.testing.assert_array_equal(swarm, genetic)
+    np.testing.assert_array_equal(first_generation(AntColony(population=30), 7), swarm[:30])
+    assert not np.array_equal(first_generation(ParticleSwarm(), 8), swarm)
+    assert np.unique(swarm).size == swarm.size
+    assert (swarm.min(axis=0) < -1.5).all() and (swarm.max(axis=0) > 1.5).all()
+
+
+def test_a_seed_sequence_is_not_consumed_and_equals_its_number() -> None:
+    sequence = np.random.SeedSequence(7)
+    runs = [minimize(disc(), SWARM, evaluations=100, seed=seed) for seed in (sequence, sequence, 7)]
+    assert len({tuple(run.x) for run in runs}) == 1
+    assert sequence.n_children_spawned == 0
+
+
+def test_the_seed_in_the_result_repeats_the_run() -> None:
+    child = np.random.SeedSequence([1, 2]).spawn(3)[2]
+    run = minimize(disc(), SWARM, evaluations=100, seed=child)
+    assert (run.seed_entropy, run.seed_spawn_key) == ((1, 2), (2,))
+    again = np.random.SeedSequence(run.seed_entropy, spawn_key=run.seed_spawn_key)
+    np.testing.assert_array_equal(minimize(disc(), SWARM, evaluations=100, seed=again).x, run.x)
+
+
+def test_the_last_generation_is_cut_to_the_budget() -> None:
+    problem = disc()
+    minimize(problem, SWARM, evaluations=25)
+    assert problem.calls == [10, 10, 5]
+
+
+def test_target_needs_feasibility() -> None:
+    reached = minimize(disc(), SWARM, target=-1.0)
+    assert reached.reasons == ("target reached",) and reached.objective <= -1.0 and reached.feasible
+    assert reached.history.objective[-2] > -1.0 or reached.history.violation[-2] > 0.0
+    assert minimize(infeasible(), SWARM, evaluations=100, target=10.0).reasons == ("evaluation budget used",)
+
+
+def test_stagnation_counts_generations_without_a_better_best() -> None:
+    flat = Function(lambda X: (np.zeros(len(X)), np.zeros(len(X))), [0.0], [1.0])
+    result = minimize(flat, SWARM, stagnation=4)
+    assert result.reasons == ("no better point in 4 generations",) and result.generations == 5
+
+
+def test_time_limit() -> None:
+    result = minimize(disc(), SWARM, time_limit_s=1e-9)
+    assert result.reasons == ("time limit reached",) and result.generations == 1
+
+
+def test_times_add_up() -> None:
+    result = minimize(disc(), SWARM, evaluations=200)
+    assert 0.0 < result.objective_time_s < result.time_s
+    assert result.overhead_s == result.time_s - result.objective_time_s
+    assert (np.diff(result.history.elapsed_s) > 0.0).all() and result.history.elapsed_s[-1] <= result.time_s
+
+
+def test_given_points_replace_the_first_rows() -> None:
+    given = np.array([[0.5, 0.25], [0.0, 1.0]])
+    generations: list[Array] = []
+    minimize(disc(), SWARM, evaluations=10, seed=7, initial=given, observe=lambda X, f, v: generations.append(X))
+    np.testing.assert_array_equal(generations[0][:2], given)
+    np.testing.assert_array_equal(generations[0][2:], first_generation(SWARM, 7)[2:])
+
+
+def test_interruption_carries_the_complete_generations() -> None:
+    problem = disc()
+    evaluate = problem.function
+
+    def function(X: Array) -> tuple[Array, Array]:
+        if len(problem.calls) == 4:
+            raise KeyboardInterrupt
+        return evaluate(X)
+
+    problem.function = function
+    with pytest.raises(KeyboardInterrupt) as caught:
+        minimize(problem, SWARM, seed=3)
+    assert isinstance(caught.value, Interrupted)
+    partial = pickle.loads(pickle.dumps(caught.value)).result
+    whole = minimize(disc(), SWARM, seed=3, evaluations=30)
+    assert partial.reasons == ("interrupted",) and partial.evaluations == 30
+    np.testing.assert_array_equal(partial.x, whole.x)
+    assert "30 evaluations" in str(caught.value)
+
+
+def test_interruption_before_the_first_generation_has_nothing_to_carry() -> None:
+    def function(X: Array) -> tuple[Array, Array]:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        minimize(Function(function, [0.0], [1.0]), SWARM)
+    assert not isinstance(caught.value, Interrupted)
+
+
+def test_the_objective_cannot_write_into_its_points() -> None:
+    def function(X: Array) -> tuple[Array, Array]:
+        X[:] = 0.0
+        return X[:, 0], X[:, 0]
+
+    with pytest.raises(ValueError, match="read-only"):
+        minimize(Function(function, [0.0], [1.0]), SWARM)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "message"),
+    [
+        ([0.0, 1.0], [1.0, 0.0], r"'x1'.*lower <= upper.*1\.0 and 0\.0"),
+        ([0.0, np.nan], [1.0, 1.0], "'x1'.*finite"),
+        ([-np.inf, 0.0], [1.0, 1.0], "'x0'.*finite"),
+        ([0.0, 0.0], [1.0], r"shape.*\(2,\).*\(1,\)"),
+        ([], [], "n >= 1"),
+    ],
+)
+def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        minimize(Function(lambda X: (X[:, 0], X[:, 0]), lower, upper), SWARM)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"evaluations": 9}, "population of 'pso', 10, got 9: raise"),
+        ({"evaluations": 100.5}, "whole number"),
+        ({"seed": -1}, "seed must be a whole number >= 0"),
+        ({"seed": None}, "seed must be"),
+        ({"target": np.nan}, "target"),
+        ({"stagnation": 0}, "stagnation must be"),
+        ({"time_limit_s": 0.0}, "time_limit_s must be > 0"),
+        ({"initial": np.zeros(2)}, r"shape \(R, 2\).*got \(2,\)"),
+        ({"initial": np.zeros((11, 2))}, "R <= 10"),
+        ({"initial": np.full((1, 2), 9.0)}, r"initial row 0, variable 0: 9\.0 is outside"),
+        ({"initial": np.full((1, 2), np.nan)}, "outside the bounds"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        minimize(sphere(2), SWARM, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (np.zeros(10), "returned ndarray: return a tuple"),
+        ((np.zeros((10, 1)), np.zeros(10)), r"got shapes \(10, 1\) and \(10,\)"),
+        ((np.zeros(10), 0.0), r"\(\)"),
+        ((np.zeros(10), ["a"] * 10), "real numbers"),
+        ((np.zeros(10), np.full(10, -1e-9)), "violation must be >= 0.*row 0 has -1e-09"),
+    ],
+)
+def test_bad_answers(answer: tuple[Array, Array], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        minimize(Function(lambda X: answer, [0.0], [1.0]), SWARM)
