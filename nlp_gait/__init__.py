@@ -1,0 +1,23 @@
+"""Biped gait problems, written once as symbolic CasADi models.
+
+``load`` makes a problem, ``solve`` gives it to IPOPT, ``compile_objective`` gives its exact functions to search algorithms.
+"""
+
+from nlp_gait.backends.compiled import CompiledObjective, compile_objective
+from nlp_gait.backends.ipopt import IpoptSettings
+from nlp_gait.backends.solution import Solution
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import GaitError
+from nlp_gait.problems import GaitProblem, load, problem_names
+
+__all__ = [
+    "CompiledObjective",
+    "GaitError",
+    "GaitProblem",
+    "IpoptSettings",
+    "Solution",
+    "compile_objective",
+    "load",
+    "problem_names",
+    "solve",
+]

@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 from casadi import MX
 
-from nlp_gait.problems.gait_problem import GaitProblem, constraint_rows
+from nlp_gait.backends.solution import RowViolation
+from nlp_gait.problems.gait_problem import Array, GaitProblem, constraint_rows
 from nlp_gait.symbolic.nonsmooth import Exact
+
+# A total violation below this counts as feasible (each row in units of its scale).
+FEASIBILITY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,6 +37,25 @@ class ExactModel:
 def exact_model(problem: GaitProblem) -> ExactModel:
     """Exact function of a problem, built once for all copies that differ in parameter values only."""
     return problem.built("exact", lambda: _build(problem))
+
+
+def row_violations(problem: GaitProblem, x: Array) -> list[RowViolation]:
+    """Rows that the exact functions find violated at x by more than the tolerance, worst first."""
+    exact = exact_model(problem)
+    _, _, g, lower, upper, _ = (np.array(value).ravel() for value in exact.function(x, problem.p))
+    excess = np.maximum(np.maximum(lower - g, g - upper), 0.0)
+    return [
+        RowViolation(
+            name=exact.row_names[i],
+            value=float(g[i]),
+            lower=float(lower[i]),
+            upper=float(upper[i]),
+            violation=float(excess[i]),
+            unit=exact.row_units[i],
+        )
+        for i in np.argsort(-excess, kind="stable")
+        if excess[i] > FEASIBILITY_TOLERANCE
+    ]
 
 
 def _build(problem: GaitProblem) -> ExactModel:

@@ -5,11 +5,17 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import unknown
 from nlp_gait.problems.gait_problem import GaitProblem
+from nlp_gait.problems.nao_dsp import nao_dsp
 from nlp_gait.problems.nao_ssp import nao_ssp
 
-PROBLEMS: dict[str, Callable[..., GaitProblem]] = {"nao-ssp": nao_ssp}
+PROBLEMS: dict[str, Callable[..., GaitProblem]] = {"nao-ssp": nao_ssp, "nao-dsp": nao_dsp}
+
+
+def problem_names() -> tuple[str, ...]:
+    """Names of the problems that come with the package."""
+    return tuple(PROBLEMS)
 
 
 def load(name: str, **options: str | int | float | bool) -> GaitProblem:
@@ -29,4 +35,4 @@ def load(name: str, **options: str | int | float | bool) -> GaitProblem:
     return make(**options)
 
 
-__all__ = ["PROBLEMS", "GaitProblem", "InputError", "load"]
+__all__ = ["PROBLEMS", "GaitProblem", "load", "problem_names"]

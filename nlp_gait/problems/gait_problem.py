@@ -286,9 +286,7 @@ class GaitProblem:
         """Fresh symbols for x and p."""
         positions: dict[str, tuple[Literal["x", "p"], int]] = {q.name: ("p", i) for i, q in enumerate(self.parameters)}
         positions |= {v.name: ("x", i) for i, v in enumerate(self.variables)}
-        return Point(
-            x=MX.sym("x", len(self.variables)), p=MX.sym("p", len(self.parameters)), positions=positions
-        )
+        return Point(x=MX.sym("x", len(self.variables)), p=MX.sym("p", len(self.parameters)), positions=positions)
 
     def built(self, key: str, build: Callable[[], T]) -> T:
         """What was built from the mathematics under a key, built now if it was not; shared by all copies."""

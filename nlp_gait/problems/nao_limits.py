@@ -1,19 +1,82 @@
-"""Objective, constraints and indexes of a NAO support phase (sections 4.1 and 4.2), from its samples."""
+"""Problem of a NAO support phase (sections 4.1 and 4.2): parameters, objective, constraints, indexes from its samples."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problems.gait_problem import Assembly, Constraint, Parameter, Point
-from nlp_gait.problems.nao import JOINTS, PLANNED_JOINTS, Samples
+from nlp_gait.problems.gait_problem import (
+    Array,
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+)
+from nlp_gait.problems.nao import JOINTS, PLANNED_JOINTS
+from nlp_gait.problems.nao_phase import Phase, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # Violations that count alike in the total: 1 rad, 1 Nm, 10 mm of balance margin, 1 in the cosine of a knee.
 ANGLE_SCALE, TORQUE_SCALE, MARGIN_SCALE, REACH_SCALE = 1.0, 1.0, 0.01, 1.0
+
+# Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m] and an interpretation.
+Margins = Callable[[MX, Nonsmooth], tuple[MX, MX]]
+
+
+def phase_problem(
+    *,
+    name: str,
+    title: str,
+    variables: tuple[Variable, ...],
+    phase: Phase,
+    margins: Margins,
+    mean_dbm_m: tuple[float, float],
+    make: Callable[..., GaitProblem],
+    options: Mapping[str, str | int | float | bool],
+) -> GaitProblem:
+    """Least mean power over a phase.
+
+    Args:
+        name: of the problem.
+        title: one line.
+        variables: in the order of x.
+        phase: motion and loads, sampled.
+        margins: balance margins of the phase's ground contact.
+        mean_dbm_m: default of the least mean balance margins in x and y [m].
+        make: the function that made this problem, called again for a denser grid.
+        options: that it was called with.
+    """
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        samples = phase.samples(point, ops)
+        return assemble_phase(point, ops, samples, margins(samples.zmp, ops), phase.samples_per_interval)
+
+    def refine(factor: int) -> GaitProblem:
+        return make(**options, samples_per_interval=phase.samples_per_interval * factor)
+
+    def signals(x: Array, p: Array) -> Signals:
+        return phase.signals(problem.symbols(), x, p)
+
+    problem = GaitProblem(
+        name=name,
+        title=title,
+        options=options,
+        variables=variables,
+        own_parameters=phase_parameters(phase.robot, mean_dbm_m),
+        objective=Objective(name="power", unit="W"),
+        assemble=assemble,
+        refine=refine,
+        signals=signals,
+    )
+    return problem
 
 
 def phase_parameters(robot: Robot, mean_dbm_m: tuple[float, float]) -> tuple[Parameter, ...]:

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import casadi as ca
-from casadi import DM, MX, SX
+from casadi import DM, MX, SX, fmax, vertcat
 
-from nlp_gait.problems.gait_problem import Array, Assembly, GaitProblem, Objective, Point, Signals, Variable
+from nlp_gait.problems.gait_problem import GaitProblem, Variable
 from nlp_gait.problems.nao import (
     GRAVITY,
+    HIP_VARIABLES,
     LEAST_DURATION,
-    Derivatives,
-    Loader,
-    Loads,
-    Phase,
-    Plan,
-    Planner,
     arm_joints,
+    hip_motion,
     leg_joints,
     nao,
 )
-from nlp_gait.problems.nao_limits import assemble_phase, phase_parameters
+from nlp_gait.problems.nao_limits import phase_problem
+from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
@@ -42,13 +38,7 @@ ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
 }
 
 VARIABLES = (
-    Variable(name="hip_height_m", unit="m", lower=0.25, upper=0.31, description="x1, torso origin at both ends"),
-    Variable(name="hip_vz_start_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x2, vertical velocity"),
-    Variable(name="hip_vz_end_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x3"),
-    Variable(name="hip_vx_start_m_s", unit="m/s", lower=0.001, upper=0.2, description="x4, sagittal velocity"),
-    Variable(name="hip_vx_end_m_s", unit="m/s", lower=0.001, upper=0.2, description="x5"),
-    Variable(name="hip_vy_start_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x6, lateral velocity"),
-    Variable(name="hip_vy_end_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x7"),
+    *HIP_VARIABLES,
     Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
     Variable(name="single_support_time_s", unit="s", lower=0.4, upper=4.0, description="x9"),
 )
@@ -72,51 +62,31 @@ def nao_ssp(
         samples_per_interval: above 1 for a grid that is denser than the intervals.
     """
     model = nao(robot, rotational_inertia)
-    phase = Phase(
-        robot=model,
-        variables=len(VARIABLES),
-        duration="single_support_time_s",
-        plan=_planner(model),
-        loads=_loads(model),
-        intervals=intervals * samples_per_interval,
-        derivatives=derivatives,
-    )
     foot = model.feet["left"]
-
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        samples = phase.samples(point, ops)
-        dbm = single_support_margins(samples.zmp, SUPPORT_XY, foot, ops)
-        return assemble_phase(point, ops, samples, dbm, samples_per_interval)
-
-    def refine(factor: int) -> GaitProblem:
-        return nao_ssp(
-            robot=robot,
-            intervals=intervals,
-            derivatives=derivatives,
-            rotational_inertia=rotational_inertia,
-            samples_per_interval=samples_per_interval * factor,
-        )
-
-    def signals(x: Array, p: Array) -> Signals:
-        return phase.signals(problem.symbols(), x, p)
-
-    problem = GaitProblem(
+    return phase_problem(
         name="nao-ssp",
         title="NAO, single support: least mean power",
+        variables=VARIABLES,
+        phase=Phase(
+            robot=model,
+            variables=len(VARIABLES),
+            duration="single_support_time_s",
+            plan=_planner(model),
+            loads=_loads(model),
+            intervals=intervals,
+            samples_per_interval=samples_per_interval,
+            derivatives=derivatives,
+        ),
+        margins=lambda zmp, ops: single_support_margins(zmp, SUPPORT_XY, foot, ops),
+        mean_dbm_m=MEAN_DBM,
+        make=nao_ssp,
         options={
             "robot": robot,
             "intervals": intervals,
             "derivatives": derivatives,
             "rotational_inertia": rotational_inertia,
         },
-        variables=VARIABLES,
-        own_parameters=phase_parameters(model, MEAN_DBM),
-        objective=Objective(name="power", unit="W"),
-        assemble=assemble,
-        refine=refine,
-        signals=signals,
     )
-    return problem
 
 
 def _planner(robot: Robot) -> Planner:
@@ -124,24 +94,19 @@ def _planner(robot: Robot) -> Planner:
     ankle_height = robot.feet["left"].ankle_height_m
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        height, vz0, vz1, vx0, vx1, vy0, vy1, lift, duration = ca.vertsplit(x)
-        T = ca.fmax(duration, LEAST_DURATION)
-        hip = stack(
-            cubic(SX(HIP_X[0]), SX(HIP_X[1]), vx0, vx1, T, phase),
-            cubic(SX(HIP_Y), SX(HIP_Y), vy0, vy1, T, phase),
-            cubic(height, height, vz0, vz1, T, phase),
-        )
+        lift, duration = x[7], fmax(x[8], LEAST_DURATION)
+        hip = hip_motion(x[:7], HIP_X, (HIP_Y, HIP_Y), duration, phase)
         support = stack(constant(SUPPORT_XY[0]), constant(SUPPORT_XY[1]), constant(ankle_height))
-        forward = cubic(SX(SWING_X[0]), SX(SWING_X[1]), SX(0), SX(0), T, phase)
+        forward = cubic(SX(SWING_X[0]), SX(SWING_X[1]), SX(0), SX(0), duration, phase)
         rise = parabola_lift(forward, *SWING_X, lift)
         swing = stack(forward, constant(SWING_Y), rise._replace(position=rise.position + ankle_height))
         left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
         return Plan(
-            joints={**left, **right, **arm_joints(ARM_SWING, T, phase)},
+            joints={**left, **right, **arm_joints(ARM_SWING, duration, phase)},
             hip=hip.position,
             ankles={"L": support.position, "R": swing.position},
-            reach=ca.vertcat(left_reach, right_reach),
+            reach=vertcat(left_reach, right_reach),
         )
 
     return plan

@@ -32,17 +32,22 @@ class Body:
     com_offset_m: Vector
 
 
-def tree_from(robot: Robot, fixed_link: str) -> tuple[Body, ...]:
+def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:
     """Bodies ordered from the fixed link outwards, parents before children.
 
     The fixed link's reference point is its frame's origin.
+
+    Args:
+        robot: whose links they are.
+        fixed_link: name of the first body's link.
+        joints: pass through these only, for a part of the robot; None means all.
     """
     if fixed_link not in robot.links:
         raise InputError(f"robot {robot.name!r} has no link {fixed_link!r}")
     neighbours: dict[str, list[tuple[str, Joint]]] = {name: [] for name in robot.links}
-    for joint in robot.joints.values():
-        neighbours[joint.parent].append((joint.child, joint))
-        neighbours[joint.child].append((joint.parent, joint))
+    for passage in robot.joints.values() if joints is None else map(robot.joint, joints):
+        neighbours[passage.parent].append((passage.child, passage))
+        neighbours[passage.child].append((passage.parent, passage))
     bodies: list[Body] = []
     waiting: list[tuple[str, int, Joint | None, Vector]] = [(fixed_link, -1, None, (0.0, 0.0, 0.0))]
     while waiting:

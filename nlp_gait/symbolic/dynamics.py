@@ -20,7 +20,12 @@ class Wrench(NamedTuple):
 
 
 def newton_euler(
-    tree: Sequence[Body], q: Mapping[str, SX], qd: Mapping[str, SX], qdd: Mapping[str, SX], gravity: float
+    tree: Sequence[Body],
+    q: Mapping[str, SX],
+    qd: Mapping[str, SX],
+    qdd: Mapping[str, SX],
+    gravity: float,
+    shares: Mapping[str, SX] | None = None,
 ) -> tuple[dict[str, SX], Wrench]:
     """Joint torques of a tree whose first body stands still on the ground.
 
@@ -30,6 +35,7 @@ def newton_euler(
         qd: joint velocities by name [rad/s].
         qdd: joint accelerations by name [rad/s^2].
         gravity: magnitude, acting along -z [m/s^2].
+        shares: factors on mass and inertia of links by name, for a link that two trees carry together.
 
     Returns:
         Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
@@ -40,6 +46,10 @@ def newton_euler(
     """
     rotations = [relative_rotation(body, q) for body in tree]
     forces, moments = _forward(tree, rotations, qd, qdd, gravity)
+    for i, body in enumerate(tree):
+        if shares is not None and body.link.name in shares:  # force and moment are linear in mass and inertia
+            forces[i] *= shares[body.link.name]
+            moments[i] *= shares[body.link.name]
     torques: dict[str, SX] = {}
     for i in range(len(tree) - 1, 0, -1):
         body = tree[i]

@@ -26,6 +26,11 @@ class Leg(NamedTuple):
     reach: SX
 
 
+def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:
+    """Cosine of the knee angle (zero if stretched) from the squared distance of hip and ankle [m^2], by the law of cosines."""
+    return (distance_squared - thigh**2 - tibia**2) / (2 * thigh * tibia)
+
+
 def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> Leg:
     """Angles, velocities and accelerations of a leg, defined for every finite input.
 
@@ -54,7 +59,7 @@ def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops
 
     # Knee: law of cosines (eq. 6).
     distance_squared = x * x + length_squared
-    cosine = (distance_squared - thigh**2 - tibia**2) / (2 * thigh * tibia)
+    cosine = knee_cosine(distance_squared, thigh, tibia)
     cosined = (x * xd + half_square_rate) / (thigh * tibia)
     cosinedd = (xd * xd + yd * yd + zd * zd + x * xdd + y * ydd + z * zdd) / (thigh * tibia)
     knee, slope, bend = ops.acos(cosine, margin)

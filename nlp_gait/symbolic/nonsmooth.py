@@ -103,9 +103,7 @@ class Lifted:
         inside = ca.fabs(argument) <= limit
         sine_squared = 1 - clamped * clamped
         first = -1 / ca.sqrt(sine_squared)
-        return Angle(
-            ca.acos(clamped) + first * (argument - clamped), first, inside * first * clamped / sine_squared
-        )
+        return Angle(ca.acos(clamped) + first * (argument - clamped), first, inside * first * clamped / sine_squared)
 
     def abs(self, v: MX) -> MX:
         """A variable s with s >= v and s >= -v."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+import casadi as ca
 from casadi import SX
 
 
@@ -56,6 +58,20 @@ def parabola_lift(along: Motion, start: float, end: float, height: SX) -> Motion
     offset = (along.position - (start + end) / 2) / half
     rate, bend = along.velocity / half, along.acceleration / half
     return Motion(height * (1 - offset**2), -2 * height * offset * rate, -2 * height * (rate**2 + offset * bend))
+
+
+def through(function: Callable[[SX], SX], argument: Motion) -> Motion:
+    """Motion of a smooth function of a moving quantity, by the chain rule with automatic differentiation.
+
+    Args:
+        function: from (n,) to (m,) or to a (k, m) matrix, twice differentiable.
+        argument: (n,) motion.
+    """
+    q = SX.sym("q", argument.position.shape[0])
+    value = function(q)
+    slope = ca.jtimes(value, q, argument.velocity)
+    bend = ca.jtimes(slope, q, argument.velocity) + ca.jtimes(value, q, argument.acceleration)
+    return Motion(*ca.substitute([value, slope, bend], [q], [argument.position]))
 
 
 def constant(value: float) -> Motion:

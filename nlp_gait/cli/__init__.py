@@ -1,0 +1,33 @@
+"""Command line: ``nlp-gait list | evaluate | solve | search | compare``.
+
+Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from nlp_gait.cli.compare import compare
+from nlp_gait.cli.evaluate import evaluate
+from nlp_gait.cli.list import list_problems
+from nlp_gait.cli.search import search
+from nlp_gait.cli.solve import solve
+
+app = typer.Typer(
+    help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+)
+app.command("list")(list_problems)
+app.command("evaluate")(evaluate)
+app.command("solve")(solve)
+app.command("search")(search)
+app.command("compare")(compare)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()

@@ -1,0 +1,192 @@
+"""What the commands share: options that name a problem, progress, output and errors."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, ParamSpec, TypeVar
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from compare.runner import ProblemSpec
+from metaheuristics import SearchError
+from nlp_gait.errors import GaitError, InputError, unknown
+from nlp_gait.problems import PROBLEMS
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
+Robot = Annotated[str | None, typer.Option(help="nao-v5 (default), nao-v6, nao-v4, or a robot file (.json).")]
+Intervals = Annotated[int | None, typer.Option(help="Equal parts of the phase (default 10).")]
+Derivatives = Annotated[str | None, typer.Option(help="analytic (default) or finite-difference.")]
+Options = Annotated[
+    list[str] | None, typer.Option("--option", metavar="NAME=VALUE", help="Any other option of the problem.")
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Parameter, or a variable's bound as NAME.lower=VALUE; repeatable."
+    ),
+]
+Fix = Annotated[
+    list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a variable at a value; repeatable.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Worker processes (default: all processors).")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+stderr = Console(stderr=True, highlight=False)
+stdout = Console(highlight=False)
+
+
+def command(function: Callable[P, R]) -> Callable[P, R]:
+    """Turn expected errors into one sentence on stderr and the right exit status."""
+
+    @functools.wraps(function)
+    def run(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return function(*args, **kwargs)
+        except (GaitError, SearchError) as error:
+            fail(str(error))
+        except KeyboardInterrupt:
+            stderr.print("nlp-gait: interrupted; finished runs are kept", soft_wrap=True)
+            raise typer.Exit(130) from None
+        except BrokenPipeError:  # the reader of our output has gone, for example `| head`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(1) from None
+
+    return run
+
+
+def fail(message: str) -> NoReturn:
+    """End with status 1 and one sentence."""
+    stderr.print(f"nlp-gait: {message}", soft_wrap=True, markup=False)
+    raise typer.Exit(1)
+
+
+def problem_spec(
+    name: str,
+    robot: str | None,
+    intervals: int | None,
+    derivatives: str | None,
+    options: Sequence[str] | None,
+    values: Sequence[str] | None,
+    fix: Sequence[str] | None = None,
+) -> ProblemSpec:
+    """Problem of a command line, checked.
+
+    Raises:
+        UnknownNameError: problem, option, parameter or variable.
+        InputError: a value that is not allowed.
+    """
+    if name not in PROBLEMS:
+        raise unknown("problem", name, PROBLEMS)
+    named = {"robot": robot, "intervals": intervals, "derivatives": derivatives}
+    given: dict[str, Any] = {key: value for key, value in named.items() if value is not None}
+    known = inspect.signature(PROBLEMS[name]).parameters
+    for key, text in _pairs(options, "--option"):
+        if key not in known:
+            raise unknown(f"option of {name}", key, known)
+        given[key] = _typed(key, text, known[key].default)
+    settings = {key: _number(key, text, "--set") for key, text in _pairs(values, "--set")}
+    spec = ProblemSpec(name=name, options=given, values=settings)
+    problem = spec.load()
+    fixed = problem.fix(**{key: _number(key, text, "--fix") for key, text in _pairs(fix, "--fix")})
+    return ProblemSpec(name=name, options=given, values=dict(fixed.values))
+
+
+def parse_numbers(text: str) -> list[float]:
+    """Comma-separated numbers."""
+    return [_number("x", part, "--x") for part in text.split(",")]
+
+
+def print_json(data: Any) -> None:
+    """One JSON object on stdout; what is not finite is null, for not every reader takes NaN."""
+    sys.stdout.write(json.dumps(_finite(data), indent=1, allow_nan=False) + "\n")
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Table on stdout; the first column is left-aligned."""
+    table = Table(title=title, title_justify="left")
+    for i, name in enumerate(header):
+        table.add_column(name, justify="left" if i == 0 else "right")
+    for row in rows:
+        table.add_row(*row)
+    stdout.print(table)
+
+
+@contextmanager
+def progress_bar(description: str, total: int) -> Iterator[Callable[[str], None]]:
+    """Progress on stderr; the function inside advances it by one and shows a note."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
+    with Progress(*columns, console=stderr, transient=True) as progress:
+        task = progress.add_task(description, total=total, note="")
+        yield lambda note: progress.update(task, advance=1, note=note)
+
+
+def output_file(path: Path) -> Path:
+    """Path that can be written to, checked before the work."""
+    from compare.storage import writable_folder
+
+    writable_folder(path.parent)
+    if path.is_dir():
+        raise InputError(f"{str(path)!r} is a folder; name a file")
+    return path
+
+
+def _pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:
+    pairs = []
+    for item in items or ():
+        name, equals, text = item.partition("=")
+        if not equals or not name:
+            raise InputError(f"{flag} takes NAME=VALUE, got {item!r}")
+        pairs.append((name.strip(), text.strip()))
+    return pairs
+
+
+def _number(name: str, text: str, flag: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{flag}: {name} must be a number, got {text!r}") from None
+
+
+def _typed(name: str, text: str, default: Any) -> str | int | float | bool:
+    """Text as the type of an option's default."""
+    if isinstance(default, bool):
+        if text.lower() not in ("true", "false"):
+            raise InputError(f"--option {name} must be true or false, got {text!r}")
+        return text.lower() == "true"
+    if isinstance(default, (int, float)):
+        try:
+            return type(default)(text)
+        except ValueError:
+            raise InputError(f"--option {name} must be a {type(default).__name__}, got {text!r}") from None
+    return text
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, float):
+        return data if data - data == 0.0 else None
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return data

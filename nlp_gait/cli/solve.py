@@ -1,0 +1,97 @@
+"""``nlp-gait solve``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlp_gait.backends.solution import Solution
+from nlp_gait.cli.common import (
+    AsJson,
+    Derivatives,
+    Fix,
+    Intervals,
+    Options,
+    ProblemName,
+    Robot,
+    Seed,
+    Set,
+    command,
+    fail,
+    output_file,
+    parse_numbers,
+    print_json,
+    print_table,
+    problem_spec,
+    progress_bar,
+    stdout,
+)
+
+
+@command
+def solve(
+    problem: ProblemName,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts within the bounds.")] = 20,
+    seed: Seed = 0,
+    x0: Annotated[str | None, typer.Option("--x0", help="First start, separated by commas.")] = None,
+    robot: Robot = None,
+    intervals: Intervals = None,
+    derivatives: Derivatives = None,
+    option: Options = None,
+    values: Set = None,
+    fix: Fix = None,
+    out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Solve a problem with IPOPT from several random starts; the best is judged by the exact functions.
+
+    Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
+    """
+    import nlp_gait
+
+    target = None if out is None else output_file(out)
+    loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
+    first = None if x0 is None else loaded.check_x(parse_numbers(x0))
+    with progress_bar("IPOPT starts", starts) as advance:
+        solution = nlp_gait.solve(
+            loaded,
+            starts=starts,
+            seed=seed,
+            x0=first,
+            progress=lambda outcome: advance(f"{outcome.objective:.6g} {loaded.objective.unit}, {outcome.status}"),
+        )
+    if target is not None:
+        from compare.storage import write_json
+
+        write_json(target, solution.to_json())
+    if as_json:
+        print_json(solution.to_json())
+    else:
+        _print(solution)
+    if not solution.success:
+        fail(solution.status)
+
+
+def _print(solution: Solution) -> None:
+    unit = solution.objective_unit
+    converged = sum(start.success for start in solution.starts)
+    stdout.print(f"{solution.problem}: {solution.objective_name} {solution.objective:.6f} {unit} ({solution.status})")
+    print_table("Optimum", ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
+    if solution.active_constraints:
+        rows = [
+            (a.name, a.side, f"{a.bound:g} {a.unit}", f"{a.price:.4g} {a.price_unit}")
+            for a in solution.active_constraints
+        ]
+        print_table("What holds it back", ("bound", "side", "at", "price of raising it"), rows)
+    counts = solution.evaluations
+    stdout.print(
+        f"{converged} of {len(solution.starts)} starts converged; {solution.iterations} iterations of the best; "
+        f"calls f {counts.f}, g {counts.g}, gradient {counts.gradient}, Jacobian {counts.jacobian}, Hessian {counts.hessian}"
+    )
+    time = solution.time_s
+    stdout.print(
+        f"build {time.build:.2f} s, derivatives {time.compile:.2f} s, solve {time.solve:.2f} s; "
+        f"{solution.solver} with {solution.linear_solver}"
+    )

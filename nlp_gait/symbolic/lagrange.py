@@ -1,0 +1,44 @@
+"""Equations of motion of a mechanism from its kinetic and potential energy."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+
+class EquationsOfMotion(NamedTuple):
+    """M(q) qdd + C(q, qd) qd + G(q) = generalised forces.
+
+    Attributes:
+        M: (n, n) inertia matrix, symmetric and positive definite.
+        C: (n, n) Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+        G: (n,) gravity.
+    """
+
+    M: SX
+    C: SX
+    G: SX
+
+
+def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsOfMotion:
+    """Lagrange's equations of L = K - P, with K quadratic in the velocities.
+
+    Args:
+        kinetic: K(q, qd), scalar [J].
+        potential: P(q), scalar [J].
+        q: (n,) generalised coordinates.
+        qd: (n,) their rates.
+
+    Source:
+        Bhardwaj et al., eqs. (40)-(42); with C as a matrix, so that the product C qd is the vector of eq. (42).
+    """
+    M = ca.hessian(kinetic, qd)[0]
+    slopes = [ca.jacobian(M[:, k], q) for k in range(q.shape[0])]  # slopes[k][i, j] = dM_ik / dq_j
+    n = range(q.shape[0])
+    C = SX(q.shape[0], q.shape[0])
+    for i in n:
+        for j in n:
+            C[i, j] = sum(0.5 * (slopes[j][i, k] + slopes[k][i, j] - slopes[k][j, i]) * qd[k] for k in n)
+    return EquationsOfMotion(M, C, ca.gradient(potential, q))

@@ -1,0 +1,89 @@
+"""Planar biped with toes: points, centres of mass and energies from absolute link angles.
+
+All angles are absolute. Those of legs and feet turn clockwise from the forward axis x (a leg that hangs down has pi / 2), that of
+the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from nlp_gait.symbolic.lagrange import EquationsOfMotion, equations_of_motion
+
+# Order of the angles, as in the paper's Table I: thigh, shank of both legs, torso, sole and toe of both feet.
+LINKS = ("HK", "KA", "HK'", "K'A'", "UH", "AS", "ST", "A'S'", "S'T'")
+# Ends of every link.
+ENDS = {
+    "HK": ("H", "K"),
+    "KA": ("K", "A"),
+    "HK'": ("H", "K'"),
+    "K'A'": ("K'", "A'"),
+    "UH": ("H", "U"),
+    "AS": ("A", "S"),
+    "ST": ("S", "T"),
+    "A'S'": ("A'", "S'"),
+    "S'T'": ("S'", "T'"),
+}
+# Links in the order in which they are reached from the stance ankle, and whether they are passed from their far end.
+_PATH = (("K'A'", -1), ("HK'", -1), ("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1), ("A'S'", 1), ("S'T'", 1))
+
+
+class Rod(NamedTuple):
+    """Link with its mass in the middle: length [m], mass [kg], moment of inertia about the middle [kg m^2]."""
+
+    length: float
+    mass: float
+    inertia: float
+
+
+def direction(link: str, angle: SX) -> SX:
+    """(2,) unit vector along a link, from its first end to its second; z up."""
+    upward = 1 if link == "UH" else -1
+    return ca.vertcat(ca.cos(angle), upward * ca.sin(angle))
+
+
+def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, ankle: SX) -> dict[str, SX]:
+    """Positions of all joints and ends by name, (2,) each [m].
+
+    Args:
+        rods: by link.
+        q: nine angles in the order of LINKS [rad].
+        ankle: (2,) position of the stance ankle A' [m].
+    """
+    found = {"A'": ankle}
+    for link, sense in _PATH:
+        near, far = ENDS[link][::sense]
+        found[far] = found[near] + sense * rods[link].length * direction(link, q[LINKS.index(link)])
+    return found
+
+
+def centres(found: Mapping[str, SX]) -> dict[str, SX]:
+    """Centres of mass by link, (2,) each [m], from the points."""
+    return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
+
+
+def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX) -> EquationsOfMotion:
+    """Equations of motion about a fixed stance ankle.
+
+    Args:
+        rods: by link.
+        gravity: magnitude [m/s^2].
+        q: (n,) generalised coordinates.
+        qd: (n,) their rates.
+        angles: (9,) link angles as a function of q, in the order of LINKS [rad].
+
+    Source:
+        Bhardwaj et al., eqs. (36)-(42).
+    """
+    spins = ca.jtimes(angles, q, qd)
+    middles = centres(points(rods, angles, SX(2, 1)))
+    kinetic, potential = SX(0), SX(0)
+    for i, link in enumerate(LINKS):
+        rod, velocity = rods[link], ca.jtimes(middles[link], q, qd)
+        kinetic += 0.5 * rod.mass * ca.sumsqr(velocity) + 0.5 * rod.inertia * spins[i] ** 2  # (eqs. 36, 37)
+        potential += rod.mass * gravity * middles[link][1]  # (eq. 38)
+    return equations_of_motion(kinetic, potential, q, qd)

@@ -1,0 +1,157 @@
+"""The command line as scripts use it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PSO_OF_THE_PAPER = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
+# Verified by two independent implementations to nine digits; the paper's variables are rounded, the values are not.
+AGREEMENT = 2e-6
+
+
+def nlp_gait(*arguments, status=0, **environment):
+    import os
+
+    done = subprocess.run(
+        [sys.executable, "-m", "nlp_gait", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, **environment},
+    )
+    assert done.returncode == status, f"{arguments}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def as_json(*arguments, **options):
+    return json.loads(nlp_gait(*arguments, "--json", **options).stdout)
+
+
+def test_evaluate_prints_what_scripts_rely_on(tmp_path):
+    signals = tmp_path / "signals.npz"
+    result = as_json("evaluate", "nao-ssp", "--x", PSO_OF_THE_PAPER, "--signals", str(signals))
+    assert result["problem"] == "nao-ssp" and result["robot"] == "nao-v5"
+    assert list(result["x"])[:2] == ["hip_height_m", "hip_vz_start_m_s"]
+    assert result["objective"] == {"name": "power", "value": pytest.approx(0.866844, abs=AGREEMENT), "unit": "W"}
+    expected = {
+        "power_W": 0.866844,
+        "torque_change_Nm": 0.421864,
+        "dbm_x_min_m": 0.029943,
+        "dbm_y_min_m": 0.009195,
+        "dbm_x_mean_m": 0.060437,
+        "dbm_y_mean_m": 0.020754,
+    }
+    assert result["indexes"] == pytest.approx(expected, abs=AGREEMENT)
+    assert set(result["dense"]) == set(expected)
+    assert result["feasible"] is True
+    assert all(set(row) == {"name", "value", "lower", "upper", "violation", "unit"} for row in result["constraints"])
+    with np.load(signals) as arrays:
+        assert arrays["tau"].shape == arrays["q"].shape == (11, 22)
+        assert len(arrays["joints"]) == 22
+        assert arrays["zmp"].shape == (11, 2)
+        assert arrays["com"].shape == arrays["left_foot"].shape == (11, 3)
+
+
+def test_solve_search_and_compare(tmp_path):
+    solution = as_json("solve", "nao-ssp", "--starts", "1", "--seed", "0")
+    for key in (
+        "status",
+        "success",
+        "objective",
+        "x",
+        "iterations",
+        "evaluations",
+        "time_s",
+        "active_constraints",
+        "starts",
+    ):
+        assert key in solution
+    assert solution["success"] and solution["objective"] == pytest.approx(0.845868, rel=1e-5)
+    runs = as_json("search", "nao-ssp", "--algorithm", "pso", "--runs", "2", "--seed", "3", "--evaluations", "1000")[
+        "runs"
+    ]
+    assert [run["seed"] for run in runs] == [3, 4]
+    assert all({"objective", "violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
+    out = tmp_path / "study"
+    nlp_gait("compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--out", str(out))
+    assert (out / "nao-ssp.md").read_text().count("| pso |") == 1
+    assert (out / "nao-ssp-convergence.png").stat().st_size > 10_000
+    assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 5
+
+
+def test_fixed_variable_and_parameter():
+    fixed = as_json(
+        "solve", "nao-ssp", "--starts", "1", "--fix", "swing_height_m=0.024", "--set", "torque_change_limit_Nm=0.3"
+    )
+    assert fixed["x"]["swing_height_m"] == pytest.approx(0.024, abs=1e-12)
+    assert fixed["parameters"]["torque_change_limit_Nm"] == 0.3
+
+
+def test_same_seed_same_result_with_one_or_two_processes():
+    def search(jobs):
+        runs = as_json("search", "nao-ssp", "--algorithm", "ga", "--runs", "3", "--evaluations", "600", "--jobs", jobs)[
+            "runs"
+        ]
+        return [(run["seed"], run["objective"], run["x"]) for run in runs]
+
+    assert search("1") == search("1") == search("2")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["evaluate", "nao-spp", "--x", "1"], ["unknown problem 'nao-spp'", "nao-ssp"]),
+        (["search", "nao-ssp", "--algorithm", "psso"], ["unknown algorithm 'psso'", "pso"]),
+        (["solve", "nao-ssp", "--fix", "swing_hight_m=0.02"], ["unknown variable", "swing_height_m"]),
+        (["solve", "nao-ssp", "--set", "torque_change_limit=0.02"], ["unknown parameter", "torque_change_limit_Nm"]),
+        (["solve", "nao-ssp", "--robot", "nao-v7"], ["unknown robot 'nao-v7'", "nao-v"]),
+        (["evaluate", "nao-ssp", "--x", "0.31,2"], ["must have 9 values"]),
+        (["evaluate", "nao-ssp", "--x", "nan" + PSO_OF_THE_PAPER[4:]], ["hip_height_m must be finite", "nan"]),
+        (
+            ["evaluate", "nao-ssp", "--x", PSO_OF_THE_PAPER[:-1] + "inf"],
+            ["single_support_time_s must be finite", "inf"],
+        ),
+        (["evaluate", "nao-ssp", "--x", "a,b"], ["must be a number", "'a'"]),
+        (["solve", "nao-ssp", "--set", "hip_height_m.lower=0.5"], ["inverted", "hip_height_m"]),
+        (["solve", "nao-ssp", "--set", "LKneePitch_rad.lower=3"], ["inverted", "LKneePitch_rad"]),
+        (["solve", "nao-ssp", "--fix", "swing_height_m=0.5"], ["cannot be fixed at 0.5", "0.015, 0.03"]),
+        (["solve", "nao-ssp", "--set", "torque_change_limit_Nm"], ["NAME=VALUE"]),
+        (["compare", "nao-ssp", "--out", "/proc/nowhere"], ["cannot write", "--out"]),
+        (["solve", "nao-ssp", "--intervals", "0"], ["intervals", "at least"]),
+        (["solve", "nao-ssp", "--derivatives", "numeric"], ["derivatives", "finite-difference"]),
+    ],
+)
+def test_bad_input_is_one_sentence(arguments, words):
+    error = nlp_gait(*arguments, status=1).stderr
+    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    for word in words:
+        assert word in error
+
+
+def test_unreachable_pose_is_evaluated_and_named():
+    x = PSO_OF_THE_PAPER.replace("0.31,", "0.36,", 1)
+    result = as_json("evaluate", "nao-ssp", "--x", x)
+    assert not result["feasible"]
+    assert all(np.isfinite(value) for value in result["indexes"].values())
+    out_of_reach = [
+        row["name"] for row in result["constraints"] if row["name"].startswith("reach") and row["violation"] > 0
+    ]
+    assert "reach[left leg, 5]" in out_of_reach
+    assert "reach[left leg, " in nlp_gait("evaluate", "nao-ssp", "--x", x).stdout
+
+
+def test_help_has_examples():
+    for command in ("evaluate", "solve", "search", "compare", "list"):
+        assert f"nlp-gait {command}" in nlp_gait(command, "--help", COLUMNS="200").stdout
+
+
+def test_out_is_checked_before_the_work(tmp_path):
+    blocked = Path(tmp_path, "file")
+    blocked.write_text("")
+    error = nlp_gait("search", "nao-ssp", "--evaluations", "100000000", "--out", str(blocked), status=1).stderr
+    assert "cannot write" in error
