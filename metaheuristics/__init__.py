@@ -15,10 +15,11 @@ from metaheuristics.genetic_operators import Flip, Polynomial, SimulatedBinary, 
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
 from metaheuristics.particle_swarm import ParticleSwarm
-from metaheuristics.registry import ALGORITHMS, algorithm
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling
 from metaheuristics.result import History, Interrupted, Result
 
 __all__ = [
+    "ADAPTERS",
     "ALGORITHMS",
     "Algorithm",
     "AntColony",
@@ -29,6 +30,7 @@ __all__ = [
     "EpsilonLevel",
     "Flip",
     "GeneticAlgorithm",
+    "HANDLINGS",
     "History",
     "Interrupted",
     "ParticleSwarm",
@@ -42,5 +44,6 @@ __all__ = [
     "Start",
     "StaticPenalty",
     "algorithm",
+    "handling",
     "minimize",
 ]

@@ -1,7 +1,8 @@
 """Constraint handling: how two points with objective f and violation v compare.
 
-Every rule here orders points lexicographically by two keys computed from f and v. That makes it a total preorder, gives
-pairwise comparison and sorting from one definition, and reduces a new rule to a key function.
+Every rule here orders points lexicographically by two keys computed from f and v: the violation and the objective as the
+rule sees them. That makes it a total preorder, gives pairwise comparison and sorting from one definition, reduces a new
+rule to a key function, and lets packages that put feasible points first by themselves follow any rule.
 
 A failed evaluation has f = v = infinity (see `mark_failed`) and so comes last under every rule.
 """
@@ -38,7 +39,8 @@ class Rule:
     """A total preorder of points; smaller keys are better, the first key decides before the second.
 
     Attributes:
-        keys: Maps f and violation, any equal shape and free of NaN, to the two keys of the same shape.
+        keys: Maps f and violation, any equal shape and free of NaN, to the two keys of the same shape: effective violation,
+            >= 0, and effective objective.
     """
 
     keys: Callable[[Array, Array], tuple[Array, Array]]
@@ -153,7 +155,7 @@ class StaticPenalty:
         return Rule(keys=self._keys)
 
     def _keys(self, f: Array, violation: Array) -> tuple[Array, Array]:
-        return f + self.weight * violation, violation
+        return np.zeros_like(f), f + self.weight * violation
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -5,17 +5,39 @@ from __future__ import annotations
 import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from importlib.util import find_spec
 from types import MappingProxyType
+from typing import TypeVar
 
+from metaheuristics.adapters.cma import CmaEs
+from metaheuristics.adapters.pymoo import MODULES, Pymoo
+from metaheuristics.adapters.scipy_de import DifferentialEvolution
 from metaheuristics.ant_colony import AntColony
 from metaheuristics.ant_colony_grid import AntColonyGrid
+from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
 from metaheuristics.genetic import GeneticAlgorithm
 from metaheuristics.interface import Algorithm
 from metaheuristics.particle_swarm import ParticleSwarm
 
+T = TypeVar("T")
+
 ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
     {factory.name: factory for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid)}
+)
+"""This package's own algorithms."""
+
+ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
+    {"cma": CmaEs, "de": DifferentialEvolution}
+    | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
+)
+"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` brings."""
+
+PACKAGES: Mapping[str, str] = MappingProxyType({"cma": "cma", "de": "scipy", "pymoo": "pymoo"})
+
+HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
+    {"deb": Deb, "penalty": StaticPenalty, "epsilon": EpsilonLevel}
 )
 
 
@@ -23,22 +45,49 @@ def algorithm(name: str, **settings: object) -> Algorithm:
     """Make an algorithm by name.
 
     Args:
-        name: A key of `ALGORITHMS`.
+        name: A key of `ALGORITHMS` or `ADAPTERS`.
         settings: Settings that differ from the defaults.
 
     Returns:
         The algorithm.
 
     Raises:
-        SearchError: Unknown name or setting (the nearest known ones are suggested), or a value that is not allowed.
+        SearchError: Unknown name or setting (the nearest known ones are suggested), a value that is not allowed, or the
+            package that it comes from is not installed.
     """
-    if name not in ALGORITHMS:
-        raise SearchError(f"unknown algorithm {name!r}; {_suggest(name, ALGORITHMS)}")
-    factory = ALGORITHMS[name]
+    factories = {**ALGORITHMS, **ADAPTERS}
+    package = PACKAGES.get(name.partition(":")[0])
+    if name in ADAPTERS and package is not None and find_spec(package) is None:
+        raise SearchError(
+            f"algorithm {name!r} needs the package {package}, which is not installed: pip install 'nlp-gait[algorithms]'"
+        )
+    return _made("algorithm", name, factories, settings)
+
+
+def handling(name: str, **settings: object) -> ConstraintHandling:
+    """Make a constraint handling by name.
+
+    Args:
+        name: A key of `HANDLINGS`.
+        settings: Settings that differ from the defaults.
+
+    Raises:
+        SearchError: Unknown name or setting, a setting that is missing, or a value that is not allowed.
+    """
+    return _made("constraint handling", name, HANDLINGS, settings)
+
+
+def _made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
+    if name not in factories:
+        raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
+    factory = factories[name]
     known = inspect.signature(factory).parameters
     for setting in settings:
         if setting not in known:
-            raise SearchError(f"algorithm {name!r} has no setting {setting!r}; {_suggest(setting, known)}")
+            raise SearchError(f"{kind} {name!r} has no setting {setting!r}; {_suggest(setting, known)}")
+    for setting, parameter in known.items():
+        if parameter.default is parameter.empty and setting not in settings:
+            raise SearchError(f"{kind} {name!r} needs a value for {setting!r}")
     return factory(**settings)
 
 

@@ -30,6 +30,10 @@ class LiftedSenseError(GaitError):
     """A non-smooth operation was lifted where the reformulation is not exact."""
 
 
+class MissingExtraError(GaitError):
+    """A feature that needs an optional package which is not installed."""
+
+
 class OutputError(GaitError):
     """A result cannot be written where it was asked for."""
 

@@ -25,12 +25,14 @@ class ExactModel:
             by its scale), ``g`` (m,), and ``lower``, ``upper`` (m,), ``indexes``.
         row_names: (m,) names of the constraint rows; the last n are the variables' bounds.
         row_units: (m,).
+        row_scales: (m,) violation that counts as 1, in the row's unit.
         index_names: names of the indexes.
     """
 
     function: ca.Function
     row_names: tuple[str, ...]
     row_units: tuple[str, ...]
+    row_scales: Array
     index_names: tuple[str, ...]
 
 
@@ -91,5 +93,9 @@ def _build(problem: GaitProblem) -> ExactModel:
     }
     function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
     return ExactModel(
-        function=function, row_names=tuple(names), row_units=tuple(units), index_names=tuple(assembly.indexes)
+        function=function,
+        row_names=tuple(names),
+        row_units=tuple(units),
+        row_scales=np.array(ca.evalf(scale)).ravel(),
+        index_names=tuple(assembly.indexes),
     )

@@ -6,7 +6,7 @@ import re
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -49,13 +49,13 @@ class IpoptSettings:
         tolerance: IPOPT's ``tol``.
         iterations: limit of iterations for each stage.
         time_limit_s: limit of wall time for each stage [s].
-        hessian: ``"exact"`` or ``"limited-memory"``.
+        hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
     """
 
     tolerance: float = 1e-8
     iterations: int = 300
     time_limit_s: float = 60.0
-    hessian: str = "exact"
+    hessian: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what IPOPT would refuse late."""
@@ -65,8 +65,8 @@ class IpoptSettings:
             raise InputError(
                 f"iterations and time_limit_s must be positive, got {self.iterations}, {self.time_limit_s}"
             )
-        if self.hessian not in ("exact", "limited-memory"):
-            raise InputError(f"hessian must be 'exact' or 'limited-memory', got {self.hessian!r}")
+        if self.hessian not in (None, "exact", "limited-memory"):
+            raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,6 +218,7 @@ class Ipopt:
 
 def ipopt_for(problem: GaitProblem, settings: IpoptSettings) -> Ipopt:
     """IPOPT for a problem, made once for all its copies."""
+    settings = replace(settings, hessian=settings.hessian or problem.hessian)
     return problem.built(f"ipopt {settings}", lambda: Ipopt(nlp_model(problem), settings))
 
 

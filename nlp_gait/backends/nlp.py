@@ -80,14 +80,15 @@ def _build(problem: GaitProblem) -> NlpModel:
     values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
     bounds = ca.Function("row_bounds", [p], [lower, upper])
     cost = problem.objective.sign * assembly.objective
+    row_names = tuple(name for constraint in assembly.constraints for name in constraint.row_names)
     if ops.lifts:
-        _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds)
+        _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds, row_names)
     lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
     return NlpModel(
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
-        row_names=tuple(name for constraint in assembly.constraints for name in constraint.row_names),
+        row_names=row_names,
         row_units=tuple(c.unit for c in assembly.constraints for _ in range(c.value.shape[0])),
         offset=offset,
         scale=problem.scale,
@@ -110,27 +111,39 @@ def _lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
 
 
 def _check_sense(
-    problem: GaitProblem, lifts: list[Lift], inputs: MX, cost: MX, values: MX, bounds: ca.Function
+    problem: GaitProblem,
+    lifts: list[Lift],
+    inputs: MX,
+    cost: MX,
+    values: MX,
+    bounds: ca.Function,
+    row_names: tuple[str, ...],
 ) -> None:
     """Lifting is exact only if moving a lifted variable away from its exact value never helps.
 
-    Checked by the sign of the first derivatives of the cost and of each row, at points inside the bounds.
+    Checked by the sign of the first derivatives of the cost, of each row and of the rows that define the other lifted
+    variables, at points inside the bounds.
     """
     variables = ca.vertcat(*(lift.variable for lift in lifts))
+    ties = ca.vertcat(*(lift.rows for lift in lifts))
     away = np.concatenate([np.full(lift.variable.shape[0], 1.0 if lift.from_above else -1.0) for lift in lifts])
-    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(ca.vertcat(cost, values), variables)])
+    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(ca.vertcat(cost, values, ties), variables)])
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
-    hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower)])
-    two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper)])
+    hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), -np.ones(ties.shape[0])])
+    two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), np.zeros(ties.shape[0], dtype=bool)])
+    # A lifted variable's own rows let it move away, by definition: they do not count.
+    row_owner = np.repeat(np.arange(len(lifts) + 1), [1 + len(lower), *(lift.rows.shape[0] for lift in lifts)])
+    column_owner = np.repeat(np.arange(len(lifts)) + 1, [lift.variable.shape[0] for lift in lifts])
+    foreign = row_owner[:, None] != column_owner
     for share in SENSE_POINTS:
         at = np.concatenate([np.full(len(problem.variables), share), problem.p, [1e-3]])
-        slope = np.array(slopes(at, np.zeros(len(away))))
+        slope = foreign * np.array(slopes(at, np.zeros(len(away))))
         helps = slope * away * hurts[:, None] < -SENSE_TOLERANCE
         helps |= two_sided[:, None] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():
             row = int(np.argwhere(helps)[0][0])
-            where = "the objective" if row == 0 else f"constraint row {row - 1}"
+            where = "the objective" if row == 0 else "another abs or min" if row_owner[row] else f"row {row_names[row - 1]}"
             raise LiftedSenseError(
                 f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "
                 "NLP would be wrong; use abs only where it is minimised or bounded from above, min only where it is "

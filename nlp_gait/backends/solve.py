@@ -54,7 +54,7 @@ def solve(
     outcomes: list[StartOutcome] = []
     for index, point in enumerate(points):
         ends.append(ipopt.run(problem, point))
-        outcomes.append(_outcome(index, problem, point, ends[-1]))
+        outcomes.append(outcome_of(index, problem, point, ends[-1]))
         if progress is not None:
             progress(outcomes[-1])
     return solution_of(problem, ipopt, ends, outcomes, seed)
@@ -68,7 +68,8 @@ def _start_points(problem: GaitProblem, starts: int, seed: int, x0: Sequence[flo
     return points
 
 
-def _outcome(index: int, problem: GaitProblem, x0: Array, end: End) -> StartOutcome:
+def outcome_of(index: int, problem: GaitProblem, x0: Array, end: End) -> StartOutcome:
+    """Plain account of one start."""
     return StartOutcome(
         index=index,
         success=end.success,

@@ -1,4 +1,4 @@
-"""Command line: ``nlp-gait list | evaluate | solve | search | compare``.
+"""Command line: ``nlp-gait list | evaluate | solve | search | compare | sweep``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -13,6 +13,7 @@ from nlp_gait.cli.evaluate import evaluate
 from nlp_gait.cli.list import list_problems
 from nlp_gait.cli.search import search
 from nlp_gait.cli.solve import solve
+from nlp_gait.cli.sweep import sweep
 
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
@@ -26,6 +27,7 @@ app.command("evaluate")(evaluate)
 app.command("solve")(solve)
 app.command("search")(search)
 app.command("compare")(compare)
+app.command("sweep")(sweep)
 
 
 def main() -> None:

@@ -45,8 +45,11 @@ Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k us
 Jobs = Annotated[int | None, typer.Option(min=1, help="Worker processes (default: all processors).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
-stderr = Console(stderr=True, highlight=False)
-stdout = Console(highlight=False)
+# Wide enough for every table where there is no terminal to fit, for example in a pipe or a log.
+PIPE_WIDTH = 160
+
+stderr = Console(stderr=True, highlight=False, markup=False)
+stdout = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
 
 
 def command(function: Callable[P, R]) -> Callable[P, R]:
@@ -70,7 +73,7 @@ def command(function: Callable[P, R]) -> Callable[P, R]:
 
 def fail(message: str) -> NoReturn:
     """End with status 1 and one sentence."""
-    stderr.print(f"nlp-gait: {message}", soft_wrap=True, markup=False)
+    stderr.print(f"nlp-gait: {message}", soft_wrap=True)
     raise typer.Exit(1)
 
 
@@ -119,7 +122,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     """Table on stdout; the first column is left-aligned."""
     table = Table(title=title, title_justify="left")
     for i, name in enumerate(header):
-        table.add_column(name, justify="left" if i == 0 else "right")
+        table.add_column(name, justify="left" if i == 0 else "right", overflow="fold")
     for row in rows:
         table.add_row(*row)
     stdout.print(table)
@@ -136,7 +139,7 @@ def progress_bar(description: str, total: int) -> Iterator[Callable[[str], None]
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
     )
-    with Progress(*columns, console=stderr, transient=True) as progress:
+    with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
         task = progress.add_task(description, total=total, note="")
         yield lambda note: progress.update(task, advance=1, note=note)
 

@@ -154,6 +154,8 @@ class GaitProblem:
         signals: time histories of a given x (n,) and parameter vector (k,), or None.
         start: a start point (n,) for gradient methods from the parameter vector and a generator; None means uniform
             within the bounds.
+        hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
+        searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
     """
 
@@ -167,6 +169,8 @@ class GaitProblem:
     refine: Callable[[int], GaitProblem] | None = None
     signals: Callable[[Array, Array], Signals] | None = None
     start: Callable[[Array, np.random.Generator], Array] | None = None
+    hessian: Literal["exact", "limited-memory"] = "exact"
+    searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
     _built: dict[str, Any] = field(default_factory=dict, repr=False)
 

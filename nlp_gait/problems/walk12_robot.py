@@ -64,9 +64,7 @@ class PointMassBiped:
             if field.name in TEXT:
                 if not isinstance(value, str):
                     raise RobotDataError(f"robot {self.name!r}: {field.name} must be text, got {value!r}")
-            elif (
-                isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf
-            ):
+            elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
                 raise RobotDataError(f"robot {self.name!r}: {field.name} must be a number > 0, got {value!r}")
 
     @property

@@ -46,7 +46,7 @@ def _merged(name_or_path: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     base = _merged(base_name, (*seen, name_or_path))
     merged = {**base, **raw}
     for group in ("links", "joints", "feet", "sources"):
-        merged[group] = {**base.get(group, {}), **raw.get(group, {})}
+        merged[group] = {**_group(base, group, base_name), **_group(raw, group, name_or_path)}
     return merged
 
 
@@ -79,7 +79,7 @@ def _robot(raw: Mapping[str, Any]) -> Robot:
     return Robot(
         name=name,
         description=str(raw.get("description", "")),
-        sources={str(k): str(v) for k, v in dict(raw.get("sources", {})).items()},
+        sources={key: str(value) for key, value in _group(raw, "sources", name).items()},
         root=_get(raw, "root", str, owner),
         links=links,
         joints=joints,
@@ -146,6 +146,14 @@ def _records(raw: Mapping[str, Any], group: str, owner: str) -> list[tuple[str, 
     if not isinstance(records, dict) or not all(isinstance(r, dict) for r in records.values()):
         raise RobotDataError(f"{owner}: {group!r} must be an object of records by name, got {type(records).__name__}")
     return list(records.items())
+
+
+def _group(raw: Mapping[str, Any], group: str, robot: str) -> dict[str, Any]:
+    """Entries of a group that need not be there."""
+    entries = raw.get(group, {})
+    if not isinstance(entries, dict):
+        raise RobotDataError(f"robot {robot!r}: {group!r} must be an object, got {entries!r}")
+    return entries
 
 
 def _get(raw: Mapping[str, Any], key: str, kind: type[T], owner: str) -> T:

@@ -211,9 +211,10 @@ class Robot:
     def path_to_root(self, link: str) -> tuple[Joint, ...]:
         """Joints from a link up to the root, in that order."""
         path: list[Joint] = []
-        while link != self.root:
+        below = link
+        while below != self.root:
             if len(path) > len(self.joints):
                 raise RobotDataError(f"robot {self.name!r}: joints above link {link!r} form a ring")
-            path.append(self.joint_to[link])
-            link = path[-1].parent
+            path.append(self.joint_to[below])
+            below = path[-1].parent
         return tuple(path)

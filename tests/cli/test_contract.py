@@ -122,7 +122,7 @@ def test_same_seed_same_result_with_one_or_two_processes():
         (["solve", "nao-ssp", "--fix", "swing_height_m=0.5"], ["cannot be fixed at 0.5", "0.015, 0.03"]),
         (["solve", "nao-ssp", "--set", "torque_change_limit_Nm"], ["NAME=VALUE"]),
         (["compare", "nao-ssp", "--out", "/proc/nowhere"], ["cannot write", "--out"]),
-        (["solve", "nao-ssp", "--intervals", "0"], ["intervals", "at least"]),
+        (["solve", "nao-ssp", "--intervals", "0"], ["intervals must be a whole number >= 1", "got 0"]),
         (["solve", "nao-ssp", "--derivatives", "numeric"], ["derivatives", "finite-difference"]),
     ],
 )

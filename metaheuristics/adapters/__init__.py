@@ -1,0 +1,1 @@
+"""Search algorithms of other packages, as strong opponents; each file imports its package only when a run begins."""

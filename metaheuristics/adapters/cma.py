@@ -1,0 +1,115 @@
+"""CMA-ES of the package cma (pycma), restarted with a growing population."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from metaheuristics.constraint_handling import Rule
+from metaheuristics.interface import Array, Start
+from metaheuristics.settings import check_count, check_number
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CmaEs:
+    """Covariance matrix adaptation, with pycma's own settings but for those below.
+
+    It sees nothing of objective and violation but the order that the constraint rule gives, which is all that CMA-ES
+    uses of them. The shared starting points are its first generation; the first distribution is centred on their best.
+    Once pycma would stop, it starts again from a random point with a larger population, until the budget ends.
+
+    Attributes:
+        population: Points in a generation; 10 is pycma's own choice for 8 and 9 variables.
+        sigma: First standard deviation, as a share of each variable's range.
+        growth: Factor on the population at every restart.
+
+    Raises:
+        SearchError: A setting is not allowed.
+
+    Source:
+        Hansen, Ostermeier (2001), Completely derandomized self-adaptation in evolution strategies; Auger, Hansen (2005),
+        A restart CMA evolution strategy with increasing population size.
+    """
+
+    population: int = 10
+    sigma: float = 0.3
+    growth: float = 2.0
+    name: ClassVar[str] = "cma"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=4)
+        check_number(self, "sigma", above=0.0)
+        check_number(self, "growth", at_least=1.0)
+
+    def start(self, start: Start) -> CmaEsSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return CmaEsSearch(self, start)
+
+
+class CmaEsSearch:
+    """A run of `CmaEs`; see `Search`.
+
+    pycma works in the unit cube of the free variables. It does not take fewer than two, so there are idle ones if need be.
+    """
+
+    def __init__(self, settings: CmaEs, start: Start) -> None:
+        """Ask for the starting points first."""
+        self._settings = settings
+        self._start = start
+        self._free = np.flatnonzero(start.upper > start.lower)
+        self._size = float(settings.population)
+        self._X = start.initial
+        self._strategy: Any = None
+        self._asked: list[Array] = []
+
+    def ask(self) -> Array:
+        """Return the generation, (P, n)."""
+        return self._X
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Adapt the distribution and sample it; see `Search.tell`."""
+        order = rule.order(f, violation)
+        if self._strategy is None:
+            self._strategy = self._begin(self._unit(X[order[0]]))
+        else:
+            ranks = np.empty(len(order))
+            ranks[order] = np.arange(len(order))
+            self._strategy.tell(self._asked, ranks.tolist())
+            if self._strategy.stop():
+                self._size *= self._settings.growth
+                self._strategy = self._begin(self._start.rng.random(max(2, self._free.size)))
+        self._asked = self._strategy.ask()
+        self._X = self._points(np.array(self._asked))
+
+    def stop(self) -> tuple[str, ...]:
+        """Return no reason: it restarts for ever."""
+        return ()
+
+    def _begin(self, centre: Array) -> Any:
+        from cma import CMAEvolutionStrategy
+
+        options = {
+            "bounds": [0.0, 1.0],
+            "popsize": int(self._size),
+            "randn": lambda *shape: self._start.rng.standard_normal(shape),
+            "seed": np.nan,  # else it seeds NumPy's global generator
+            "verbose": -9,
+            "verb_log": 0,
+        }
+        return CMAEvolutionStrategy(centre, self._settings.sigma, options)
+
+    def _unit(self, x: Array) -> Array:
+        """Position (max(2, free),) of a point in the unit cube."""
+        lower, upper = self._start.lower[self._free], self._start.upper[self._free]
+        idle = np.full(max(0, 2 - self._free.size), 0.5)
+        return np.concatenate([(x[self._free] - lower) / (upper - lower), idle])
+
+    def _points(self, unit: Array) -> Array:
+        """Points (P, n) of positions in the unit cube."""
+        lower, upper = self._start.lower, self._start.upper
+        X = np.tile(lower, (len(unit), 1))
+        free = self._free
+        X[:, free] = lower[free] + unit[:, : free.size] * (upper[free] - lower[free])
+        return np.clip(X, lower, upper)

@@ -1,0 +1,129 @@
+"""Any population-based algorithm of the package pymoo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from metaheuristics.constraint_handling import Rule
+from metaheuristics.errors import SearchError
+from metaheuristics.interface import Array, Start
+from metaheuristics.settings import bad_setting, check_count
+
+MODULES: Mapping[str, str] = {
+    "AGEMOEA": "moo.age",
+    "BRKGA": "soo.nonconvex.brkga",
+    "DE": "soo.nonconvex.de",
+    "EPPSO": "soo.nonconvex.pso_ep",
+    "ES": "soo.nonconvex.es",
+    "G3PCX": "soo.nonconvex.g3pcx",
+    "GA": "soo.nonconvex.ga",
+    "ISRES": "soo.nonconvex.isres",
+    "NRBO": "soo.nonconvex.nrbo",
+    "NSGA2": "moo.nsga2",
+    "PSO": "soo.nonconvex.pso",
+    "SMSEMOA": "moo.sms",
+    "SPEA2": "moo.spea2",
+    "SRES": "soo.nonconvex.sres",
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Pymoo:
+    """An algorithm of pymoo with its own defaults, begun from the shared starting points.
+
+    pymoo prefers feasible points by itself, as Deb's rules do. It is given the objective and the violation as the
+    constraint rule in force sees them, for its whole population anew in each generation.
+
+    Attributes:
+        algorithm: Class name in pymoo, for example "GA"; many-objective ones get one objective.
+        population: Size of the population (pop_size).
+        settings: Further arguments of the class.
+
+    Raises:
+        SearchError: Unknown algorithm, or a setting is not allowed.
+
+    Source:
+        Blank, Deb (2020), pymoo: Multi-objective optimization in Python.
+    """
+
+    algorithm: str
+    population: int = 50
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.algorithm not in MODULES:
+            raise bad_setting(self, "algorithm", f"one of {', '.join(MODULES)}")
+        check_count(self, "population", at_least=5)
+
+    @property
+    def name(self) -> str:
+        """For example ``"pymoo:GA"``."""
+        return f"pymoo:{self.algorithm}"
+
+    def start(self, start: Start) -> PymooSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return PymooSearch(self, start)
+
+
+class PymooSearch:
+    """A run of `Pymoo` on the free variables; see `Search`."""
+
+    def __init__(self, settings: Pymoo, start: Start) -> None:
+        """Ask for the starting points first."""
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
+        self._start = start
+        self._free = np.flatnonzero(start.upper > start.lower)
+        self._X = start.initial
+        self._algorithm: Any = None
+        if self._free.size:
+            lower, upper = start.lower[self._free], start.upper[self._free]
+            problem = Problem(n_var=self._free.size, n_obj=1, n_ieq_constr=1, xl=lower, xu=upper)
+            factory = getattr(import_module(f"pymoo.algorithms.{MODULES[settings.algorithm]}"), settings.algorithm)
+            sampling = start.initial[:, self._free]
+            try:
+                self._algorithm = factory(pop_size=settings.population, sampling=sampling, **settings.settings)
+            except TypeError as error:
+                raise SearchError(f"{settings.name} does not take these settings: {error}") from error
+            self._algorithm.setup(problem, termination=NoTermination(), seed=int(start.rng.integers(2**31)))
+            self._infills = self._algorithm.ask()
+
+    def ask(self) -> Array:
+        """Return pymoo's offspring, (P, n)."""
+        return self._X
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Let pymoo select and vary; see `Search.tell`."""
+        if self._algorithm is None:
+            return
+        for individual, values in zip(self._infills, zip(f, violation, strict=True), strict=True):
+            individual.data["raw"] = values
+        members = () if self._algorithm.pop is None else self._algorithm.pop
+        members = [individual for individual in members if "raw" in individual.data]
+        self._set_values([*members, *self._infills], rule)
+        self._algorithm.tell(infills=self._infills)
+        self._infills = self._algorithm.ask()
+        X = np.tile(self._start.lower, (len(self._infills), 1))
+        X[:, self._free] = self._infills.get("X")
+        self._X = np.clip(X, self._start.lower, self._start.upper)
+
+    def stop(self) -> tuple[str, ...]:
+        """Give up if there is nothing to vary."""
+        return ("all variables are fixed",) if self._algorithm is None else ()
+
+    @staticmethod
+    def _set_values(individuals: list[Any], rule: Rule) -> None:
+        """Objective and violation of each individual under the rule in force."""
+        raw = np.array([individual.data["raw"] for individual in individuals])
+        violation, objective = rule.keys(raw[:, 0], raw[:, 1])
+        # Finite, for the sums and differences that some algorithms take: failed evaluations still come last.
+        objective, violation = (np.nan_to_num(values, posinf=1e30) for values in (objective, violation))
+        for individual, value, excess in zip(individuals, objective, violation, strict=True):
+            individual.F, individual.G, individual.H = np.array([value]), np.array([excess]), np.zeros(0)
+            individual.evaluated = {"F", "G", "H"}

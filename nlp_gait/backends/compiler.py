@@ -1,0 +1,137 @@
+"""The C++ compiler of this machine: found, asked for its version, run with a time limit."""
+
+from __future__ import annotations
+
+import functools
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from nlp_gait.errors import CompilerError
+
+TIME_LIMIT_S = 300.0
+VERSION_TIME_LIMIT_S = 20.0
+COMMON_NAMES = ("c++", "g++", "clang++")
+HOW_TO_GET_ONE = (
+    "to get a compiler: pip install 'nlp-gait[compiler]', or your system's g++ or clang++, or name one in the environment "
+    "variable CXX"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compiler:
+    """A C++ compiler.
+
+    Attributes:
+        command: program and leading arguments.
+        version: what ``--version`` says, for cache keys.
+    """
+
+    command: tuple[str, ...]
+    version: str
+
+    @property
+    def summary(self) -> str:
+        """Program and first line of the version."""
+        return f"{' '.join(self.command)} ({self.version.splitlines()[0] if self.version else 'version unknown'})"
+
+    def build(self, source: Path, library: Path, flags: Sequence[str], time_limit_s: float = TIME_LIMIT_S) -> None:
+        """Compile one C++ file into a shared library.
+
+        Raises:
+            CompilerError: the compiler fails or does not end in time.
+        """
+        command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
+        _run(command, time_limit_s)
+
+
+def find_compiler() -> Compiler:
+    """The first C++ compiler that answers: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
+
+    Raises:
+        CompilerError: there is none; the message says what was tried.
+    """
+    return _find(os.environ.get("CXX", ""), os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@functools.lru_cache(maxsize=8)
+def _find(cxx: str, cc: str, path: str) -> Compiler:
+    tried: list[str] = []
+    for command in _candidates(cxx, cc):
+        if shutil.which(command[0], path=path) is None:
+            tried.append(f"{command[0]}: not found")
+            continue
+        try:
+            return Compiler(command=command, version=_run([*command, "--version"], VERSION_TIME_LIMIT_S).strip())
+        except CompilerError as error:
+            tried.append(str(error))
+    raise CompilerError(f"no C++ compiler ({'; '.join(tried)}); {HOW_TO_GET_ONE}")
+
+
+def _candidates(cxx: str, cc: str) -> list[tuple[str, ...]]:
+    named = [tuple(shlex.split(variable)) for variable in (cxx, cc) if variable.strip()]
+    found = [(name,) for name in COMMON_NAMES]
+    if find_spec("ziglang") is not None:
+        found.append((sys.executable, "-m", "ziglang", "c++"))
+    return named + found
+
+
+def _run(command: Sequence[str], time_limit_s: float) -> str:
+    program = Path(command[0]).name
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", timeout=time_limit_s, stdin=subprocess.DEVNULL
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CompilerError(f"{program} did not end within {time_limit_s:g} s") from error
+    except OSError as error:
+        raise CompilerError(f"{program} cannot be run: {error}") from error
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
+        raise CompilerError(f"{program} failed with exit status {done.returncode}: {reason.strip()}")
+    return done.stdout
+
+
+@functools.cache
+def cpu_features() -> frozenset[str]:
+    """Names of the instruction sets that this CPU has, as the operating system spells them; empty if it does not say."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="ignore").splitlines()
+    except OSError:
+        return frozenset()
+    for line in lines:
+        name, _, value = line.partition(":")
+        if name.strip() in ("flags", "Features"):
+            return frozenset(value.split())
+    return frozenset()
+
+
+# Flags that let the compiler use what the CPU has, by lane count; each needs the features named.
+X86_SETS = (
+    (8, ("avx512f", "avx512dq", "avx512vl", "avx512bw", "avx2", "fma")),
+    (4, ("avx2", "fma")),
+)
+
+
+def native_lanes() -> int:
+    """Doubles that one instruction of this CPU works on: 8 (AVX-512), 4 (AVX2), 2 (SSE2, NEON), else 1."""
+    machine = platform.machine().lower()
+    if machine in ("x86_64", "amd64"):
+        return next((lanes for lanes, needed in X86_SETS if cpu_features().issuperset(needed)), 2)
+    return 2 if machine in ("aarch64", "arm64") else 1
+
+
+def lane_flags(lanes: int) -> tuple[str, ...]:
+    """Compiler flags for a lane count."""
+    if platform.machine().lower() in ("x86_64", "amd64"):
+        needed = dict(X86_SETS).get(lanes, ())
+        return tuple(f"-m{feature}" for feature in needed)
+    return ()

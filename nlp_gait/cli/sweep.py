@@ -1,0 +1,82 @@
+"""``nlp-gait sweep``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlp_gait.cli.common import (
+    AsJson,
+    Derivatives,
+    Fix,
+    Intervals,
+    Options,
+    ProblemName,
+    Robot,
+    Seed,
+    Set,
+    command,
+    print_json,
+    print_table,
+    problem_spec,
+    progress_bar,
+    stdout,
+)
+
+
+@command
+def sweep(
+    problem: ProblemName,
+    over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
+    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
+    starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
+    evaluations: Annotated[int, typer.Option(min=1, help="Budget of one search run.")] = 10_000,
+    seed: Seed = 0,
+    robot: Robot = None,
+    intervals: Intervals = None,
+    derivatives: Derivatives = None,
+    option: Options = None,
+    values: Set = None,
+    fix: Fix = None,
+    out: Annotated[Path, typer.Option(help="Folder for the CSV table and the picture.")] = Path("results"),
+    as_json: AsJson = False,
+) -> None:
+    """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
+
+    Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
+    """
+    import math
+
+    from compare.storage import writable_folder
+    from compare.sweep import parse_axis, write_sweep
+    from compare.sweep import sweep as run_sweep
+
+    folder = writable_folder(out)
+    spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
+    axes = [parse_axis(text) for text in over]
+    with progress_bar("points", math.prod(len(axis.values) for axis in axes)) as advance:
+        points = run_sweep(
+            spec,
+            axes,
+            algorithm=algorithm,
+            starts=starts,
+            evaluations=evaluations,
+            seed=seed,
+            progress=lambda point: advance(f"{point.objective:.6g}"),
+        )
+    loaded = spec.load()
+    written = write_sweep(folder, points, loaded, algorithm)
+    if as_json:
+        print_json({"problem": problem, "points": [asdict(p) for p in points], "files": [str(p) for p in written]})
+        return
+    header = (*points[0].at, loaded.objective.name, "status")
+    rows = [
+        (*(f"{v:g}" for v in p.at.values()), f"{p.objective:.6f} {loaded.objective.unit}" if p.feasible else "-", p.status)
+        for p in points
+    ]
+    print_table(f"{problem} by {algorithm}", header, rows)
+    for path in written:
+        stdout.print(f"wrote {path}", soft_wrap=True)

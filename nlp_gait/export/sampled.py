@@ -1,0 +1,28 @@
+"""Time histories of a result, as dense as asked for."""
+
+from __future__ import annotations
+
+import math
+
+from nlp_gait.errors import InputError
+from nlp_gait.export.result import Result
+from nlp_gait.problems.gait_problem import Signals
+
+
+def sampled(result: Result, period_s: float) -> Signals:
+    """Signals on the problem's own grid, refined until neighbouring samples are at most a period apart.
+
+    Raises:
+        InputError: the problem has no signals, or the period is not positive.
+    """
+    if not (period_s > 0.0 and math.isfinite(period_s)):
+        raise InputError(f"the time between samples must be > 0 s, got {period_s!r}")
+    problem, x = result.problem, result.x
+    if problem.signals is None:
+        raise InputError(f"problem {problem.name!r} has no time histories")
+    signals = problem.signals(x, problem.p)
+    times = signals.arrays["t"]
+    longest = float((times[1:] - times[:-1]).max())
+    factor = math.ceil(longest / period_s - 1e-9)  # a step that is a period but for rounding is not halved
+    dense = problem.dense(factor) if factor > 1 else None
+    return signals if dense is None or dense.signals is None else dense.signals(x, dense.p)

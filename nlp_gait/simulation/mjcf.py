@@ -1,0 +1,137 @@
+"""A robot as MJCF, MuJoCo's model format; needs no MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from xml.etree import ElementTree as Xml
+
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.shapes import Prism, Shape
+
+TIME_STEP = 0.001  # [s]
+# A floor as hard as the step allows: MuJoCo asks for a time constant of at least two steps, and we take four.
+CONTACT_TIME_CONSTANT = 4 * TIME_STEP
+FRICTION = 0.7  # rubber-like soles on a hard floor
+TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
+FLOOR = "floor"
+
+Shapes = Mapping[str, Sequence[Shape]]
+
+
+def fixed_model(tree: Sequence[Body], gravity: float) -> str:
+    """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to.
+
+    Args:
+        tree: bodies, parents first.
+        gravity: [m/s^2], along -z.
+    """
+    root = _document("fixed", gravity)
+    _add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, free=False)
+    return _text(root)
+
+
+def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, friction: float = FRICTION) -> str:
+    """The whole robot on a floor, driven by position servos; every shape can touch the floor, and nothing else.
+
+    Args:
+        robot: to be simulated.
+        shapes: by link.
+        drive: gains and limits of the servos.
+        gravity: [m/s^2], along -z.
+        friction: coefficient of sliding friction between robot and floor.
+    """
+    root = _document(robot.name, gravity)
+    Xml.SubElement(
+        Xml.SubElement(root, "default"),
+        "geom",
+        contype="0",
+        conaffinity="1",
+        condim="3",
+        solref=_numbers(CONTACT_TIME_CONSTANT, 1.0),
+        friction=_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION),
+        rgba="0.86 0.87 0.9 1",
+    )
+    _add_assets(Xml.SubElement(root, "asset"), shapes)
+    world = Xml.SubElement(root, "worldbody")
+    Xml.SubElement(world, "light", pos="0.6 -1 2", dir="-0.3 0.5 -1", diffuse="0.7 0.7 0.7")
+    Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
+    bodies = _add_bodies(world, tree_from(robot, robot.root), shapes, free=True)
+    for side, foot in robot.feet.items():
+        Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
+    actuators = Xml.SubElement(root, "actuator")
+    for name, joint in robot.joints.items():
+        limit = drive.torque_limit(joint)
+        gains = {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
+        Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit), **gains)
+    return _text(root)
+
+
+def _document(name: str, gravity: float) -> Xml.Element:
+    root = Xml.Element("mujoco", model=name)
+    Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
+    Xml.SubElement(
+        root,
+        "option",
+        timestep=_numbers(TIME_STEP),
+        gravity=_numbers(0.0, 0.0, -gravity),
+        integrator="implicitfast",
+        cone="elliptic",
+    )
+    return root
+
+
+def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
+    """Texture of the floor and convex hulls of the soles."""
+    colours = {"rgb1": "0.93 0.94 0.95", "rgb2": "0.84 0.86 0.88"}
+    Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256", **colours)
+    Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texrepeat="60 60")
+    for link, parts in shapes.items():
+        for i, shape in enumerate(parts):
+            if isinstance(shape, Prism):
+                levels = (shape.bottom, shape.bottom + shape.thickness)
+                corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
+                Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
+
+
+def _add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free: bool) -> dict[str, Xml.Element]:
+    """Bodies nested as in the tree, each with its frame at its reference point; elements by link."""
+    elements: list[Xml.Element] = []
+    for body in tree:
+        parent = world if body.parent < 0 else elements[body.parent]
+        element = Xml.SubElement(parent, "body", name=body.link.name, pos=_numbers(*body.offset_m))
+        elements.append(element)
+        if body.joint is not None:
+            axis = (body.direction * a for a in body.joint.axis)
+            limits = _numbers(*body.joint.limits_rad)
+            Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
+        elif free:
+            Xml.SubElement(element, "freejoint")
+        link = body.link
+        tensor = _numbers(*link.inertia_com_kgm2)  # the same order in MJCF: xx, yy, zz, xy, xz, yz
+        mass = _numbers(link.mass_kg)
+        Xml.SubElement(element, "inertial", pos=_numbers(*body.com_offset_m), mass=mass, fullinertia=tensor)
+        for i, shape in enumerate(shapes.get(link.name, ())):
+            _add_geometry(element, shape, f"{link.name} {i}")
+    return {body.link.name: element for body, element in zip(tree, elements, strict=True)}
+
+
+def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
+    if isinstance(shape, Prism):
+        Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name, rgba="0.35 0.38 0.42 1")
+    elif shape.start == shape.end:
+        Xml.SubElement(element, "geom", name=name, type="sphere", pos=_numbers(*shape.start), size=_numbers(shape.radius))
+    else:
+        ends = _numbers(*shape.start, *shape.end)
+        Xml.SubElement(element, "geom", name=name, type="capsule", fromto=ends, size=_numbers(shape.radius))
+
+
+def _numbers(*values: float) -> str:
+    """Numbers as MJCF reads them, to the last digit."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _text(root: Xml.Element) -> str:
+    Xml.indent(root)
+    return Xml.tostring(root, encoding="unicode") + "\n"

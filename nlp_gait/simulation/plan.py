@@ -1,0 +1,109 @@
+"""The planned motion of a NAO gait as functions of time, and what the model predicts for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import trapezoid
+from scipy.interpolate import CubicSpline
+
+from nlp_gait.errors import InputError
+from nlp_gait.export.result import Result
+from nlp_gait.export.sampled import sampled
+from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS, JOINTS, nao
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.simulation.shapes import Shape, Sole, link_shapes
+
+SIDES = ("left", "right")
+INTERVALS = 1000  # of the grid that the splines run through: their error is below 1e-9 rad
+STANDING = 1e-9  # [m]; a sole that moves less is a support
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """A gait to be played.
+
+    Attributes:
+        robot: as the model takes it, head and neck one with the torso.
+        full_robot: with all joints, for its shapes.
+        signals: planned time histories on a dense grid.
+        heat_loss: K [W/(Nm)^2].
+        gravity: [m/s^2].
+    """
+
+    robot: Robot
+    full_robot: Robot
+    signals: Signals
+    heat_loss: float
+    gravity: float = GRAVITY
+    joints: tuple[str, ...] = field(default=JOINTS)
+
+    @property
+    def duration_s(self) -> float:
+        """Of the phase."""
+        return float(self.signals.arrays["t"][-1])
+
+    @cached_property
+    def supports(self) -> tuple[str, ...]:
+        """Sides whose sole stands still throughout."""
+        return tuple(side for side in SIDES if np.ptp(self.signals.arrays[f"{side}_foot"], axis=0).max() < STANDING)
+
+    @cached_property
+    def _splines(self) -> dict[str, CubicSpline]:
+        arrays = self.signals.arrays
+        names = ("q", "zmp", "hip", *(f"{side}_foot" for side in SIDES))
+        return {name: CubicSpline(arrays["t"], arrays[name]) for name in names}
+
+    def at(self, name: str, times: Array) -> Array:
+        """Planned ``q``, ``zmp``, ``hip``, ``left_foot`` or ``right_foot`` at any times; beyond the end it stays [rad, m]."""
+        return np.asarray(self._splines[name](np.clip(times, 0.0, self.duration_s)))
+
+    def rate_at_start(self, name: str) -> Array:
+        """Planned velocity at time zero."""
+        return np.asarray(self._splines[name](0.0, 1))
+
+    def shapes(self, sole: Sole) -> dict[str, list[Shape]]:
+        """Shapes of the simulated robot's links."""
+        return link_shapes(self.full_robot, sole, welded=HEAD_JOINTS)
+
+    @cached_property
+    def mechanical_power_W(self) -> float:
+        """Mean of the sum of |torque rate| over the phase."""
+        arrays = self.signals.arrays
+        return _mean(np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1))
+
+    @cached_property
+    def heat_power_W(self) -> float:
+        """Mean of K times the sum of squared torques over the phase."""
+        return self.heat_loss * _mean((self.signals.arrays["tau"] ** 2).sum(axis=1))
+
+
+def plan_of(result: Result) -> Plan:
+    """Plan of a solved NAO problem.
+
+    Raises:
+        InputError: another problem, or a gait so damaged that its angles are not finite.
+    """
+    problem = result.problem
+    robot = problem.options.get("robot")
+    duration = next((name for name in problem.names if name.endswith("_time_s")), None)
+    if not isinstance(robot, str) or duration is None or not problem.name.startswith("nao-"):
+        raise InputError(f"only gaits of the NAO problems can be simulated, got one of {problem.name!r}")
+    time = float(result.x[problem.variable_index(duration)])
+    signals = sampled(result, time / INTERVALS)
+    if not all(np.isfinite(array).all() for array in signals.arrays.values()):
+        raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
+    return Plan(
+        robot=nao(robot, rotational_inertia=True),
+        full_robot=load_robot(robot),
+        signals=signals,
+        heat_loss=problem.value("heat_loss_W_per_Nm2"),
+    )
+
+
+def _mean(samples: Array) -> float:
+    """Time mean of equidistant samples by the trapezoidal rule."""
+    return float(trapezoid(samples) / (len(samples) - 1))

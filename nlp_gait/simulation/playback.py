@@ -1,0 +1,169 @@
+"""A planned gait played back open loop: set-points at a fixed period, no sensor read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.problems.gait_problem import Array
+from nlp_gait.simulation.conditions import Conditions
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.mjcf import FLOOR, TIME_STEP, free_model
+from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.shapes import Sole
+
+SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
+FALLEN_TILT = math.radians(45.0)
+FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start
+LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
+
+# Called with the engine's model and data before every step.
+Observer = Callable[[Any, Any], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """What was measured at every step; the first axis is time, axes are those of the floor.
+
+    Attributes:
+        t: (T,) [s].
+        q: (T, J) joint angles, columns as in the plan [rad].
+        qd: (T, J) [rad/s].
+        torque: (T, J) of the servos [Nm].
+        set_points: (T, J) [rad].
+        torso: (T, 3) its origin [m].
+        tilt: (T,) angle between the torso's axis and the floor's normal [rad].
+        feet: (T, 2, 3) soles under the ankles, left and right [m].
+        loads: (T, 2) force of the floor on the left and right foot, along its normal [N].
+        pressure: (T, 2) centre of pressure of both feet [m]; NaN in flight.
+        fell_at_s: None if the robot stayed up.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    torque: Array
+    set_points: Array
+    torso: Array
+    tilt: Array
+    feet: Array
+    loads: Array
+    pressure: Array
+    fell_at_s: float | None
+
+
+def play(
+    plan: Plan,
+    conditions: Conditions | None = None,
+    drive: Drive | None = None,
+    *,
+    sole: Sole = "rectangle",
+    observe: Observer | None = None,
+) -> Trace:
+    """Play a gait from its planned state at time zero until it has settled or the robot has fallen.
+
+    Deterministic: the same arguments give the same numbers.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    engine = mujoco()
+    drive, conditions = drive or Drive(), conditions or Conditions()
+    model, data = prepared(plan, conditions, drive, sole)
+    at = _Addresses(model, plan)
+    steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
+    times = np.arange(steps) * TIME_STEP
+    # A set-point holds until the next one.
+    commands = plan.at("q", np.floor(times / drive.period_s + 1e-9) * drive.period_s)
+    least_height = FALLEN_HEIGHT * float(plan.at("hip", np.zeros(1))[0, 2])
+    rows: list[tuple[Any, ...]] = []
+    fell_at_s = None
+    for t, command in zip(times.tolist(), commands, strict=True):
+        data.ctrl[at.actuators] = command
+        data.xfrc_applied[at.torso, :2] = _push(conditions, plan.duration_s, t)
+        if observe is not None:
+            observe(model, data)
+        q, qd = data.qpos[at.angles], data.qvel[at.rates]
+        torso, upright = data.xpos[at.torso].copy(), data.xmat[at.torso, 8]
+        feet = data.site_xpos[at.soles]
+        engine.mj_step(model, data)
+        rows.append((q, qd, data.actuator_force[at.actuators], torso, upright, feet, *_pressure(data, at)))
+        if upright < math.cos(FALLEN_TILT) or torso[2] < least_height or not math.isfinite(torso[2]):
+            fell_at_s = t
+            break
+    q, qd, torque, torso, upright, feet, loads, pressure = (np.array(column) for column in zip(*rows, strict=True))
+    n = len(rows)
+    return Trace(
+        t=times[:n],
+        q=q,
+        qd=qd,
+        torque=torque,
+        set_points=commands[:n],
+        torso=torso,
+        tilt=np.arccos(np.clip(upright, -1.0, 1.0)),
+        feet=feet,
+        loads=loads,
+        pressure=pressure,
+        fell_at_s=fell_at_s,
+    )
+
+
+def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: Sole) -> tuple[Any, Any]:
+    """The engine's model and data, the robot in its planned state at time zero."""
+    engine = mujoco()
+    text = free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, conditions.friction)
+    model = engine.MjModel.from_xml_string(text)
+    model.body_mass *= conditions.mass_factor
+    model.body_inertia *= conditions.mass_factor
+    model.opt.gravity[:] = conditions.gravity(plan.gravity)
+    data = engine.MjData(model)
+    engine.mj_setConst(model, data)
+    at = _Addresses(model, plan)
+    start = np.zeros(1)
+    data.qpos[:3], data.qpos[3:7] = plan.at("hip", start)[0], (1.0, 0.0, 0.0, 0.0)  # the torso starts upright
+    data.qpos[at.angles] = plan.at("q", start)[0]
+    data.qvel[:] = 0.0
+    data.qvel[:3], data.qvel[at.rates] = plan.rate_at_start("hip"), plan.rate_at_start("q")
+    engine.mj_forward(model, data)
+    return model, data
+
+
+class _Addresses:
+    """Where the engine keeps what is set and measured."""
+
+    def __init__(self, model: Any, plan: Plan) -> None:
+        joints = [model.joint(name) for name in plan.joints]
+        self.angles = np.array([joint.qposadr[0] for joint in joints])
+        self.rates = np.array([joint.dofadr[0] for joint in joints])
+        self.actuators = np.array([model.actuator(name).id for name in plan.joints])
+        self.torso = model.body(plan.robot.root).id
+        self.soles = np.array([model.site(side).id for side in SIDES])
+        self.floor = model.geom(FLOOR).id
+        self.foot_of_geometry = np.full(model.ngeom, -1)
+        for i, side in enumerate(SIDES):
+            self.foot_of_geometry[model.geom_bodyid == model.body(plan.robot.feet[side].link).id] = i
+
+
+def _push(conditions: Conditions, duration_s: float, t: float) -> tuple[float, float]:
+    """Force of the push at a time [N]."""
+    push = conditions.push
+    if push is None or not 0.0 <= t - duration_s / 2 < push.duration_s:
+        return (0.0, 0.0)
+    return (push.impulse_Ns[0] / push.duration_s, push.impulse_Ns[1] / push.duration_s)
+
+
+def _pressure(data: Any, at: _Addresses) -> tuple[Array, Array]:
+    """Normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
+    contact = data.contact
+    active = contact.efc_address >= 0
+    forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
+    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the floor is geometry 0
+    loads = np.array([forces[feet == i].sum() for i in range(len(SIDES))])
+    total = forces.sum()
+    centre = forces @ contact.pos[active, :2] / total if total > LEAST_LOAD else np.full(2, np.nan)
+    return loads, centre

@@ -1,0 +1,106 @@
+"""Primitive shapes of a robot's links: what is drawn, and what can touch the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots.robot import Vector
+
+# The rectangle that balance margins are measured to, or the true outline.
+Sole = Literal["rectangle", "polygon"]
+
+SOLE_THICKNESS = 0.015  # [m]; the sole's lower face alone touches the floor
+LIMB_RADIUS = 0.02  # [m]
+TRUNK_RADIUS = 0.045  # [m]
+SHORTEST_LIMB = 0.02  # [m]; joints closer together than this share a centre
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capsule:
+    """Cylinder with round ends [m]; a ball where both ends are one."""
+
+    start: Vector
+    end: Vector
+    radius: float
+
+    def shifted(self, by: Vector) -> Capsule:
+        """The same shape elsewhere."""
+        return replace(self, start=_sum(self.start, by), end=_sum(self.end, by))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prism:
+    """Convex outline (x, y) with a thickness upwards from ``bottom`` [m]."""
+
+    outline: tuple[tuple[float, float], ...]
+    bottom: float
+    thickness: float
+
+    def shifted(self, by: Vector) -> Prism:
+        """The same shape elsewhere."""
+        outline = tuple((x + by[0], y + by[1]) for x, y in self.outline)
+        return replace(self, outline=outline, bottom=self.bottom + by[2])
+
+
+Shape: TypeAlias = Capsule | Prism
+
+
+def link_shapes(robot: Robot, sole: Sole = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
+    """Shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
+
+    Args:
+        robot: with all its joints.
+        sole: outline of the soles.
+        welded: joints that the simulated robot lacks; shapes beyond them move to the link before them.
+
+    Raises:
+        InputError: an outline that does not exist.
+    """
+    if sole not in get_args(Sole):
+        raise InputError(f"sole must be one of {', '.join(get_args(Sole))}, got {sole!r}")
+    shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
+    for joint in robot.joints.values():
+        radius = TRUNK_RADIUS if joint.parent == robot.root else LIMB_RADIUS
+        if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB:
+            shapes[joint.parent].append(Capsule(start=(0.0, 0.0, 0.0), end=joint.origin_m, radius=radius))
+    soles = {foot.link: foot for foot in robot.feet.values()}
+    parents = {joint.parent for joint in robot.joints.values()}
+    for name, link in robot.links.items():
+        if name in soles:
+            shapes[name].append(sole_prism(soles[name], sole))
+        elif name not in parents:  # a hand or a head, about its centre of mass
+            radius = TRUNK_RADIUS if np.linalg.norm(link.com_m) > SHORTEST_LIMB + LIMB_RADIUS else LIMB_RADIUS
+            shapes[name].append(Capsule(start=link.com_m, end=link.com_m, radius=radius))
+    for joint in sorted((robot.joint(name) for name in welded), key=lambda j: -len(robot.path_to_root(j.child))):
+        shapes[joint.parent] += [shape.shifted(joint.origin_m) for shape in shapes.pop(joint.child)]
+    return shapes
+
+
+def sole_prism(foot: Foot, sole: Sole) -> Prism:
+    """Sole under the ankle, in the foot link's axes."""
+    outline = sole_outline(foot, sole)
+    return Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS)
+
+
+def sole_outline(foot: Foot, sole: Sole) -> tuple[tuple[float, float], ...]:
+    """Corners of a sole from the ankle's projection on the ground [m].
+
+    Raises:
+        InputError: the robot's data has no polygon.
+    """
+    if sole == "rectangle":
+        front, back, left, right = foot.front_m, -foot.back_m, foot.left_m, -foot.right_m
+        return ((front, left), (back, left), (back, right), (front, right))
+    if not foot.sole_polygon_m:
+        raise InputError(f"foot {foot.link!r} has no sole_polygon_m in the robot's data; use --sole rectangle")
+    return foot.sole_polygon_m
+
+
+def _sum(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -1,0 +1,127 @@
+"""The lifted NLP: its derivatives, its agreement with the exact functions, and lifting against the sense."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import LiftedSenseError
+from nlp_gait.problems import load
+from nlp_gait.problems.gait_problem import Array, Constraint
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import Mathematics, corner, row, toy
+
+NAMES = ("nao-ssp", "nao-dsp")
+WIDTH = 1e-3
+# Central differences with a relative step of 1e-6 on functions of order one, whose third derivatives reach 1e3.
+DIFFERENCE_STEP, DIFFERENCE_TOLERANCE = 1e-6, 1e-5
+# Sums of the same products in another order.
+ROUNDING = 1e-9
+
+
+def start_of(model: NlpModel, z: Array, p: Array, width: float = WIDTH) -> Array:
+    return np.concatenate([z, np.array(model.lift_start(z, p, width)).ravel()])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
+    """Along random directions, at a start point whose knees are bent."""
+    problem = load(name)
+    model = nlp_model(problem)
+    x, f, g = model.nlp["x"], model.nlp["f"], model.nlp["g"]
+    values = ca.Function("values", [x, model.nlp["p"]], [f, g])
+    slopes = ca.Function("slopes", [x, model.nlp["p"]], [ca.gradient(f, x), ca.jacobian(g, x)])
+    rng = np.random.default_rng(0)
+    z = np.full(model.variables, 0.45)
+    w, p = start_of(model, z, problem.p), np.append(problem.p, WIDTH)
+    gradient, jacobian = (np.array(ca.DM(part)) for part in slopes(w, p))
+    for _ in range(5):
+        direction = rng.normal(size=w.size)
+        (f1, g1), (f0, g0) = (values(w + sign * DIFFERENCE_STEP * direction, p) for sign in (1, -1))
+        assert float(f1 - f0) / (2 * DIFFERENCE_STEP) == pytest.approx(
+            float(gradient.ravel() @ direction), rel=DIFFERENCE_TOLERANCE
+        )
+        got = np.array(g1 - g0).ravel() / (2 * DIFFERENCE_STEP)
+        expected = jacobian @ direction
+        np.testing.assert_allclose(got, expected, rtol=0, atol=DIFFERENCE_TOLERANCE * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_with_lifted_variables_at_their_exact_values_the_nlp_is_the_exact_problem(name: str) -> None:
+    """At a reachable point, and away from the jump that single support smooths."""
+    problem = load(name)
+    model, exact = nlp_model(problem), exact_model(problem)
+    x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: model.variables]
+    if name == "nao-dsp":
+        x[-1] = 1.0
+    w = start_of(model, (x - model.offset) / model.scale, problem.p)
+    values = ca.Function("values", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"], model.nlp["g"]])
+    f, g = (np.array(value).ravel() for value in values(w, np.append(problem.p, WIDTH)))
+    cost, _, rows, *_ = (np.array(value).ravel() for value in exact.function(x, problem.p))
+    assert f[0] == pytest.approx(cost[0], rel=ROUNDING)
+    smoothed = np.array([name.startswith("dbm_x") for name in model.row_names]) & model.smoothed
+    count = len(model.row_names)
+    np.testing.assert_allclose(g[:count][~smoothed], rows[:count][~smoothed], rtol=0, atol=ROUNDING)
+    assert g[count:].min() == pytest.approx(0.0, abs=ROUNDING)  # the rows of the lifts hold, some tightly
+    assert exact.row_names[:count] == model.row_names
+    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
+    np.testing.assert_array_equal(lower, np.array(exact.function(x, problem.p)[3]).ravel()[:count])
+    np.testing.assert_array_equal(upper, np.array(exact.function(x, problem.p)[4]).ravel()[:count])
+
+
+
+GOOD: dict[str, Mathematics] = {
+    "abs minimised": lambda x, y, limit, ops: (ops.abs(x) + y**2, ()),
+    "min maximised": lambda x, y, limit, ops: (-ops.min(x, y), ()),
+    "abs bounded from above": lambda x, y, limit, ops: (x + y, (row(ops.abs(x), upper=limit),)),
+    "min bounded from below": lambda x, y, limit, ops: (x + y, (row(ops.min(x, y), lower=limit),)),
+    "min of a min": lambda x, y, limit, ops: (x + y, (row(ops.min(ops.min(x, y), 2 - x), lower=limit),)),
+    "min of minus an abs": lambda x, y, limit, ops: (y, (row(ops.min(-ops.abs(x), y), lower=-limit),)),
+}
+BAD: dict[str, tuple[Mathematics, str]] = {
+    "abs maximised": (lambda x, y, limit, ops: (-ops.abs(x), ()), "the objective"),
+    "min minimised": (lambda x, y, limit, ops: (ops.min(x, y), ()), "the objective"),
+    "abs bounded from below": (lambda x, y, limit, ops: (x, (row(ops.abs(x), lower=limit),)), "row row gains"),
+    "min bounded from above": (lambda x, y, limit, ops: (x, (row(ops.min(x, y), upper=limit),)), "row row gains"),
+    "abs held at a value": (lambda x, y, limit, ops: (x, (row(ops.abs(x), limit, limit),)), "row row gains"),
+    "min of an abs": (lambda x, y, limit, ops: (-ops.min(ops.abs(x), y), ()), "another abs or min gains"),
+    "abs of a difference from an abs": (lambda x, y, limit, ops: (ops.abs(ops.abs(x) - 1), ()), "another abs or min"),
+}
+
+
+@pytest.mark.parametrize("mathematics", GOOD.values(), ids=GOOD.keys())
+def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematics) -> None:
+    solution = solve(toy(mathematics), starts=3)
+    assert solution.success
+    exact = np.array([start.objective for start in solution.starts if start.success])
+    grid = np.array(np.meshgrid(np.linspace(-2, 2, 81), np.linspace(-1, 3, 81))).reshape(2, -1).T
+    problem = toy(mathematics)
+    function = exact_model(problem).function
+    searched = [float(f) for f, v in ((function(x, problem.p)[:2]) for x in grid) if float(v) <= ROUNDING]
+    assert exact.min() == pytest.approx(min(searched), abs=1e-6)  # every optimum here lies on the grid
+
+
+@pytest.mark.parametrize(("mathematics", "where"), BAD.values(), ids=BAD.keys())
+def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: str) -> None:
+    with pytest.raises(LiftedSenseError, match=f"toy: .*{where}.*the lifted NLP would be wrong"):
+        nlp_model(toy(mathematics))
+
+
+def test_the_sense_of_the_objective_counts() -> None:
+    def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return ops.abs(x), ()
+
+    nlp_model(toy(mathematics, "minimise"))
+    with pytest.raises(LiftedSenseError):
+        nlp_model(toy(mathematics, "maximise"))
+
+
+def test_copies_with_other_values_share_one_nlp() -> None:
+    problem = toy(corner)
+    assert nlp_model(problem) is nlp_model(problem.with_values(limit=1.5)) is nlp_model(problem.fix(x=1.0))
+    assert nlp_model(problem) is not nlp_model(toy(corner))

@@ -1,0 +1,115 @@
+"""Independent robot dynamics with Pinocchio: the natural tree with a free-flyer at the torso.
+
+The package sees the robot from the foot outwards; here the torso floats, the foot stands still, and the ground's wrench follows
+from the six rows of the base, which no motor drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from nlp_gait.problems.gait_problem import Array
+from nlp_gait.robots import Link, Robot
+
+
+class Standing(NamedTuple):
+    """What a robot on one foot needs.
+
+    Attributes:
+        torques: by joint name [Nm].
+        zmp: (2,) in the world [m], from the rate of the momentum about the origin.
+        ground_load: vertical force of the ground [N].
+        com: (3,) [m].
+        torso: (3,) position of the torso [m].
+    """
+
+    torques: dict[str, float]
+    zmp: Array
+    ground_load: float
+    com: Array
+    torso: Array
+
+
+def inertia(link: Link, share: float = 1.0) -> pin.Inertia:
+    """Pinocchio's record of a link."""
+    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
+    tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    return pin.Inertia(share * link.mass_kg, np.array(link.com_m), share * tensor)
+
+
+def floating_model(robot: Robot, share: float = 1.0, prefix: str = "") -> pin.Model:
+    """Free-flyer at the torso; head and torso weigh ``share`` of themselves; only joints with the prefix (and the head)."""
+    model = pin.Model()
+    torso = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), robot.root)
+    model.appendBodyToJoint(torso, inertia(robot.links[robot.root], share), pin.SE3.Identity())
+    indexes = {robot.root: torso}
+    waiting = list(robot.joints.values())
+    while waiting:
+        joint = waiting.pop(0)
+        is_head = joint.name.startswith("Head")
+        if not (is_head or joint.name.startswith(prefix)):
+            continue
+        if joint.parent not in indexes:
+            waiting.append(joint)
+            continue
+        placement = pin.SE3(np.eye(3), np.array(joint.origin_m))
+        revolute = pin.JointModelRevoluteUnaligned(np.array(joint.axis))
+        index = model.addJoint(indexes[joint.parent], revolute, placement, joint.name)
+        link = robot.links[joint.child]
+        model.appendBodyToJoint(index, inertia(link, share if is_head else 1.0), pin.SE3.Identity())
+        indexes[joint.child] = index
+    return model
+
+
+def stand(
+    model: pin.Model,
+    ankle_joint: str,
+    ankle: Array,
+    q: Mapping[str, float],
+    qd: Mapping[str, float],
+    qdd: Mapping[str, float],
+    gravity: float,
+) -> Standing:
+    """Torques of a robot whose ankle link stands still with world axes at ``ankle`` (3,); missing joints rest at zero."""
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    data = model.createData()
+    names = list(model.names)[2:]  # without the universe and the free-flyer
+    q0, v0, a0 = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
+    for name in names:
+        joint = model.joints[model.getJointId(name)]
+        q0[joint.idx_q] = q.get(name, 0.0)
+        v0[joint.idx_v] = qd.get(name, 0.0)
+        a0[joint.idx_v] = qdd.get(name, 0.0)
+    foot = model.getJointId(ankle_joint)
+
+    # Base pose, velocity and acceleration from the foot that stands still.
+    pin.forwardKinematics(model, data, q0)
+    base = pin.SE3(np.eye(3), ankle) * data.oMi[foot].inverse()
+    q0[:3], q0[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+    pin.computeJointJacobians(model, data, q0)
+    jacobian = pin.getJointJacobian(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
+    v0[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v0[6:])
+    pin.forwardKinematics(model, data, q0, v0, a0)
+    drift = pin.getAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED).vector
+    a0[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+
+    # The six base rows give the wrench on the foot; its share of the joint rows is the rest.
+    generalised = pin.rnea(model, data, q0, v0, a0)
+    wrench = np.linalg.solve(jacobian[:, :6].T, generalised[:6])
+    torques = generalised[6:] - jacobian[:, 6:].T @ wrench
+
+    pin.computeCentroidalMomentumTimeVariation(model, data, q0, v0, a0)
+    mass, com, rate = pin.computeTotalMass(model), data.com[0], data.dhg
+    force = rate.linear + np.array([0.0, 0.0, mass * gravity])
+    moment = rate.angular + np.cross(com, force)
+    return Standing(
+        torques={name: float(torques[model.joints[model.getJointId(name)].idx_v - 6]) for name in names},
+        zmp=np.array([-moment[1], moment[0]]) / force[2],
+        ground_load=float(force[2]),
+        com=np.array(com),
+        torso=np.array(base.translation),
+    )

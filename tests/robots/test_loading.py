@@ -1,0 +1,210 @@
+"""Robot files: the three NAOs, and a message for everything that can be wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nlp_gait.errors import RobotDataError, UnknownNameError
+from nlp_gait.robots import load_robot, robot_names
+
+
+def link(mass: Any = 1.0, inertia: Any = (1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)) -> dict[str, Any]:
+    return {"mass_kg": mass, "com_m": [0.0, 0.0, 0.0], "inertia_com_kgm2": list(inertia)}
+
+
+def joint(parent: str, child: str) -> dict[str, Any]:
+    return {
+        "parent": parent,
+        "child": child,
+        "origin_m": [0.0, 0.0, -0.1],
+        "axis": [0.0, 1.0, 0.0],
+        "limits_rad": [-1.0, 1.0],
+        "velocity_limit_rad_s": 5.0,
+        "torque_limit_Nm": 2.0,
+    }
+
+
+def foot(name: str) -> dict[str, Any]:
+    return {"link": name, "ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
+
+
+def tiny() -> dict[str, Any]:
+    """A torso with two legs of one link."""
+    return {
+        "schema": 1,
+        "name": "tiny",
+        "root": "torso",
+        "links": {"torso": link(), "left": link(), "right": link()},
+        "joints": {"LHip": joint("torso", "left"), "RHip": joint("torso", "right")},
+        "feet": {"left": foot("left"), "right": foot("right")},
+    }
+
+
+def written(folder: Path, raw: object) -> str:
+    path = folder / "robot.json"
+    path.write_text(raw if isinstance(raw, str) else json.dumps(raw), encoding="utf-8")
+    return str(path)
+
+
+def with_joint_ring(raw: dict[str, Any]) -> None:
+    raw["links"] |= {"a": link(), "b": link()}
+    raw["joints"] |= {"A": joint("a", "b"), "B": joint("b", "a")}
+
+
+def set_in(*path: str, to: object) -> Callable[[dict[str, Any]], None]:
+    def change(raw: dict[str, Any]) -> None:
+        for key in path[:-1]:
+            raw = raw[key]
+        raw[path[-1]] = to
+
+    return change
+
+
+DAMAGES = [
+    (set_in("links", "left", "mass_kg", to=-1.0), r"link 'left': mass_kg must be > 0, got -1\.0"),
+    (set_in("links", "left", "mass_kg", to="1"), r"link 'left': 'mass_kg' must be a finite number, got '1'"),
+    (set_in("links", "left", "mass_kg", to=True), r"'mass_kg' must be a finite number, got True"),
+    (set_in("links", "left", "mass_kg", to=float("nan")), r"'mass_kg' must be a finite number, got nan"),
+    (set_in("links", "left", "com_m", to=[0.0, 0.0]), r"'com_m' must be a list of 3 numbers, got \[0\.0, 0\.0\]"),
+    (
+        set_in("links", "left", "inertia_com_kgm2", to=[3e-3, 1e-3, 1e-3, 0, 0, 0]),
+        r"link 'left': .* principal moments 1\.000e-03, 1\.000e-03, 3\.000e-03 .* subtract m \(c\.c I - c c\^T\)",
+    ),
+    (set_in("links", "left", "inertia_com_kgm2", to=[-1e-3, 1e-3, 1e-3, 0, 0, 0]), "needs all >= 0"),
+    (set_in("links", to=[1, 2]), r"robot 'tiny': 'links' must be an object of records by name, got list"),
+    (set_in("joints", "LHip", "limits_rad", to=[1.0, -1.0]), r"joint 'LHip': limits_rad must be ordered .* \[1\.0, -1"),
+    (set_in("joints", "LHip", "planning_limits_rad", to=[1.0, 1.0]), "planning_limits_rad must be ordered"),
+    (set_in("joints", "LHip", "axis", to=[0.0, 2.0, 0.0]), r"axis must be a unit vector, got \[0\.0, 2\.0, 0\.0\]"),
+    (set_in("joints", "LHip", "velocity_limit_rad_s", to=0), r"velocity_limit_rad_s must be > 0, got 0\.0"),
+    (set_in("joints", "LHip", "torque_limit_Nm", to=-2), r"torque_limit_Nm must be > 0, got -2\.0"),
+    (set_in("joints", "LHip", "parent", to="tail"), r"joint 'LHip': link 'tail' does not exist"),
+    (set_in("joints", "LHip", "parent", to=None), r"joint 'LHip': 'parent' must be a str, got None"),
+    (set_in("joints", "LHip", "child", to="right"), r"link 'right' already has a parent or is the root"),
+    (set_in("joints", "LHip", "child", to="torso"), r"link 'torso' already has a parent or is the root"),
+    (set_in("joints", "LHip", "motor", to="Maxon"), r"joint 'LHip': 'motor' must be an object, got 'Maxon'"),
+    (
+        set_in(
+            "joints",
+            "LHip",
+            "motor",
+            to={
+                "make": "M1",
+                "gear_ratio": 0,
+                "no_load_rpm": 1,
+                "stall_torque_mNm": 1,
+                "continuous_torque_mNm": 1,
+            },
+        ),
+        r"motor 'M1': gear_ratio must be > 0, got 0\.0",
+    ),
+    (set_in("links", "tail", to=link()), r"robot 'tiny': no joint carries link tail"),
+    (with_joint_ring, r"robot 'tiny': joints above link 'a' form a ring"),
+    (set_in("root", to="pelvis"), r"robot 'tiny': root 'pelvis' is not a link"),
+    (set_in("root", to=3), r"robot 'tiny': 'root' must be a str, got 3"),
+    (set_in("name", to=None), r"'name' must be a str, got None"),
+    (set_in("feet", to={"left": foot("left")}), r"robot 'tiny': foot 'right' is missing or names no link"),
+    (set_in("feet", "left", "link", to="paw"), r"foot 'left' is missing or names no link"),
+    (set_in("feet", "left", "front_m", to=0), r"foot 'left': front_m must be > 0, got 0\.0"),
+    (set_in("feet", "left", "sole_polygon_m", to="round"), r"sole_polygon_m must be a list of \[x, y\], got 'round'"),
+    (set_in("schema", to=2), r"'schema' must be 1, got 2"),
+    (set_in("extends", to=7), r"'extends' must name another robot, got 7"),
+    (set_in("sources", to=["somewhere"]), r"'sources' must be an object, got \['somewhere'\]"),
+]
+
+
+@pytest.mark.parametrize(("damage", "message"), DAMAGES, ids=[message[:40] for _, message in DAMAGES])
+def test_what_is_wrong_with_a_robot_is_said(
+    tmp_path: Path, damage: Callable[[dict[str, Any]], None], message: str
+) -> None:
+    raw = tiny()
+    load_robot(written(tmp_path, raw))  # unharmed it loads
+    load_robot.cache_clear()
+    damage(raw)
+    with pytest.raises(RobotDataError, match=message):
+        load_robot(written(tmp_path, raw))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "is not valid JSON"),
+        ("[]", "'schema' must be 1, got 'list'"),
+        ("[" * 100_000, "is not valid JSON"),
+        ("{}", "'schema' must be 1, got None"),
+    ],
+    ids=["cut off", "list", "too deep", "empty"],
+)
+def test_a_damaged_file_is_named(tmp_path: Path, text: str, message: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(RobotDataError, match=message) as error:
+        load_robot(path)
+    assert path in str(error.value)
+
+
+def test_a_file_that_is_missing_or_binary_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotDataError, match=r"nowhere\.json' cannot be read: .*No such file"):
+        load_robot("nowhere.json")
+    binary = tmp_path / "binary.json"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RobotDataError, match=r"binary\.json' cannot be read"):
+        load_robot(str(binary))
+
+
+def test_robots_that_extend_each_other_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.json"
+    path.write_text(json.dumps(tiny() | {"extends": str(path)}), encoding="utf-8")
+    with pytest.raises(RobotDataError, match="'extends' must name another robot"):
+        load_robot(str(path))
+
+
+def test_a_damaged_group_beside_extends_is_named(tmp_path: Path) -> None:
+    raw = {"schema": 1, "name": "odd", "extends": "nao-v5", "links": ["LThigh"]}
+    with pytest.raises(RobotDataError, match=r"'links' must be an object, got \['LThigh'\]"):
+        load_robot(written(tmp_path, raw))
+
+
+def test_an_unknown_robot_or_joint_gets_the_nearest_names() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown robot 'nao_v5'; did you mean .*'nao-v5'"):
+        load_robot("nao_v5")
+    with pytest.raises(UnknownNameError, match=r"unknown joint of robot nao-v5 'LKnee'; did you mean 'LKneePitch'"):
+        load_robot("nao-v5").joint("LKnee")
+
+
+@pytest.mark.parametrize(("name", "mass_kg"), [("nao-v4", 5.19535), ("nao-v5", 5.30535), ("nao-v6", 5.35975)])
+def test_nao_weighs_what_its_maker_says(name: str, mass_kg: float) -> None:
+    assert name in robot_names()
+    assert load_robot(name).mass_kg == pytest.approx(mass_kg, abs=1e-9)  # a sum of five-digit numbers
+
+
+def test_only_the_head_of_v6_differs_from_v5() -> None:
+    v5, v6 = load_robot("nao-v5"), load_robot("nao-v6")
+    assert {name for name in v5.links if v5.links[name] != v6.links[name]} == {"Head"}
+    assert v5.joints == v6.joints
+    assert v5.feet == v6.feet
+
+
+def test_gaits_are_planned_within_the_limits_of_the_paper() -> None:
+    knee = load_robot("nao-v5").joint("LKneePitch")
+    assert knee.planning_limits_rad == (-0.09, 2.11)
+    assert knee.limits_rad != knee.planning_limits_rad
+
+
+def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> None:
+    base = load_robot("nao-v5")
+    raw = {"schema": 1, "name": "heavy", "extends": "nao-v5", "links": {"LThigh": link(mass=9.0)}}
+    heavy = load_robot(written(tmp_path, raw))
+    assert heavy.mass_kg == pytest.approx(base.mass_kg - base.links["LThigh"].mass_kg + 9.0)
+    assert heavy.joints == base.joints
+
+
+def test_robots_and_their_records_are_frozen() -> None:
+    robot = load_robot("nao-v5")
+    with pytest.raises(AttributeError):
+        robot.links["torso"].mass_kg = 0.0  # type: ignore[misc]
+    with pytest.raises(AttributeError):
+        robot.name = "other"  # type: ignore[misc]
