@@ -15,6 +15,7 @@ from metaheuristics.genetic_operators import Flip, Polynomial, SimulatedBinary, 
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
 from metaheuristics.particle_swarm import ParticleSwarm
+from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling
 from metaheuristics.result import History, Interrupted, Result
 
@@ -44,6 +45,7 @@ __all__ = [
     "Start",
     "StaticPenalty",
     "algorithm",
+    "check_limits",
     "handling",
     "minimize",
 ]

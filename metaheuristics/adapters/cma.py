@@ -95,6 +95,12 @@ class CmaEsSearch:
             "popsize": int(self._size),
             "randn": lambda *shape: self._start.rng.standard_normal(shape),
             "seed": np.nan,  # else it seeds NumPy's global generator
+            # Criteria on objective values, which it does not see; those on the distribution remain.
+            "tolfun": -1.0,
+            "tolfunhist": -1.0,
+            "tolfunrel": -1.0,
+            "tolflatfitness": np.inf,
+            "tolstagnation": np.inf,
             "verbose": -9,
             "verb_log": 0,
         }

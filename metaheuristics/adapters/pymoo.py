@@ -15,8 +15,6 @@ from metaheuristics.interface import Array, Start
 from metaheuristics.settings import bad_setting, check_count
 
 MODULES: Mapping[str, str] = {
-    "AGEMOEA": "moo.age",
-    "BRKGA": "soo.nonconvex.brkga",
     "DE": "soo.nonconvex.de",
     "EPPSO": "soo.nonconvex.pso_ep",
     "ES": "soo.nonconvex.es",

@@ -63,7 +63,9 @@ def row_violations(problem: GaitProblem, x: Array) -> list[RowViolation]:
 def _build(problem: GaitProblem) -> ExactModel:
     point = problem.symbols()
     assembly = problem.assemble(point, Exact())
-    values, lowers, uppers, scales, names, units = [], [], [], [], [], []
+    values, lowers, uppers, scales = [], [], [], []
+    names: list[str] = []
+    units: list[str] = []
     for constraint in assembly.constraints:
         value, lower, upper = constraint_rows(constraint)
         values.append(value)

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,8 +24,9 @@ from nlp_gait.problems.gait_problem import Array, GaitProblem
 # The narrower ones are tried only if the exact functions find the point infeasible.
 WIDTHS = (1e-2, 5e-4)
 NARROWER_WIDTHS = (1e-4, 2e-5)
-# Barrier parameter at which a warm-started stage begins.
-WARM_BARRIER = 1e-5
+# Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
+# Over the 50 points of nao-ssp's swing heights 1e-5 takes 574 iterations, 1e-8 takes 138; over its durations 584 and 332.
+WARM_BARRIER = 1e-8
 
 STATUS_WORDS = {
     "Solve_Succeeded": "converged",
@@ -130,7 +132,7 @@ class Ipopt:
 
     def __init__(self, model: NlpModel, settings: IpoptSettings) -> None:
         started = time.perf_counter()
-        options = {
+        options: dict[str, Any] = {
             "print_time": False,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
@@ -146,7 +148,7 @@ class Ipopt:
         derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
         if settings.hessian == "exact":
             derivatives["hess_lag"] = "nlp_hess_l"
-        warm_options = {
+        warm_options: dict[str, Any] = {
             **options,
             **{option: self._cold.get_function(name) for option, name in derivatives.items()},
             "ipopt.mu_strategy": "monotone",
@@ -228,7 +230,7 @@ def linear_solver() -> str:
     x = ca.MX.sym("x")
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ipopt.log"
-        options = {
+        options: dict[str, Any] = {
             "print_time": False,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",

@@ -12,8 +12,8 @@ from nlp_gait.backends.kernel_source import SYMBOLS, Kernel, kernel_source
 from nlp_gait.backends.library_cache import load_library
 from nlp_gait.problems.gait_problem import Array
 
-# No -ffast-math: NaN and infinity keep their meaning. Beyond -O1 nothing is gained and compilation takes longer.
-BASE_FLAGS = ("-std=c++17", "-O1", "-ffp-contract=fast", "-fno-math-errno", "-w")
+# No -ffast-math: NaN and infinity keep their meaning. Hidden symbols let the compiler inline CasADi's helpers.
+BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=fast", "-fno-math-errno", "-w")
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 
 

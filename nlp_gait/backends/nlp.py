@@ -74,7 +74,9 @@ def _build(problem: GaitProblem) -> NlpModel:
     symbols = problem.symbols()
     z, p, width = MX.sym("z", n), symbols.p, MX.sym("width")
     ops = Lifted(width)
-    assembly = problem.assemble(Point(x=offset + problem.scale * z, p=p, positions=symbols.positions), ops)
+    assembly = problem.assemble(
+        Point(x=ca.DM(offset) + ca.DM(problem.scale) * z, p=p, positions=symbols.positions), ops
+    )
 
     rows = [constraint_rows(constraint) for constraint in assembly.constraints]
     values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
@@ -143,7 +145,9 @@ def _check_sense(
         helps |= two_sided[:, None] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():
             row = int(np.argwhere(helps)[0][0])
-            where = "the objective" if row == 0 else "another abs or min" if row_owner[row] else f"row {row_names[row - 1]}"
+            where = (
+                "the objective" if row == 0 else "another abs or min" if row_owner[row] else f"row {row_names[row - 1]}"
+            )
             raise LiftedSenseError(
                 f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "
                 "NLP would be wrong; use abs only where it is minimised or bounded from above, min only where it is "

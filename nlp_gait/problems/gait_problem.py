@@ -296,7 +296,7 @@ class GaitProblem:
         """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
         if key not in self._built:
             self._built[key] = build()
-        return self._built[key]  # type: ignore[no-any-return]
+        return self._built[key]
 
     def _parameter_index(self, name: str) -> int:
         for i, parameter in enumerate(self.parameters):

@@ -61,6 +61,12 @@ def nao(robot: str, rotational_inertia: bool) -> Robot:
     return welded if rotational_inertia else point_masses(welded)
 
 
+def upright_links(robot: Robot) -> frozenset[str]:
+    """Links that keep the world's axes: an upright torso, flat soles, and hips whose yaw-pitch joint is held at zero."""
+    hips = (robot.joint(f"{side}HipYawPitch").child for side in "LR")
+    return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
+
+
 def hip_motion(x: SX, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX) -> Motion:
     """Motion of the torso's origin as cubics in x, y and z (3,) [m].
 

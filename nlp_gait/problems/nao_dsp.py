@@ -22,6 +22,7 @@ from nlp_gait.problems.nao import (
     hip_motion,
     leg_joints,
     nao,
+    upright_links,
 )
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
@@ -147,7 +148,7 @@ def _loads(robot: Robot, rule: TorsoShare) -> Loader:
         side: tree_from(robot, robot.feet[foot].link, [joint for joint in JOINTS if joint.startswith(side)])
         for side, foot in FEET.items()
     }
-    weight = robot.mass_kg * GRAVITY
+    weight, upright = robot.mass_kg * GRAVITY, upright_links(robot)
 
     def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
@@ -155,7 +156,7 @@ def _loads(robot: Robot, rule: TorsoShare) -> Loader:
         torques: dict[str, SX] = {}
         zmps, ground_loads = [], []
         for side, tree in halves.items():
-            half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]})
+            half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
             offset = zmp_of_wrench(wrench, robot.feet[FEET[side]].ankle_height_m, weight)
             torques |= half
             zmps.append(DM(SOLES_XY[side]) + offset)

@@ -16,6 +16,7 @@ from nlp_gait.problems.gait_problem import Array, Point, Signals
 from nlp_gait.problems.nao import JOINTS, LEAST_DURATION, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.economy import economical
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -129,7 +130,7 @@ class Phase:
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
         planned = ca.vertcat(*(plan.joints[name].position for name in PLANNED_JOINTS))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
-        outputs = ca.cse([planned, plan.reach, torque, power, loads.zmp])
+        outputs = economical([planned, plan.reach, torque, power, loads.zmp])
         return ca.Function("sample", inputs, outputs, ["x", "margin", "phase"], list(Samples._fields))
 
     def signals(self, point: Point, x: Array, p: Array) -> Signals:
@@ -188,7 +189,7 @@ class Phase:
         loads = self.loads({**plan.joints, **moved}, hip)
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         moving = ca.vertcat(*(loads.torques[name] for name in self.moving))
-        return ca.Function("dynamics", [*parts, hip], ca.cse([torque, moving, loads.zmp]))
+        return ca.Function("dynamics", [*parts, hip], economical([torque, moving, loads.zmp]))
 
     def _mapped(self, function: ca.Function, point: Point) -> list[MX]:
         """A function of (x, margin, phase) at all samples, one column each."""

@@ -15,6 +15,7 @@ from nlp_gait.problems.nao import (
     hip_motion,
     leg_joints,
     nao,
+    upright_links,
 )
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
@@ -115,20 +116,18 @@ def _planner(robot: Robot) -> Planner:
 def _loads(robot: Robot) -> Loader:
     """Torques of the whole tree from the support foot, and the ZMP from the ground's wrench on that foot."""
     foot = robot.feet["left"]
-    tree = tree_from(robot, foot.link)
+    tree, upright = tree_from(robot, foot.link), upright_links(robot)
 
     def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY)
+        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
         return Loads(torques, DM(SUPPORT_XY) + offset)
 
     return loads
 
 
-def single_support_margins(
-    zmp: MX, support_xy: tuple[float, float], foot: Foot, ops: Nonsmooth
-) -> tuple[MX, MX]:
+def single_support_margins(zmp: MX, support_xy: tuple[float, float], foot: Foot, ops: Nonsmooth) -> tuple[MX, MX]:
     """Balance margins in x and y, (1, N + 1) each [m].
 
     In x the distance to the sole's edge on that side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.

@@ -88,16 +88,21 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         values = layout.values(x)
         step_time = values_of(PARAMETERS, p)["step_time_s"]
         loads = model.loads_at(values)
+
+        def held(columns: Array) -> Array:
+            """What holds during an interval, at its first instant; the last instant repeats the last interval."""
+            return np.concatenate([columns, columns[:, -1:]], axis=1).T
+
         return Signals(
             joints=MOVING,
             arrays={
                 "t": np.linspace(0.0, step_time, intervals + 1),
                 "q": values["angle"].T,
                 "qd": values["rate"].T,
-                "qdd": values["acceleration"].T,
-                "tau": loads.torque.T,
-                "stance_force": loads.stance_force.T,
-                "zmp": loads.stance_pressure.ravel(),
+                "qdd": held(values["acceleration"]),
+                "tau": held(loads.torque),
+                "stance_force": held(loads.stance_force),
+                "zmp": held(loads.stance_pressure)[:, 0],
             },
         )
 

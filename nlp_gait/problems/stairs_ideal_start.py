@@ -51,6 +51,7 @@ def _angles() -> ca.Function:
         t1=SX(t1),
         t2=SX(t2),
         t_bc=SX(t_bc),
+        foot_pitch=SX(0),
         t3=SX(t3),
         sole_angle=SX(np.pi / 6),
         toe_angle=SX(np.pi / 6),

@@ -66,8 +66,8 @@ def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> 
     s, n, lift, bend = ca.vertsplit(x)
 
     def swing_ankle(t: SX) -> SX:
-        forward = s / 2 * ca.sin(math.pi / step_time * (t - step_time / 2))
-        return ca.vertcat(forward, -robot.hip_distance_m, lift * ca.sin(math.pi * (forward / s + 0.5)))  # (eq. 4)
+        share = ca.sin(math.pi / step_time * (t - step_time / 2)) / 2  # P12x / s
+        return ca.vertcat(s * share, -robot.hip_distance_m, lift * ca.sin(math.pi * (share + 0.5)))  # (eq. 4)
 
     def stance_hip(t: SX) -> SX:
         forward = s / 4 * ca.sin(math.pi / step_time * (t - step_time / 2))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.tree import Body, inertia_matrix
@@ -19,6 +20,14 @@ class Wrench(NamedTuple):
     moment: SX
 
 
+class Inertia(NamedTuple):
+    """Mass [kg], first moments (3,) [kg m] and second moments (3, 3) [kg m^2] of a body about its reference point."""
+
+    mass: float
+    first: np.ndarray[Any, Any]
+    second: np.ndarray[Any, Any]
+
+
 def newton_euler(
     tree: Sequence[Body],
     q: Mapping[str, SX],
@@ -26,6 +35,7 @@ def newton_euler(
     qdd: Mapping[str, SX],
     gravity: float,
     shares: Mapping[str, SX] | None = None,
+    upright: Collection[str] = (),
 ) -> tuple[dict[str, SX], Wrench]:
     """Joint torques of a tree whose first body stands still on the ground.
 
@@ -36,18 +46,22 @@ def newton_euler(
         qdd: joint accelerations by name [rad/s^2].
         gravity: magnitude, acting along -z [m/s^2].
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
+        upright: links that do not turn in the motions asked for; to know it saves operations.
 
     Returns:
         Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
 
     Source:
         Gives the torques of Gupta, Pratihar, Deb (2023), eqs. (15)-(18); the recursion is that of Luh, Walker and Paul
-        (1980), with each link seen from the joint through which it is reached.
+        (1980), with each link seen from the joint through which it is reached, inertias regrouped and products of spins
+        shared as Khalil and Kleinfinger (1987) do.
     """
+    shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
-    forces, moments = _forward(tree, rotations, qd, qdd, gravity)
+    inertias = regrouped_inertias(tree, shares)
+    forces, moments = _forward(tree, inertias, rotations, qd, qdd, gravity, upright)
     for i, body in enumerate(tree):
-        if shares is not None and body.link.name in shares:  # force and moment are linear in mass and inertia
+        if body.link.name in shares:  # force and moment are linear in mass and inertia
             forces[i] *= shares[body.link.name]
             moments[i] *= shares[body.link.name]
     torques: dict[str, SX] = {}
@@ -58,47 +72,102 @@ def newton_euler(
         force = rotations[i] @ forces[i]
         moment = rotations[i] @ moments[i]
         forces[body.parent] += force
-        moments[body.parent] += moment + _cross(DM(body.offset_m), force)
+        moments[body.parent] += moment + ca.cross(SX(DM(body.offset_m)), force)
     return torques, Wrench(forces[0], moments[0])
 
 
+def regrouped_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[Inertia]:
+    """Inertias that give the same torques and the same wrench on the ground with fewer operations.
+
+    Matter on a joint's axis moves alike whether it belongs to the body before or behind the joint, and gives no torque
+    about the axis. So mass, the first moment along the axis and the second moment along it go to the body before: all
+    bodies but the first end up without mass.
+
+    Args:
+        tree: bodies, parents first.
+        kept: links that neither give nor take.
+    """
+    inertias = [_inertia(body) for body in tree]
+    for i in range(len(tree) - 1, 0, -1):
+        body = tree[i]
+        if body.joint is None or {body.link.name, tree[body.parent].link.name} & set(kept):
+            continue
+        mass, first, second = inertias[i]
+        axis, offset = np.array(body.joint.axis), np.array(body.offset_m)
+        along, spread = axis @ first, axis @ second @ axis
+        line = spread * np.outer(axis, axis)
+        inertias[i] = Inertia(0.0, first - along * axis, second - line)
+        taken, bent = inertias[body.parent], np.outer(offset, along * axis)
+        inertias[body.parent] = Inertia(
+            taken.mass + mass,
+            taken.first + mass * offset + along * axis,
+            taken.second + mass * np.outer(offset, offset) + bent + bent.T + line,
+        )
+    return inertias
+
+
+def _inertia(body: Body) -> Inertia:
+    mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), inertia_matrix(body.link)
+    spread = np.trace(about_com) / 2 * np.eye(3) - about_com  # second moments about the centre of mass
+    return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
+
+
 def _forward(
-    tree: Sequence[Body], rotations: Sequence[SX], qd: Mapping[str, SX], qdd: Mapping[str, SX], gravity: float
+    tree: Sequence[Body],
+    inertias: Sequence[Inertia],
+    rotations: Sequence[SX],
+    qd: Mapping[str, SX],
+    qdd: Mapping[str, SX],
+    gravity: float,
+    upright: Collection[str],
 ) -> tuple[list[SX], list[SX]]:
     """Force and moment that each body's own motion asks for, about its reference point, in its axes."""
     spins: list[SX] = []
     spin_rates: list[SX] = []
+    turnings: list[SX] = []
     accelerations: list[SX] = []
     forces: list[SX] = []
     moments: list[SX] = []
-    for body, rotation in zip(tree, rotations, strict=True):
+    for body, inertia, rotation in zip(tree, inertias, rotations, strict=True):
+        spin, spin_rate = SX(3, 1), SX(3, 1)
         if body.joint is None:
-            spin, spin_rate = SX(3, 1), SX(3, 1)
             acceleration = SX(DM([0, 0, gravity]))  # gravity as an upward acceleration of the ground
         else:
-            axis = body.direction * DM(body.joint.axis)
-            rate, rate_rate = axis * qd[body.joint.name], axis * qdd[body.joint.name]
-            carried = rotation.T @ spins[body.parent]
-            spin = carried + rate
-            spin_rate = rotation.T @ spin_rates[body.parent] + _cross(carried, rate) + rate_rate
-            acceleration = rotation.T @ _at_offset(
-                accelerations[body.parent], spins[body.parent], spin_rates[body.parent], DM(body.offset_m)
-            )
-        com = DM(body.com_offset_m)
-        inertia = DM(inertia_matrix(body.link))
-        force = body.link.mass_kg * _at_offset(acceleration, spin, spin_rate, com)
+            offset = DM(body.offset_m)
+            acceleration = rotation.T @ (accelerations[body.parent] + turnings[body.parent] @ offset)
+            if body.link.name not in upright:
+                axis = body.direction * DM(body.joint.axis)
+                rate, rate_rate = axis * qd[body.joint.name], axis * qdd[body.joint.name]
+                carried = rotation.T @ spins[body.parent]
+                spin = carried + rate
+                spin_rate = rotation.T @ spin_rates[body.parent] + ca.cross(carried, rate) + rate_rate
+        turning = _turning(spin, spin_rate)
         spins.append(spin)
         spin_rates.append(spin_rate)
+        turnings.append(turning)
         accelerations.append(acceleration)
-        forces.append(force)
-        moments.append(inertia @ spin_rate + _cross(spin, inertia @ spin) + _cross(com, force))
+        forces.append(inertia.mass * acceleration + turning @ DM(inertia.first))
+        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _spin_moment(turning, inertia.second))
     return forces, moments
 
 
-def _at_offset(acceleration: SX, spin: SX, spin_rate: SX, offset: DM) -> SX:
-    """Acceleration of a point fixed to a body, at an offset from its reference point."""
-    return acceleration + _cross(spin_rate, offset) + _cross(spin, _cross(spin, offset))
+def _turning(spin: SX, spin_rate: SX) -> SX:
+    """(3, 3) matrix that gives a body point's acceleration relative to the reference point from its position."""
+    (x, y, z), (a, b, c) = ca.vertsplit(spin), ca.vertsplit(spin_rate)
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+    return ca.blockcat([[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]])
 
 
-def _cross(a: SX | DM, b: SX | DM) -> SX:
-    return ca.cross(SX(a), SX(b))
+def _spin_moment(turning: SX, second: np.ndarray[Any, Any]) -> SX:
+    """Moment that turning a body about its reference point asks for: sum of p x (turning p) over its matter at p."""
+    U, J = turning, second
+    return ca.vertcat(
+        *(
+            (U[k, k] - U[j, j]) * J[j, k]
+            + U[k, i] * J[i, j]
+            - U[j, i] * J[i, k]
+            + U[k, j] * J[j, j]
+            - U[j, k] * J[k, k]
+            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        )
+    )

@@ -1,4 +1,4 @@
-"""The four operations at which a gait model is not smooth, in two interpretations.
+"""The operations at which a gait model is not smooth, in two interpretations.
 
 A problem is assembled once, against ``Nonsmooth``. ``Exact`` gives what the papers evaluate: it is compiled, searched and
 judged. ``Lifted`` gives an NLP that IPOPT can solve: absolute values and minima become variables with inequalities, an
@@ -39,6 +39,9 @@ class Nonsmooth(Protocol):
     def min(self, a: MX, b: MX) -> MX:
         """Elementwise minimum."""
 
+    def largest(self, v: MX) -> MX:
+        """Largest |v_i| of a vector (m, 1)."""
+
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Elementwise: ``below`` where switch < 0, else ``above``."""
 
@@ -61,6 +64,14 @@ class Exact:
     def min(self, a: MX, b: MX) -> MX:
         """Minimum."""
         return ca.fmin(a, b)
+
+    def largest(self, v: MX) -> MX:
+        """Largest |v_i|, by halves: elementwise operations only."""
+        v = ca.fabs(v)
+        while v.shape[0] > 1:
+            half = (v.shape[0] + 1) // 2
+            v = ca.fmax(v[:half], v[-half:])
+        return v
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """A true jump, written without a branch so that it vectorises."""
@@ -116,6 +127,12 @@ class Lifted:
         d = MX.sym(f"min_{len(self.lifts)}", a.shape[0])
         self.lifts.append(Lift(variable=d, value=ca.fmin(a, b), rows=ca.vertcat(a - d, b - d), from_above=False))
         return d
+
+    def largest(self, v: MX) -> MX:
+        """A variable s with s >= v_i and s >= -v_i for all i."""
+        s = MX.sym(f"largest_{len(self.lifts)}")
+        self.lifts.append(Lift(variable=s, value=ca.norm_inf(v), rows=ca.vertcat(s - v, s + v), from_above=True))
+        return s
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """A sigmoid between the two branches."""

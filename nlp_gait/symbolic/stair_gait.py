@@ -15,6 +15,7 @@ from nlp_gait.symbolic.stair_profile import Stair
 from nlp_gait.symbolic.trajectories import Motion
 
 PHASES = ("heel rises", "sole rises", "catch the cycloid", "track the cycloid")
+LEAST_DURATION = 1e-3  # [s]
 # Newton steps for the cycloid's first angle; from the cube root as guess, five reach machine precision.
 _NEWTON_STEPS = 6
 # Flat stairs begin their cycloid at its first point, where the root has no slope: at 2e-5 rad instead.
@@ -36,6 +37,7 @@ class StairPlan(NamedTuple):
         t1: end of the first phase [s].
         t2: end of the double support [s].
         t_bc: end of the Bezier bridge [s].
+        foot_pitch: upward pitch of the foot while it tracks the cycloid [rad].
         t3: end of the step [s].
         sole_angle: theta_a, largest angle of the sole [rad].
         toe_angle: theta_b, of the toe at the end of the double support [rad].
@@ -51,6 +53,7 @@ class StairPlan(NamedTuple):
     t1: SX
     t2: SX
     t_bc: SX
+    foot_pitch: SX
     t3: SX
     sole_angle: SX
     toe_angle: SX
@@ -58,8 +61,9 @@ class StairPlan(NamedTuple):
 
     @property
     def durations(self) -> SX:
-        """(4,) of the phases [s]."""
-        return ca.vertcat(self.t1, self.t2 - self.t1, self.t_bc - self.t2, self.t3 - self.t_bc)
+        """(4,) of the phases [s]; a phase of no or negative duration counts as a millisecond."""
+        ends = ca.vertcat(0, self.t1, self.t2, self.t_bc, self.t3)
+        return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
 
 
 class Foot(NamedTuple):
@@ -72,12 +76,17 @@ class Foot(NamedTuple):
 def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     """Angles of sole and toe, theta_6 and theta_7 [rad], from the fractions s (4,) of the phases.
 
+    In the air the foot straightens and pitches up by ``foot_pitch``, and lands as it left: toe first.
+
     Source:
         Bhardwaj et al., eqs. (3), (4), with (t - t1) / (t2 - t1) as argument of the second piece: as printed they are
-        continuous only if t2 = 2 t1. In single support theta_6 = 0 and theta_7 = theta_b (eq. 20).
+        continuous only if t2 = 2 t1. In the air eq. (20) holds theta_6 = 0 and theta_7 = theta_b, with which the toe cuts
+        through the edge of both steps; eqs. (15)-(18) have a straight foot.
     """
+    straight = _smooth(s[2]) - s[3] ** 4 * (5 - 4 * s[3])
     sole = plan.sole_angle * (_smooth(s[0]) - _smooth(s[1]))  # (eq. 3)
-    return sole, plan.toe_angle * _smooth(s[1])  # (eq. 4)
+    toe = plan.toe_angle * _smooth(s[1])  # (eq. 4)
+    return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
 def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
@@ -88,7 +97,7 @@ def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
         lies on the cycloid's tangent and its argument is 2 u^2 - u^3, so that the velocity is continuous at both ends; the
         cycloid ends so far ahead that the foot, once flat, stands exactly two treads on.
     """
-    sole, toe = foot_angles(plan, s)
+    sole, toe = foot_angles(plan, ca.vertcat(s[:2], 0, 0))
     on_toe = ca.vertcat(
         foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
         foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)
@@ -110,7 +119,7 @@ def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
     bridge = (1 - b) ** 3 * p1 + 3 * (1 - b) ** 2 * b * p2 + 3 * (1 - b) * b**2 * p3 + b**3 * p4  # (eqs. 10, 11)
 
     # Angle of the cycloid: cubic from the bridge's end velocity to the end rate (eqs. 12-14).
-    bridge_time, track_time = plan.t_bc - plan.t2, plan.t3 - plan.t_bc
+    _, _, bridge_time, track_time = ca.vertsplit(plan.durations)
     start_rate = 3 * plan.catch_angle / bridge_time
     v0, v1, rise = start_rate * track_time, plan.end_rate * track_time, ca.pi - caught
     c = s[3]

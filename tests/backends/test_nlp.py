@@ -74,7 +74,6 @@ def test_with_lifted_variables_at_their_exact_values_the_nlp_is_the_exact_proble
     np.testing.assert_array_equal(upper, np.array(exact.function(x, problem.p)[4]).ravel()[:count])
 
 
-
 GOOD: dict[str, Mathematics] = {
     "abs minimised": lambda x, y, limit, ops: (ops.abs(x) + y**2, ()),
     "min maximised": lambda x, y, limit, ops: (-ops.min(x, y), ()),

@@ -15,7 +15,9 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 Mathematics = Callable[[MX, MX, MX, Nonsmooth], tuple[MX, tuple[Constraint, ...]]]
 
 
-def toy(mathematics: Mathematics, sense: Literal["minimise", "maximise"] = "minimise", limit: float = 0.5) -> GaitProblem:
+def toy(
+    mathematics: Mathematics, sense: Literal["minimise", "maximise"] = "minimise", limit: float = 0.5
+) -> GaitProblem:
     """A problem of x in [-2, 2] m and y in [-1, 3] m with a parameter ``limit`` [m]."""
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
@@ -30,7 +32,9 @@ def toy(mathematics: Mathematics, sense: Literal["minimise", "maximise"] = "mini
             Variable(name="x", unit="m", lower=-2.0, upper=2.0, description="first"),
             Variable(name="y", unit="m", lower=-1.0, upper=3.0, description="second"),
         ),
-        own_parameters=(Parameter(name="limit", unit="m", default=limit, description="of the constraint", minimum=-9.0),),
+        own_parameters=(
+            Parameter(name="limit", unit="m", default=limit, description="of the constraint", minimum=-9.0),
+        ),
         objective=Objective(name="cost", unit="J", sense=sense),
         assemble=assemble,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -43,7 +45,11 @@ def kinematics() -> ca.Function:
     """Q to the whole robot's centre of mass, and each body's centre of mass and rotation."""
     q = SX.sym("q", len(JOINTS))
     poses = forward_kinematics(TREE, by_name(q), SX(3, 1))
-    outputs = [centre_of_mass(TREE, poses), ca.horzcat(*(p.com for p in poses)), ca.horzcat(*(p.rotation for p in poses))]
+    outputs = [
+        centre_of_mass(TREE, poses),
+        ca.horzcat(*(p.com for p in poses)),
+        ca.horzcat(*(p.rotation for p in poses)),
+    ]
     return ca.Function("kinematics", [q], outputs)
 
 
@@ -126,8 +132,6 @@ def test_two_trees_that_share_a_link_carry_the_whole_robot() -> None:
 
 
 def test_a_share_of_a_link_is_a_link_of_that_mass_and_inertia() -> None:
-    from dataclasses import replace
-
     torso = ROBOT.links[ROBOT.root]
     lighter: Robot = replace(
         ROBOT,

@@ -15,17 +15,17 @@ static casadi_int work_size(int which) {
   return sizes[which];
 }
 
-extern "C" long long nlp_gait_lanes(void) { return LANES; }
+extern "C" EXPORT long long nlp_gait_lanes(void) { return LANES; }
 
 // Bytes of the workspace that each thread brings; it need not be aligned.
-extern "C" long long nlp_gait_workspace_bytes(void) {
+extern "C" EXPORT long long nlp_gait_workspace_bytes(void) {
   return sizeof(Lanes) + sizeof(Workspace) + work_size(3) * sizeof(Lanes) + work_size(2) * sizeof(casadi_int) +
          (work_size(0) + work_size(1)) * sizeof(void*);
 }
 
 // X is (rows, n), p (k), lower, upper and weight (m), f and violation (rows); g is (rows, m) or null.
 // A row of X that is not finite gets f = violation = infinity.
-extern "C" int nlp_gait_evaluate(const double* X, long long rows, const double* p, const double* lower,
+extern "C" EXPORT int nlp_gait_evaluate(const double* X, long long rows, const double* p, const double* lower,
                                         const double* upper, const double* weight, double* f, double* violation,
                                         double* g, char* memory) {
   unsigned long long start = (unsigned long long)memory;

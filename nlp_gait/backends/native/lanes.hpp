@@ -18,6 +18,7 @@ typedef long long Mask __attribute__((vector_size(8 * LANES)));
 #endif
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
+#define EXPORT __attribute__((visibility("default")))
 
 struct Lanes {
   Vector v;

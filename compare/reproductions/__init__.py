@@ -1,0 +1,1 @@
+"""The seed papers' tables and figures, next to ours."""

@@ -1,0 +1,164 @@
+"""Other NLP solvers of the CasADi wheel on the same lifted NLP as IPOPT."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.ipopt import WIDTHS
+from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.solution import Evaluations
+from nlp_gait.errors import InputError
+from nlp_gait.problems.gait_problem import Array, GaitProblem
+
+# Options that keep each solver from printing; a solver joins by a line here.
+OPTIONS: Mapping[str, Mapping[str, Any]] = {
+    "fatrop": {"fatrop.print_level": 0},
+    "sqpmethod": {
+        "print_header": False,
+        "print_iteration": False,
+        "print_status": False,
+        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
+    },
+    "uno": {"uno.logger": "SILENT"},
+}
+PROBE_TIME_LIMIT_S = 60.0
+PROBE = """
+import sys
+import casadi as ca
+x = ca.MX.sym("x", 2)
+problem = {"x": x, "f": (x[0] - 1) ** 2 + (x[1] - 2) ** 2, "g": x[0] + x[1]}
+result = ca.nlpsol("probe", sys.argv[1], problem, {"print_time": False})(x0=0, ubg=2)
+sys.exit(0 if abs(float(result["x"][0]) - 0.5) < 1e-4 else "wrong optimum")
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NlpEnd:
+    """Where a solver ended.
+
+    Attributes:
+        x: (n,) decision variables, within their bounds.
+        success: as the solver itself claims.
+        status: in the solver's own words.
+        iterations: over all stages, where the solver tells.
+        evaluations: over all stages; products with the Hessian count as gradients.
+        build_s: time to make the solver, 0 if it was there [s].
+        time_s: time of the solver [s].
+    """
+
+    x: Array
+    success: bool
+    status: str
+    iterations: int
+    evaluations: Evaluations
+    build_s: float
+    time_s: float
+
+
+@cache
+def probe(name: str) -> str | None:
+    """Why a solver does not run in this installation, or None if it does.
+
+    It is tried in another process on a small problem: a solver may be listed and still fail to load, or crash.
+
+    Raises:
+        InputError: not one of ``OPTIONS``.
+    """
+    if name not in OPTIONS:
+        raise InputError(f"NLP solver must be one of {', '.join(OPTIONS)}, got {name!r}")
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", PROBE, name],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=PROBE_TIME_LIMIT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return f"it does not end within {PROBE_TIME_LIMIT_S:g} s"
+    if done.returncode == 0:
+        return None
+    said = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+    return said[-1] if said else f"it ends with status {done.returncode}"
+
+
+def solve_with(name: str, problem: GaitProblem, x0: Array) -> NlpEnd:
+    """One run of a solver from a start point (n,), with its own default settings, in IPOPT's stages of sigmoid width."""
+    model = nlp_model(problem)
+    started = time.perf_counter()
+    solver = problem.built(f"nlpsol {name}", lambda: _make(name, model))
+    build_s = time.perf_counter() - started
+    z0 = (np.clip(x0, problem.lower, problem.upper) - model.offset) / model.scale
+    widths = WIDTHS if model.smoothed else WIDTHS[-1:]
+    primal = np.concatenate([z0, np.array(model.lift_start(z0, problem.p, widths[0])).ravel()])
+    bounds = _bounds(problem, model)
+    iterations, evaluations, stats = 0, Evaluations(), {}
+    started = time.perf_counter()
+    for width in widths:
+        with contextlib.redirect_stdout(io.StringIO()):  # qpOASES prints its licence
+            result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+        primal = np.array(result["x"]).ravel()
+        stats = solver.stats()
+        iterations += int(stats.get("iter_count") or 0)
+        evaluations += _counts(stats)
+    finite = bool(np.isfinite(primal).all())
+    x = model.offset + model.scale * primal[: model.variables] if finite else problem.lower
+    return NlpEnd(
+        x=np.clip(x, problem.lower, problem.upper),
+        success=bool(stats["success"]) and finite,
+        status=f"{name} says {stats.get('return_status')!r}" if finite else "it returned NaN or inf",
+        iterations=iterations,
+        evaluations=evaluations,
+        build_s=build_s,
+        time_s=time.perf_counter() - started,
+    )
+
+
+def claimed(problem: GaitProblem, x: Array) -> tuple[float, float]:
+    """Exact cost and total violation at a point."""
+    cost, violation = exact_model(problem).function(x, problem.p)[:2]
+    return float(cost), float(violation)
+
+
+def _make(name: str, model: NlpModel) -> ca.Function:
+    reason = probe(name)
+    if reason is not None:
+        raise InputError(f"NLP solver {name!r} does not run in this installation: {reason}")
+    return ca.nlpsol(name, name, model.nlp, {"print_time": False, "error_on_fail": False, **OPTIONS[name]})
+
+
+def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:
+    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
+    free, ties = np.full(model.lifted, np.inf), np.zeros(model.lift_rows)
+    return {
+        "lbx": np.concatenate([(problem.lower - model.offset) / model.scale, -free]),
+        "ubx": np.concatenate([(problem.upper - model.offset) / model.scale, free]),
+        "lbg": np.concatenate([lower, ties]),
+        "ubg": np.concatenate([upper, ties + np.inf]),
+    }
+
+
+def _counts(stats: Mapping[str, Any]) -> Evaluations:
+    def calls(*names: str) -> int:
+        return sum(int(stats.get(f"n_call_nlp_{name}", 0)) for name in names)
+
+    products = int(stats.get("n_call_fwd1_nlp_grad_l", 0))
+    return Evaluations(
+        f=calls("f", "fg"),
+        g=calls("g", "fg"),
+        gradient=calls("grad_f", "jac_fg") + products,
+        jacobian=calls("jac_g", "jac_fg"),
+        hessian=calls("hess_l"),
+    )

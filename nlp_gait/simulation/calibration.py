@@ -1,0 +1,59 @@
+"""Where the rigid model stops being true: prediction against engine for random feasible gaits from slow to fast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlp_gait.backends.solve import compile_objective
+from nlp_gait.errors import InputError
+from nlp_gait.export.result import Result
+from nlp_gait.problems.gait_problem import GaitProblem
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import Measurements, measure
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.playback import play
+
+DRAWS, BATCH = 50, 2_000  # candidates drawn for one feasible gait: at most DRAWS batches
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """One random gait."""
+
+    duration_s: float
+    result: Result
+    measurements: Measurements
+
+
+def random_gait(problem: GaitProblem, duration: str, duration_s: float, rng: np.random.Generator) -> Result:
+    """Uniformly drawn feasible gait of a given duration.
+
+    Raises:
+        InputError: none was found.
+    """
+    fixed = problem.fix(**{duration: duration_s})
+    objective = compile_objective(fixed)
+    for _ in range(DRAWS):
+        candidates = rng.uniform(fixed.lower, fixed.upper, (BATCH, len(fixed.names)))
+        _, violation = objective(candidates)
+        feasible = np.flatnonzero(violation == 0.0)
+        if feasible.size:
+            return Result(problem=fixed, x=candidates[feasible[0]])
+    raise InputError(f"none of {DRAWS * BATCH} random gaits of {problem.name!r} with {duration} = {duration_s:g} is feasible")
+
+
+def calibrate(
+    problem: GaitProblem, shortest_s: float, count: int = 20, seed: int = 0, drive: Drive | None = None
+) -> Iterator[Case]:
+    """Random feasible gaits with durations from the variable's upper bound down to the shortest, equal ratios apart."""
+    drive = drive or Drive()
+    duration = next(name for name in problem.names if name.endswith("_time_s"))
+    longest = float(problem.upper[problem.variable_index(duration)])
+    rng = np.random.default_rng(seed)
+    for value in np.geomspace(longest, shortest_s, count).tolist():
+        result = random_gait(problem, duration, min(value, longest), rng)
+        plan = plan_of(result)
+        yield Case(duration_s=value, result=result, measurements=measure(plan, play(plan, drive=drive), drive))

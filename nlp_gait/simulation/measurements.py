@@ -1,0 +1,169 @@
+"""What a simulation showed, beside what the model had predicted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from nlp_gait.problems.gait_problem import Array
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import TIME_STEP
+from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.playback import LEAST_LOAD, Trace
+
+AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a servo counts as saturated
+MIDDLE = (0.2, 0.8)  # part of the phase that neither the start from unloaded servos nor the landing disturbs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Power:
+    """Mean power over the phase: |torque rate| summed over the joints, and heat K torque^2 [W]."""
+
+    mechanical_W: float
+    heat_W: float
+
+    @property
+    def total_W(self) -> float:
+        """Mechanical and heat."""
+        return self.mechanical_W + self.heat_W
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landing:
+    """Where a swinging sole stood at the end, against the plan; (x, y) under the ankle [m]."""
+
+    planned_m: tuple[float, float]
+    measured_m: tuple[float, float]
+    error_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurements:
+    """One simulation in numbers; those over time belong to the phase, not to the settling after it.
+
+    Attributes:
+        fallen: the torso tilted by more than 45 degrees or sank below 60 % of its height, then or while settling.
+        fell_at_s: when; None if it stayed up.
+        largest_tilt_deg: of the torso, settling included.
+        tracking_rms_rad: planned minus measured angle, over all joints.
+        tracking_max_rad: largest.
+        slip_m: largest distance of a supporting sole from where it stood at the start.
+        landings: by side, of the swinging feet.
+        pressure_rms_m: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP.
+        pressure_max_m: largest.
+        pressure_middle_rms_m: over the middle 60 % of the phase.
+        pressure_raw_rms_m: without averaging; contact forces ring at every new set-point.
+        predicted: power by the rigid model.
+        measured: power of the servos.
+        saturated: share of time at the torque limit, by joint, where not zero.
+        joint_limits: joints that went beyond their mechanical range.
+    """
+
+    fallen: bool
+    fell_at_s: float | None
+    largest_tilt_deg: float
+    tracking_rms_rad: float
+    tracking_max_rad: float
+    slip_m: float
+    landings: Mapping[str, Landing]
+    pressure_rms_m: float | None
+    pressure_max_m: float | None
+    pressure_middle_rms_m: float | None
+    pressure_raw_rms_m: float | None
+    predicted: Power
+    measured: Power
+    saturated: Mapping[str, float]
+    joint_limits: tuple[str, ...]
+
+    @property
+    def power_error(self) -> float:
+        """Measured total power over the predicted one, minus one."""
+        return self.measured.total_W / self.predicted.total_W - 1.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries, lists and numbers."""
+        return asdict(self)
+
+
+def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
+    """Numbers of one simulation."""
+    during = trace.t <= plan.duration_s
+    error = plan.at("q", trace.t[during]) - trace.q[during]
+    torque, rate = trace.torque[during], trace.qd[during]
+    raw = np.linalg.norm(trace.pressure - plan.at("zmp", trace.t), axis=1)[during]
+    deviation = np.linalg.norm(averaged_pressure(trace, drive.period_s) - plan.at("zmp", trace.t), axis=1)[during]
+    share = trace.t[during] / plan.duration_s
+    middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
+    return Measurements(
+        fallen=trace.fell_at_s is not None,
+        fell_at_s=trace.fell_at_s,
+        largest_tilt_deg=math.degrees(float(trace.tilt.max())),
+        tracking_rms_rad=_rms(error),
+        tracking_max_rad=float(np.abs(error).max()),
+        slip_m=_slip(plan, trace),
+        landings={side: _landing(plan, trace, side) for side in SIDES if side not in plan.supports},
+        pressure_rms_m=_if_any(_rms, deviation),
+        pressure_max_m=_if_any(np.max, deviation),
+        pressure_middle_rms_m=_if_any(_rms, middle),
+        pressure_raw_rms_m=_if_any(_rms, raw),
+        predicted=Power(mechanical_W=plan.mechanical_power_W, heat_W=plan.heat_power_W),
+        measured=Power(
+            mechanical_W=float(np.abs(torque * rate).sum(axis=1).mean()),
+            heat_W=plan.heat_loss * float((torque**2).sum(axis=1).mean()),
+        ),
+        saturated=_saturated(plan, torque, drive),
+        joint_limits=_beyond_range(plan, trace.q[during]),
+    )
+
+
+def averaged_pressure(trace: Trace, period_s: float) -> Array:
+    """Centre of pressure (T, 2) averaged over a moving period, each instant weighted by its load [m]; NaN in flight."""
+    width = max(1, round(period_s / TIME_STEP))
+    load = trace.loads.sum(axis=1)
+    moment = np.nan_to_num(trace.pressure) * load[:, None]
+    mean_load = uniform_filter1d(load, width)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        centre = uniform_filter1d(moment, width, axis=0) / mean_load[:, None]
+    return np.asarray(np.where(mean_load[:, None] > LEAST_LOAD, centre, np.nan))
+
+
+def _slip(plan: Plan, trace: Trace) -> float:
+    moved = [trace.feet[:, SIDES.index(side), :2] for side in plan.supports]
+    return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
+
+
+def _landing(plan: Plan, trace: Trace, side: str) -> Landing:
+    planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2]
+    measured = trace.feet[-1, SIDES.index(side), :2]
+    return Landing(
+        planned_m=(float(planned[0]), float(planned[1])),
+        measured_m=(float(measured[0]), float(measured[1])),
+        error_m=float(np.linalg.norm(measured - planned)),
+    )
+
+
+def _saturated(plan: Plan, torque: Array, drive: Drive) -> dict[str, float]:
+    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
+    shares = (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0)
+    return {name: float(share) for name, share in zip(plan.joints, shares, strict=True) if share > 0.0}
+
+
+def _beyond_range(plan: Plan, q: Array) -> tuple[str, ...]:
+    ranges = np.array([plan.robot.joint(name).limits_rad for name in plan.joints])
+    beyond = ((q < ranges[:, 0]) | (q > ranges[:, 1])).any(axis=0)
+    return tuple(name for name, hit in zip(plan.joints, beyond, strict=True) if hit)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _if_any(statistic: Any, values: Array) -> float | None:
+    """A statistic of the values that are numbers; None if none is."""
+    numbers = values[np.isfinite(values)]
+    return float(statistic(numbers)) if numbers.size else None

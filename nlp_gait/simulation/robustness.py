@@ -1,0 +1,78 @@
+"""How much disturbance a gait survives in open loop: pushes, slippery floors, wrong masses, slopes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from nlp_gait.simulation.conditions import Conditions, Push
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.playback import play
+
+DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}
+PUSH_STEP, LARGEST_PUSH = 0.05, 3.0  # [N s]
+SLOPE_STEP, LARGEST_SLOPE = 0.5, 20.0  # [degrees]
+FRICTIONS = tuple(round(0.1 * k, 1) for k in range(3, 11))
+MASS_FACTORS = (0.9, 1.1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """What a gait survives; a fall while settling counts.
+
+    Attributes:
+        undisturbed: whether it survives at all.
+        push_Ns: by direction, the largest impulse on the torso below the first that fells it.
+        slope_deg: by the direction in which the floor rises, the largest slope below the first that fells it.
+        friction: by coefficient, whether it survives.
+        mass_factor: by factor on all masses, whether it survives.
+    """
+
+    undisturbed: bool
+    push_Ns: Mapping[str, float]
+    slope_deg: Mapping[str, float]
+    friction: Mapping[float, bool]
+    mass_factor: Mapping[float, bool]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries and numbers."""
+        return asdict(self)
+
+
+def robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
+    """Sweep every disturbance by itself, from none upwards until the robot falls.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+
+    def survives(conditions: Conditions) -> bool:
+        return play(plan, conditions, drive).fell_at_s is None
+
+    def pushed(direction: str, impulse: float) -> Conditions:
+        x, y = DIRECTIONS[direction]
+        return Conditions(push=Push(impulse_Ns=(x * impulse, y * impulse)))
+
+    def sloped(direction: str, slope: float) -> Conditions:
+        x, y = DIRECTIONS[direction]
+        return Conditions(slope_rad=(math.radians(x * slope), math.radians(y * slope)))
+
+    def largest(make: Callable[[str, float], Conditions], step: float, most: float) -> dict[str, float]:
+        found = {}
+        for direction in DIRECTIONS:
+            steps = 1
+            while steps * step <= most and survives(make(direction, steps * step)):
+                steps += 1
+            found[direction] = round((steps - 1) * step, 9)
+        return found
+
+    return Robustness(
+        undisturbed=survives(Conditions()),
+        push_Ns=largest(pushed, PUSH_STEP, LARGEST_PUSH),
+        slope_deg=largest(sloped, SLOPE_STEP, LARGEST_SLOPE),
+        friction={value: survives(Conditions(friction=value)) for value in FRICTIONS},
+        mass_factor={value: survives(Conditions(mass_factor=value)) for value in MASS_FACTORS},
+    )

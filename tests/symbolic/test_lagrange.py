@@ -1,0 +1,141 @@
+"""Equations of motion of the nine-link biped: structure, energy, and an independent oracle."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.symbolic.lagrange import equations_of_motion
+from nlp_gait.symbolic.planar_biped import ENDS, LINKS, biped_dynamics, centres, points
+
+pinocchio = pytest.importorskip("pinocchio")
+
+GRAVITY = 9.81
+POSE = np.array([1.2, 1.9, 1.4, 1.8, 1.3, 0.2, 0.1, 0.05, -0.05])
+# Path from the stance ankle: link, what it hangs on, whether it is passed from its far end.
+TREE = (
+    ("K'A'", None, True),
+    ("HK'", "K'A'", True),
+    ("UH", "HK'", False),
+    ("HK", "HK'", False),
+    ("KA", "HK", False),
+    ("AS", "KA", False),
+    ("ST", "AS", False),
+    ("A'S'", None, False),
+    ("S'T'", "A'S'", False),
+)
+
+
+@pytest.fixture(scope="module")
+def dynamics() -> ca.Function:
+    q, qd = SX.sym("q", 9), SX.sym("qd", 9)
+    motion = biped_dynamics(load_biped().rods, GRAVITY, q, qd, q)
+    return ca.Function("dynamics", [q, qd], ca.cse(list(motion)))
+
+
+@pytest.fixture
+def states() -> list[tuple[np.ndarray, np.ndarray]]:
+    rng = np.random.default_rng(0)
+    return [(rng.uniform(-np.pi, np.pi, 9), rng.uniform(-5.0, 5.0, 9)) for _ in range(30)]
+
+
+def test_inertia_is_symmetric_and_positive_definite(dynamics: ca.Function, states: list) -> None:
+    for q, qd in states:
+        M = np.array(dynamics(q, qd)[0])
+        assert np.abs(M - M.T).max() < 1e-13
+        assert np.linalg.eigvalsh(M).min() > 5e-5  # the toe: 0.15 kg, 5 cm
+
+
+def test_inertia_rate_less_twice_coriolis_is_skew(dynamics: ca.Function, states: list) -> None:
+    q, qd = SX.sym("q", 9), SX.sym("qd", 9)
+    M, C, _ = dynamics(q, qd)
+    excess = ca.reshape(ca.jtimes(ca.vec(M), q, qd), 9, 9) - 2 * C
+    function = ca.Function("excess", [q, qd], [excess + excess.T])
+    assert max(np.abs(np.array(function(*state))).max() for state in states) < 1e-12
+
+
+def test_torques_equal_pinocchio(dynamics: ca.Function, states: list) -> None:
+    model, joint_of_link = planar_model()
+    data = model.createData()
+    rng = np.random.default_rng(1)
+    for q, qd in states:
+        qdd = rng.uniform(-10.0, 10.0, 9)
+        M, C, G = (np.array(part) for part in dynamics(q, qd))
+        ours = M @ qdd + C @ qd + G.ravel()
+        # Absolute angles as joint angles; the generalised forces follow from the same linear map.
+        to_joints = joint_of_link
+        theirs = to_joints.T @ pinocchio.rnea(model, data, to_joints @ q, to_joints @ qd, to_joints @ qdd)
+        assert np.abs(ours - theirs).max() < 1e-8
+
+
+def planar_model() -> tuple[object, np.ndarray]:
+    """Pinocchio model of the same links, and the matrix from absolute link angles to its joint angles.
+
+    Every joint turns clockwise seen with x to the right and z up, that is about +y; a link lies along its own x axis, the
+    torso too, whose angle therefore enters with a minus sign. A link passed from its far end lies along -x.
+    """
+    robot = load_biped()
+    model = pinocchio.Model()
+    model.gravity = pinocchio.Motion(np.array([0.0, 0.0, -GRAVITY]), np.zeros(3))
+    ids: dict[str, int] = {}
+    tips: dict[str, np.ndarray] = {}
+    signs = {link: -1.0 if link == "UH" else 1.0 for link in LINKS}
+    matrix = np.zeros((9, 9))
+    for row, (link, parent, from_far_end) in enumerate(TREE):
+        part = robot.link(link)
+        along = np.array([-1.0 if from_far_end else 1.0, 0.0, 0.0])
+        at = tips[parent] if parent else np.zeros(3)
+        ids[link] = model.addJoint(
+            ids[parent] if parent else 0, pinocchio.JointModelRY(), pinocchio.SE3(np.eye(3), at), link
+        )
+        inertia = part.mass_kg * part.length_m**2 / 12
+        body = pinocchio.Inertia(part.mass_kg, along * part.length_m / 2, np.diag([1e-9, inertia, inertia]))
+        model.appendBodyToJoint(ids[link], body, pinocchio.SE3.Identity())
+        tips[link] = along * part.length_m
+        matrix[row, LINKS.index(link)] = signs[link]
+        if parent:
+            matrix[row, LINKS.index(parent)] -= signs[parent]
+    return model, matrix
+
+
+def test_free_fall_keeps_its_energy(dynamics: ca.Function) -> None:
+    q, qd = SX.sym("q", 9), SX.sym("qd", 9)
+    M, C, G = dynamics(q, qd)
+    rods = load_biped().rods
+    middles = centres(points(rods, q, SX(2, 1)))
+    height = sum(rods[link].mass * GRAVITY * middles[link][1] for link in LINKS)
+    energy = ca.Function("energy", [q, qd], [ca.dot(qd, M @ qd) / 2 + height])
+    state, h = ca.vertcat(q, qd), 0.25e-3
+    rate = ca.Function("rate", [state], [ca.vertcat(qd, ca.solve(M, -C @ qd - G))])
+    x = ca.MX.sym("x", 18)
+    k1 = rate(x)
+    k2 = rate(x + h / 2 * k1)
+    k3 = rate(x + h / 2 * k2)
+    k4 = rate(x + h * k3)
+    fall = ca.Function("step", [x], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)]).mapaccum(2000)
+    path = np.array(fall(np.concatenate([POSE, np.zeros(9)])))
+    before = float(energy(POSE, np.zeros(9)))
+    drift = [abs(float(energy(path[:9, k], path[9:, k])) - before) for k in range(0, 2000, 50)]
+    assert np.abs(path[9:]).max() > 5.0  # it does fall
+    assert max(drift) < 1e-3
+
+
+def test_pendulum() -> None:
+    q, qd = SX.sym("q"), SX.sym("qd")
+    motion = equations_of_motion(0.5 * 2.0 * 0.3**2 * qd**2, -2.0 * 9.81 * 0.3 * ca.cos(q), q, qd)
+    M, C, G = ca.Function("pendulum", [q, qd], list(motion))(0.5, 2.0)
+    assert float(M) == pytest.approx(0.18)
+    assert float(C) == 0.0
+    assert float(G) == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.5))
+
+
+def test_upright_points() -> None:
+    down = np.pi / 2
+    found = points(load_biped().rods, SX([down, down, down, down, down, 0, 0, 0, 0]), SX(2, 1))
+    expected = {"H": (0.0, 0.8), "K": (0.0, 0.4), "A": (0.0, 0.0), "U": (0.0, 1.1), "T": (0.17, 0.0), "T'": (0.17, 0.0)}
+    for name, place in expected.items():
+        assert np.array(ca.DM(found[name])).ravel() == pytest.approx(place, abs=1e-12)
+    assert {end for pair in ENDS.values() for end in pair} == set(found)
