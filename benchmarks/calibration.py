@@ -15,17 +15,16 @@ def main() -> None:
     """One Markdown table a phase."""
     for name, shortest in SHORTEST_S.items():
         print(f"\n### {name}\n")
-        print("| time s | model W | mechanical, heat W | engine W | mechanical, heat W | error of power | pressure RMS mm | tilt deg | |")
+        print("| time s | model W | engine W | error | CoP RMS mm | engine W, smooth set-points | error | CoP RMS mm | |")
         print("|---|---|---|---|---|---|---|---|---|")
         for case in calibrate(nlp_gait.load(name), shortest):
-            m = case.measurements
-            powers = " | ".join(f"{p.total_W:.3f} | {p.mechanical_W:.3f}, {p.heat_W:.3f}" for p in (m.predicted, m.measured))
-            end = f"falls at {m.fell_at_s:.2f} s" if m.fell_at_s is not None else "stays up"
-            pressure = "-" if m.pressure_rms_m is None else f"{1e3 * m.pressure_rms_m:.1f}"
-            print(
-                f"| {case.duration_s:.3f} | {powers} | {m.power_error:+.0%} | {pressure} | {m.largest_tilt_deg:.1f} | {end} |",
-                flush=True,
-            )
+            cells = [f"{case.duration_s:.2f}", f"{case.measurements.predicted.total_W:.3f}"]
+            for m in (case.measurements, case.smooth):
+                pressure = "-" if m.pressure_rms_m is None else f"{1e3 * m.pressure_rms_m:.1f}"
+                cells += [f"{m.measured.total_W:.3f}", f"{m.power_error:+.0%}", pressure]
+            fallen = [label for label, m in (("40 ms", case.measurements), ("smooth", case.smooth)) if m.fallen]
+            cells.append(f"falls ({', '.join(fallen)})" if fallen else "stays up")
+            print(f"| {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 from nlp_gait.errors import InputError, OutputError
+
+# Writing one file takes far less; an older temporary file is nobody's.
+LEFTOVER_AGE_S = 60.0
 
 
 def writable_folder(path: Path) -> Path:
@@ -26,6 +30,16 @@ def writable_folder(path: Path) -> Path:
             f"cannot write to {str(path)!r}: {error.strerror}; choose another folder with --out"
         ) from error
     return path
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of ``write_text`` that a killed process left behind, none that may still be in use."""
+    for path in folder.glob(".*.tmp"):
+        try:
+            if time.time() - path.stat().st_mtime > LEFTOVER_AGE_S:
+                path.unlink(missing_ok=True)
+        except OSError:
+            continue  # another process has removed it
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,16 +1,21 @@
-"""A study: solvers x problems x runs in worker processes, one file for each finished run."""
+"""A study: solvers x problems x runs, one file for each finished run."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from compare.record import RunRecord, read_record
-from compare.runner import Task, check_task, run_task
-from compare.storage import writable_folder
+from compare.storage import remove_leftovers, writable_folder
+from compare.task import Task, check_task
+from compare.workers import default_jobs, run_jobs
 from nlp_gait.errors import InputError
+
+__all__ = ["Study", "default_jobs", "record_file", "run_study"]
+
+RECORDS = "records"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,14 +23,16 @@ class Study:
     """What to run.
 
     Attributes:
-        tasks: every run.
-        folder: where records go: ``<folder>/records/<problem>/<algorithm>-<run>.json``; None keeps nothing.
+        tasks: every run; those that polish others may stand anywhere.
+        folder: where records go, see ``record_file``; None keeps nothing.
         jobs: worker processes; 1 runs in this one.
+        scheduler: address of a Dask scheduler that takes their place.
     """
 
     tasks: tuple[Task, ...]
     folder: Path | None = None
     jobs: int = 1
+    scheduler: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot run."""
@@ -33,77 +40,106 @@ class Study:
             raise InputError(f"jobs must be at least 1, got {self.jobs}")
         if not self.tasks:
             raise InputError("a study needs at least one problem, one algorithm and one run")
+        files = Counter(record_file(Path(), task) for task in self.tasks)
+        twice = next((file for file, count in files.items() if count > 1), None)
+        if twice is not None:
+            raise InputError(f"two solvers of the study are called {twice.stem!r} on {twice.parent.name!r}: label them apart")
 
 
-def run_study(study: Study, progress: Callable[[Task, RunRecord], None] | None = None) -> list[RunRecord]:
+def run_study(
+    study: Study,
+    progress: Callable[[Task, RunRecord], None] | None = None,
+    kept: Callable[[int], None] | None = None,
+) -> list[RunRecord]:
     """Run what has no record yet, and return the records of all tasks in their order.
 
     Each record is written as soon as its run has ended, so whatever stops the study loses only the runs in progress.
 
+    Args:
+        study: what to run.
+        progress: called after each run.
+        kept: called once with the number of runs that had a record already.
+
     Raises:
         UnknownNameError: a problem, option, parameter, algorithm or setting does not exist.
+        InputError: the folder holds another study.
         OutputError: the folder cannot be written to; found out before the first run.
     """
-    for task in {(t.problem.name, t.algorithm): t for t in study.tasks}.values():
+    for task in {(t.problem.title, t.title): t for t in study.tasks}.values():
         check_task(task)
-    paths = _paths(study)
-    records: dict[int, RunRecord] = {}
-    for index, path in enumerate(paths):
-        if path is not None and path.exists():
-            records[index] = _matching(path, study.tasks[index])
-    waiting = [index for index in range(len(study.tasks)) if index not in records]
-    for index, record in _run_all(study, waiting, paths):
-        records[index] = record
-        if progress is not None:
-            progress(study.tasks[index], record)
+    records = _finished(study)
+    if kept is not None:
+        kept(len(records))
+    by_key = {_key(task): index for index, task in enumerate(study.tasks)}
+    for polishing in (False, True):
+        waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
+        waiting.sort(key=lambda i: _begins(study.tasks[i]))
+        jobs = [(task, records[by_key[_polished(task)]] if polishing else None) for task in (study.tasks[i] for i in waiting)]
+        for position, record in run_jobs(jobs, study.jobs, study.scheduler):
+            index = waiting[position]
+            if study.folder is not None:
+                record.write(record_file(study.folder, study.tasks[index]))
+            records[index] = record
+            if progress is not None:
+                progress(study.tasks[index], record)
     return [records[index] for index in range(len(study.tasks))]
 
 
-def default_jobs() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def record_file(folder: Path, task: Task) -> Path:
+    """``<folder>/records/<problem>/<solver>-<run>.json``; a colon in a label becomes a full stop."""
+    problem, solver = (title.replace(":", ".") for title in (task.problem.title, task.title))
+    return folder / RECORDS / problem / f"{solver}-{task.run:04d}.json"
 
 
-def _paths(study: Study) -> list[Path | None]:
+def read_records(folder: Path) -> list[RunRecord]:
+    """All records below a folder, in the order of their names.
+
+    Raises:
+        InputError: there are none, or one is damaged.
+    """
+    paths = sorted((folder / RECORDS).glob("*/*.json"))
+    if not paths:
+        raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
+    return [read_record(path) for path in paths]
+
+
+def _finished(study: Study) -> dict[int, RunRecord]:
+    """Records that are there already."""
     if study.folder is None:
-        return [None] * len(study.tasks)
-    folder = writable_folder(study.folder / "records")
-    for problem in {task.problem.name for task in study.tasks}:
-        writable_folder(folder / problem)
-    return [folder / task.problem.name / f"{task.algorithm}-{task.run:04d}.json" for task in study.tasks]
+        return {}
+    records: dict[int, RunRecord] = {}
+    for folder in {record_file(study.folder, task).parent for task in study.tasks}:
+        remove_leftovers(writable_folder(folder))
+    for index, task in enumerate(study.tasks):
+        path = record_file(study.folder, task)
+        if path.exists():
+            records[index] = _matching(path, task)
+    return records
 
 
 def _matching(path: Path, task: Task) -> RunRecord:
     """Record of an earlier call, if it is of the same task."""
     record = read_record(path)
-    problem = task.problem.load()
-    same = (
-        record.seed == task.run_seed
-        and dict(record.options) == dict(problem.options)
-        and dict(record.parameters) == dict(problem.values)
-        and record.settings.get("evaluations", task.evaluations) == task.evaluations
-    )
-    if not same:
+    definition = task.definition()
+    if record.definition != definition:
+        differs = ", ".join(
+            key for key in {**record.definition, **definition} if record.definition.get(key) != definition.get(key)
+        )
         raise InputError(
-            f"{str(path.parent.parent.parent)!r} holds another study ({path.name} differs in seed, budget, options or "
-            "parameters); choose another folder with --out, or delete it"
+            f"{str(path.parents[2])!r} holds another study: {path.parent.name}/{path.name} differs in {differs}; choose "
+            "another folder with --out, or delete it"
         )
     return record
 
 
-def _run_all(study: Study, waiting: Sequence[int], paths: Sequence[Path | None]) -> Iterator[tuple[int, RunRecord]]:
-    if study.jobs == 1 or len(waiting) <= 1:
-        for index in waiting:
-            yield _run_one(index, study.tasks[index], paths[index])
-        return
-    from joblib import Parallel, delayed  # costs 0.1 s to import
-
-    parallel = Parallel(n_jobs=study.jobs, return_as="generator_unordered", batch_size=1)
-    yield from parallel(delayed(_run_one)(index, study.tasks[index], paths[index]) for index in waiting)
+def _key(task: Task) -> tuple[str, str, int]:
+    return task.problem.title, task.title, task.run
 
 
-def _run_one(index: int, task: Task, path: Path | None) -> tuple[int, RunRecord]:
-    record = run_task(task)
-    if path is not None:
-        record.write(path)
-    return index, record
+def _polished(task: Task) -> tuple[str, str, int]:
+    return task.problem.title, task.polishes, task.run
+
+
+def _begins(task: Task) -> tuple[int, int]:
+    """Long runs first, so that no worker is left alone with one at the end; and runs of all problems in turn."""
+    return int(task.is_search), task.run

@@ -222,5 +222,5 @@ def _search_point(at: Mapping[str, float], task: Task) -> SweepPoint:
         x=record.x,
         violation=verdict.violation,
         evaluations=record.evaluations["f"],
-        time_s=record.time_s["solve"],
+        time_s=record.time_s.solve,
     )

@@ -38,6 +38,10 @@ class OutputError(GaitError):
     """A result cannot be written where it was asked for."""
 
 
+class WorkerError(GaitError):
+    """Worker processes of a study keep dying."""
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
     """Error for an unknown name, with the nearest known ones.
 

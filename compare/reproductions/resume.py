@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from compare.storage import read_json, writable_folder, write_json
@@ -20,11 +22,13 @@ class Steps:
     Args:
         out: folder of the reproduction.
         progress: told the name of each step before it runs, and of each that need not run again.
+        code: modules that compute the results; steps run again when their text has changed.
     """
 
-    def __init__(self, out: Path, progress: Callable[[str], None]) -> None:
+    def __init__(self, out: Path, progress: Callable[[str], None], code: Sequence[ModuleType] = ()) -> None:
         self._folder = writable_folder(out / "steps")
         self._progress = progress
+        self._code = "".join(inspect.getsource(module) for module in code)
 
     def __call__(self, name: str, inputs: Mapping[str, Any], compute: Callable[[], Any]) -> Any:
         """Result of a step, as JSON gives it back: numbers, text, lists and objects only.
@@ -38,12 +42,12 @@ class Steps:
             OutputError: the result cannot be kept.
         """
         path = self._folder / f"{name}.json"
-        digest = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+        digest = hashlib.sha256((json.dumps(inputs, sort_keys=True) + self._code).encode()).hexdigest()
         if (kept := _kept(path, digest)) is not None:
             self._progress(f"{name}: kept from an earlier run")
             return kept["result"]
         self._progress(name)
-        write_json(path, {"inputs": inputs, "inputs_sha256": digest, "result": compute()})
+        write_json(path, {"inputs": inputs, "sha256": digest, "result": compute()})
         return read_json(path)["result"]
 
 
@@ -66,5 +70,5 @@ def _kept(path: Path, digest: str) -> dict[str, Any] | None:
         content = read_json(path)
     except InputError:
         return None  # damaged: made again
-    usable = isinstance(content, dict) and content.get("inputs_sha256") == digest and "result" in content
+    usable = isinstance(content, dict) and content.get("sha256") == digest and "result" in content
     return content if usable else None

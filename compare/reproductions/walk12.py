@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from compare.figures import save
+from compare.reproductions import walk12_errata, walk12_runs
 from compare.reproductions import walk12_figures as figures
 from compare.reproductions.resume import Steps, fingerprint
 from compare.reproductions.tables import write_csv
-from compare.reproductions.walk12_errata import errata
 from compare.reproductions.walk12_paper import F1MAX, TABLE_3, row_of
 from compare.reproductions.walk12_report import write_report
 from compare.reproductions.walk12_runs import (
@@ -48,7 +48,7 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
         OutputError: the folder cannot be written to.
     """
     folder = writable_folder(out)
-    steps = Steps(folder, progress)
+    steps = Steps(folder, progress, code=(walk12_runs, walk12_errata))
     inputs = {**fingerprint(walk()), "starts": STARTS}
     readings = [fingerprint(walk(zmp=reading)) for reading in ("appendix", "appendix-as-printed", "moment-free")]
     own_f1max = float(steps("model-f1max", inputs, lambda: model_f1max(walk())))
@@ -61,7 +61,7 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
         table_4=steps("table4", {**inputs, "horizons": [fingerprint(walk(h)) for h in HORIZONS]}, table_4_runs),
         weighted=steps("weighted-sum", {**inputs, "weights": SWEEP_WEIGHTS}, lambda: weighted_sum(F1MAX)),
         front=steps("front", {**inputs, "lengths_m": FRONT_LENGTHS_M}, front),
-        errata=steps("errata", {**inputs, "readings": readings}, errata),
+        errata=steps("errata", {**inputs, "readings": readings}, walk12_errata.errata),
     )
     progress("figures, tables and report")
     _figures(folder, findings)

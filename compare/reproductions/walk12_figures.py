@@ -59,6 +59,8 @@ def angles_figure(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 1
                     degrees = np.degrees(arrays["q"][:, joint - 1])
                     axes.plot(arrays["t"], degrees, color=_colour(label), label=label, linewidth=1.0)
                     axes.set(ylabel=rf"$\theta_{{{joint}}}$ [deg]")
+                    if not degrees.any():  # else noise would fill the axes
+                        axes.set_ylim(-1.0, 1.0)
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         handles, labels = grid[0, 0].get_legend_handles_labels()
@@ -112,7 +114,7 @@ def tradeoff_figure(front: Sequence[Run], weighted: Sequence[Run]) -> Figure:
         points = [run for run in weighted if run["weight"] > 0.0]  # at zero Q does not count
         s = MILLIMETRES * np.array([run["x"][0] for run in points])
         plane.plot(s, 1e3 * column(points, "Q_m2s"), "o", color=COLOURS["ga"], fillstyle="none", label="weighted sum")
-        for end, offset in ((s.min(), (6, 10)), (s.max(), (-6, -14))):
+        for end, offset in ((s.min(), (12, -4)), (s.max(), (-8, -2))):
             here = [run for run, length in zip(points, s, strict=True) if abs(length - end) < 0.01]
             low, high = here[0]["weight"], here[-1]["weight"]
             text = rf"$\lambda$ = {low:.3g} to {high:.3g}"
@@ -120,7 +122,7 @@ def tradeoff_figure(front: Sequence[Run], weighted: Sequence[Run]) -> Figure:
             at = (end, 1e3 * here[0]["Q_m2s"])
             plane.annotate(text, at, xytext=offset, textcoords="offset points", ha=align, fontsize=8)
         plane.set(xlabel="step length s [mm]", ylabel=r"Q [$10^{-3}$ m$^2$ s]")
-        plane.legend(loc="upper left")
+        plane.legend(loc="center left", bbox_to_anchor=(0.0, 0.7))
         sweep.plot(
             column(weighted, "weight"), MILLIMETRES * np.array([run["x"][0] for run in weighted]), color=COLOURS["ga"]
         )

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-F1MAX = 442.522
+F1MAX = 442.522  # [1/(m^2 s)]
+F2MAX = 0.13  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,7 @@ class PaperRow:
     @property
     def implied_f1(self) -> float:
         """f1 that makes (11) give the printed f."""
-        return (self.f - (1 - self.weight) * self.x[0] / 0.13) / self.weight * self.f1max
+        return (self.f - (1 - self.weight) * self.x[0] / F2MAX) / self.weight * self.f1max
 
 
 TABLE_3 = (

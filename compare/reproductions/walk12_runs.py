@@ -113,7 +113,7 @@ def table_4_runs() -> list[Run]:
             f1max = model_f1max(problem)
             optimum = best_by_ipopt(weighted(row.weight, f1max, problem))
             paper_f1 = judged(problem, row.x)["dense"]["f1_per_m2s"]
-            at = {"step_time_s": row.step_time_s, "horizon": horizon}
+            at = {"step_time_s": row.step_time_s, "horizon": horizon, "implied_f1": row.implied_f1}
             found.append({**at, "paper_f1": paper_f1, "f1max": f1max, "optimum": optimum})
     return found
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import subprocess
 import sys
 import time
@@ -29,7 +27,8 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = {
         "print_header": False,
         "print_iteration": False,
         "print_status": False,
-        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
+        "qpsol": "qrqp",  # the default, qpOASES, prints its licence whatever the options
+        "qpsol_options": {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False},
     },
     "uno": {"uno.logger": "SILENT"},
 }
@@ -107,8 +106,7 @@ def solve_with(name: str, problem: GaitProblem, x0: Array) -> NlpEnd:
     iterations, evaluations, stats = 0, Evaluations(), {}
     started = time.perf_counter()
     for width in widths:
-        with contextlib.redirect_stdout(io.StringIO()):  # qpOASES prints its licence
-            result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+        result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
         primal = np.array(result["x"]).ravel()
         stats = solver.stats()
         iterations += int(stats.get("iter_count") or 0)

@@ -1,4 +1,4 @@
-"""Command line: ``nlp-gait list | evaluate | solve | search | compare | sweep``.
+"""Command line: ``nlp-gait list | evaluate | solve | search | compare | sweep | simulate | export | animate``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import typer
 
+from nlp_gait.cli.animate import animate
 from nlp_gait.cli.compare import compare
 from nlp_gait.cli.evaluate import evaluate
+from nlp_gait.cli.export import export
 from nlp_gait.cli.list import list_problems
 from nlp_gait.cli.search import search
+from nlp_gait.cli.simulate import simulate
 from nlp_gait.cli.solve import solve
 from nlp_gait.cli.sweep import sweep
 
@@ -28,6 +31,9 @@ app.command("solve")(solve)
 app.command("search")(search)
 app.command("compare")(compare)
 app.command("sweep")(sweep)
+app.command("simulate")(simulate)
+app.command("export")(export)
+app.command("animate")(animate)
 
 
 def main() -> None:

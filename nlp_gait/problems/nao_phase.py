@@ -16,7 +16,7 @@ from nlp_gait.problems.gait_problem import Array, Point, Signals
 from nlp_gait.problems.nao import JOINTS, LEAST_DURATION, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.economy import economical
+from nlp_gait.symbolic.economy import economical, tabulated
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -196,7 +196,8 @@ class Phase:
         n = self.steps + 1
         phases = DM(np.linspace(0.0, 1.0, n)).T
         margin = ca.repmat(point["reach_margin"], 1, n)
-        return list(function.map(n)(ca.repmat(point.x, 1, n), margin, phases))
+        function, table = tabulated(function, phases)
+        return list(function.map(n)(ca.repmat(point.x, 1, n), margin, table))
 
     def _differences(self, q: MX, point: Point) -> tuple[MX, MX]:
         """First and second time derivative of sampled angles (m, N + 1): central, one-sided at the ends, twice.

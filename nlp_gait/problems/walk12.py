@@ -63,7 +63,7 @@ PARAMETERS = (
         name="turn_rad",
         unit="rad",
         default=0.0,
-        description="K, yaw of the swing leg: each step turns by it",
+        description="K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging",
         minimum=0.0,
         maximum=LARGEST_TURN,
     ),

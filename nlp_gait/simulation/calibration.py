@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nlp_gait.backends.solve import compile_objective
+from nlp_gait.backends.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.export.result import Result
 from nlp_gait.problems.gait_problem import GaitProblem
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
@@ -21,11 +22,19 @@ DRAWS, BATCH = 50, 2_000  # candidates drawn for one feasible gait: at most DRAW
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """One random gait."""
+    """One random gait.
+
+    Attributes:
+        duration_s: of the phase.
+        result: the gait.
+        measurements: played with the drive's own period between set-points.
+        smooth: played with a set-point at every step of the engine: what remains is not the drive's coarseness.
+    """
 
     duration_s: float
     result: Result
     measurements: Measurements
+    smooth: Measurements
 
 
 def random_gait(problem: GaitProblem, duration: str, duration_s: float, rng: np.random.Generator) -> Result:
@@ -56,4 +65,7 @@ def calibrate(
     for value in np.geomspace(longest, shortest_s, count).tolist():
         result = random_gait(problem, duration, min(value, longest), rng)
         plan = plan_of(result)
-        yield Case(duration_s=value, result=result, measurements=measure(plan, play(plan, drive=drive), drive))
+        coarse, smooth = (
+            measure(plan, play(plan, drive=each), each) for each in (drive, replace(drive, period_s=TIME_STEP))
+        )
+        yield Case(duration_s=value, result=result, measurements=coarse, smooth=smooth)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 from nlp_gait.errors import InputError
 from nlp_gait.robots import Joint
 
 # Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
 # stall or in continuous service, times the gear ratio.
-TorqueLimits = Literal["urdf", "stall", "continuous"]
+TORQUE_LIMITS = ("urdf", "stall", "continuous")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +29,7 @@ class Drive:
     full_error_rad: float = 0.08
     time_constant_s: float = 0.02
     period_s: float = 0.04
-    torque_limits: TorqueLimits = "urdf"
+    torque_limits: str = "urdf"
 
     def __post_init__(self) -> None:
         """Positive numbers, a known limit."""
@@ -38,8 +37,8 @@ class Drive:
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
                 raise InputError(f"{name} of a drive must be > 0, got {value!r}")
-        if self.torque_limits not in get_args(TorqueLimits):
-            raise InputError(f"torque limits must be one of {', '.join(get_args(TorqueLimits))}, got {self.torque_limits!r}")
+        if self.torque_limits not in TORQUE_LIMITS:
+            raise InputError(f"torque limits must be one of {', '.join(TORQUE_LIMITS)}, got {self.torque_limits!r}")
 
     def stiffness(self, joint: Joint) -> float:
         """[Nm/rad]."""

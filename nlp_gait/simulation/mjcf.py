@@ -85,7 +85,9 @@ def _document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
 
 def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
     """Texture of the floor and convex hulls of the soles."""
-    colours = {"rgb1": "0.93 0.94 0.95", "rgb2": "0.84 0.86 0.88"}
+    sky = {"rgb1": "1 1 1", "rgb2": "0.85 0.9 0.95"}
+    Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384", **sky)
+    colours = {"rgb1": "0.95 0.96 0.97", "rgb2": "0.85 0.87 0.9"}
     Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256", **colours)
     Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texrepeat="60 60")
     for link, parts in shapes.items():

@@ -15,7 +15,7 @@ from nlp_gait.export.sampled import sampled
 from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS, JOINTS, nao
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.simulation.shapes import Shape, Sole, link_shapes
+from nlp_gait.simulation.shapes import Shape, link_shapes
 
 SIDES = ("left", "right")
 INTERVALS = 1000  # of the grid that the splines run through: their error is below 1e-9 rad
@@ -65,7 +65,7 @@ class Plan:
         """Planned velocity at time zero."""
         return np.asarray(self._splines[name](0.0, 1))
 
-    def shapes(self, sole: Sole) -> dict[str, list[Shape]]:
+    def shapes(self, sole: str) -> dict[str, list[Shape]]:
         """Shapes of the simulated robot's links."""
         return link_shapes(self.full_robot, sole, welded=HEAD_JOINTS)
 

@@ -15,7 +15,6 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import FLOOR, TIME_STEP, free_model
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.shapes import Sole
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
@@ -61,8 +60,8 @@ def play(
     plan: Plan,
     conditions: Conditions | None = None,
     drive: Drive | None = None,
+    sole: str = "rectangle",
     *,
-    sole: Sole = "rectangle",
     observe: Observer | None = None,
 ) -> Trace:
     """Play a gait from its planned state at time zero until it has settled or the robot has fallen.
@@ -113,7 +112,7 @@ def play(
     )
 
 
-def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: Sole) -> tuple[Any, Any]:
+def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
     """The engine's model and data, the robot in its planned state at time zero."""
     engine = mujoco()
     text = free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, conditions.friction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, get_args
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.robot import Vector
 
-# The rectangle that balance margins are measured to, or the true outline.
-Sole = Literal["rectangle", "polygon"]
+SOLES = ("rectangle", "polygon")  # what balance margins are measured to, or the true outline
 
 SOLE_THICKNESS = 0.015  # [m]; the sole's lower face alone touches the floor
 LIMB_RADIUS = 0.02  # [m]
@@ -51,7 +50,7 @@ class Prism:
 Shape: TypeAlias = Capsule | Prism
 
 
-def link_shapes(robot: Robot, sole: Sole = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
+def link_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
     """Shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
 
     Args:
@@ -62,8 +61,6 @@ def link_shapes(robot: Robot, sole: Sole = "rectangle", welded: Collection[str] 
     Raises:
         InputError: an outline that does not exist.
     """
-    if sole not in get_args(Sole):
-        raise InputError(f"sole must be one of {', '.join(get_args(Sole))}, got {sole!r}")
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
     for joint in robot.joints.values():
         radius = TRUNK_RADIUS if joint.parent == robot.root else LIMB_RADIUS
@@ -82,18 +79,20 @@ def link_shapes(robot: Robot, sole: Sole = "rectangle", welded: Collection[str] 
     return shapes
 
 
-def sole_prism(foot: Foot, sole: Sole) -> Prism:
+def sole_prism(foot: Foot, sole: str) -> Prism:
     """Sole under the ankle, in the foot link's axes."""
     outline = sole_outline(foot, sole)
     return Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS)
 
 
-def sole_outline(foot: Foot, sole: Sole) -> tuple[tuple[float, float], ...]:
+def sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
     """Corners of a sole from the ankle's projection on the ground [m].
 
     Raises:
-        InputError: the robot's data has no polygon.
+        InputError: an outline that does not exist, or one that the robot's data lacks.
     """
+    if sole not in SOLES:
+        raise InputError(f"sole must be one of {', '.join(SOLES)}, got {sole!r}")
     if sole == "rectangle":
         front, back, left, right = foot.front_m, -foot.back_m, foot.left_m, -foot.right_m
         return ((front, left), (back, left), (back, right), (front, right))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import casadi as ca
-from casadi import SX
+from casadi import DM, SX
 
 # Squared length below which a vector has no direction; keeps its cosine and sine finite.
 LEAST_SQUARE = 1e-200
@@ -28,6 +28,25 @@ def economical(outputs: Sequence[SX]) -> list[SX]:
         rewriter.take(node)
     with _unsimplified():
         return list(ca.cse(rewriter.results))
+
+
+def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
+    """A function that is to be mapped over known values of its last input, without what depends on that input alone.
+
+    Args:
+        function: of SX expressions; its last input is a scalar.
+        values: (1, n) values of that input.
+
+    Returns:
+        The function with a vector (k,) in place of its last input, and that vector's values (k, n).
+    """
+    *others, last = function.sx_in()
+    with _unsimplified():
+        outputs = function.call([*others, last])
+        remaining, symbols, extracted = ca.extract_parametric(outputs, last, {"extract_trivial": True})
+    table = ca.Function("table", [last], [ca.vertcat(*extracted)])
+    names = function.name_in(), function.name_out()
+    return ca.Function(function.name(), [*others, ca.vertcat(*symbols)], remaining, *names), table.map(values.shape[1])(values)
 
 
 class _Node(NamedTuple):

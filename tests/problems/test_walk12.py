@@ -18,7 +18,7 @@ from nlp_gait.problems.walk12_locomotion import locomotion
 from nlp_gait.problems.walk12_robot import load_biped
 from tests.problems import walk12_oracle as oracle
 
-TABLE_TOLERANCE = 2e-4  # the design note prints four digits
+TABLE_TOLERANCE = 2e-4  # the reference values have four digits
 MOMENT_TOLERANCE = 1e-6  # [Nm]; the difference stencil alone is good to 1e-8
 ANGLE_TOLERANCE = 1e-7  # [rad]; the arccosine of the printed (2) loses half the digits near its end
 DEFAULT = nlp_gait.load("walk12")

@@ -13,7 +13,7 @@ D1, D2, W, L = 0.19, 0.15, 0.12, 0.02
 GRAVITY = 9.81
 MASSES = np.array([M3, M1, M4, M2, M4, M1, M3])
 
-# lambda, s, n, H, h, f in Table III, f of the model there (design note, 400 intervals), optimum by IPOPT (20 intervals).
+# lambda, s, n, H, h, f in Table III, reference values: f of the model there (400 intervals), optimum (20 intervals).
 TABLE_3 = (
     (0.10, 0.125, 0.128, 0.010, 0.022, 0.944, 0.9459, 0.9806),
     (0.15, 0.130, 0.109, 0.014, 0.020, 0.965, 0.9682, 0.9708),

@@ -1,0 +1,133 @@
+"""``study.json``: what a folder of records was made from, where, by which versions and which command."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from compare.settings import StudySettings, settings_from
+from compare.storage import read_json, write_json
+from nlp_gait.errors import InputError
+
+SCHEMA = 1
+FILE = "study.json"
+PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """One call that ran a part of a study.
+
+    Attributes:
+        command: as it was given.
+        started: date and time, UTC.
+        machine: processor, system, processors that may be used.
+        versions: of Python and of the packages that are there.
+        kernel: how the objective was compiled.
+        jobs: worker processes, or the address of the scheduler.
+    """
+
+    command: str
+    started: str
+    machine: Mapping[str, str]
+    versions: Mapping[str, str]
+    kernel: str
+    jobs: str
+
+    @classmethod
+    def now(cls, command: str, kernel: str, jobs: str) -> Session:
+        """Session that begins now, in this process."""
+        return cls(
+            command=command,
+            started=datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
+            machine={
+                "processor": _processor(),
+                "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+                "processors": str(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()),
+            },
+            versions={"python": sys.version.split()[0], **_versions()},
+            kernel=kernel,
+            jobs=jobs,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest:
+    """Settings of a study, None if a program made it, and the sessions that ran it."""
+
+    settings: StudySettings | None
+    sessions: tuple[Session, ...]
+
+
+def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
+    """Add a session to the folder's manifest.
+
+    Raises:
+        InputError: the folder holds another study.
+    """
+    sessions: Sequence[Session] = ()
+    if (folder / FILE).exists():
+        known = read_manifest(folder)
+        sessions = known.sessions
+        if known.settings is not None and known.settings.to_json() != settings.to_json():
+            raise InputError(
+                f"{str(folder)!r} holds another study; continue that one with --resume alone, choose another folder with "
+                "--out, or delete it"
+            )
+    data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
+    write_json(folder / FILE, data)
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Manifest of a folder; empty if the folder has none.
+
+    Raises:
+        InputError: it is damaged or of another schema.
+    """
+    path = folder / FILE
+    if not path.exists():
+        return Manifest(settings=None, sessions=())
+    raw = read_json(path)
+    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
+        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+        raise InputError(f"{str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}")
+    try:
+        sessions = tuple(_session(item) for item in raw["sessions"])
+        study = raw["study"]
+    except (AttributeError, KeyError, TypeError) as error:
+        raise InputError(f"{str(path)!r} is damaged ({error!r}); delete it, the records are still good") from error
+    return Manifest(settings=settings_from(study, f"{str(path)!r}"), sessions=sessions)
+
+
+def _session(raw: Mapping[str, Any]) -> Session:
+    values: dict[str, Any] = {field.name: str(raw[field.name]) for field in fields(Session)}
+    for name in ("machine", "versions"):
+        values[name] = {str(key): str(value) for key, value in raw[name].items()}
+    return Session(**values)
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"

@@ -1,0 +1,111 @@
+"""``nlp-gait simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nlp_gait.cli.common import AsJson, command, fail, output_file, print_json, print_table, stdout
+from nlp_gait.simulation.mjcf import FRICTION
+
+if TYPE_CHECKING:
+    from nlp_gait.simulation.measurements import Measurements
+    from nlp_gait.simulation.robustness import Robustness
+
+FRAMES_PER_S = 25.0
+
+ResultFile = Annotated[
+    Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
+]
+
+
+@command
+def simulate(
+    result: ResultFile,
+    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
+    video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
+    torque_limits: Annotated[str, typer.Option(help="urdf, stall or continuous: published limits differ.")] = "urdf",
+    sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
+    friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    robustness: Annotated[
+        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (a minute or more).")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Play a NAO gait in MuJoCo, open loop with a set-point every 40 ms, and compare it with the model's predictions.
+
+    Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
+    """
+    from compare.playback_figure import plot_playback
+    from compare.storage import writable_folder, write_json
+    from nlp_gait.export.files import write_text
+    from nlp_gait.export.result import load_result
+    from nlp_gait.export.video import check_video_path, write_video
+    from nlp_gait.simulation.camera import filmed, shown
+    from nlp_gait.simulation.conditions import Conditions
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.engine import mujoco
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.mjcf import free_model
+    from nlp_gait.simulation.plan import plan_of
+    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.robustness import robustness as sweep
+
+    mujoco()
+    if viewer and video is not None:
+        fail("--viewer and --video exclude each other; film it in a second run")
+    target = None if video is None else output_file(check_video_path(video))
+    folder = None if out is None else writable_folder(out)
+    plan = plan_of(load_result(result))
+    drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
+    if target is not None:
+        trace, frames = filmed(plan, conditions, drive, sole, FRAMES_PER_S)
+        write_video(target, frames, FRAMES_PER_S)
+    else:
+        trace = (shown if viewer else play)(plan, conditions, drive, sole)
+    report = measure(plan, trace, drive)
+    survival = sweep(plan, drive) if robustness else None
+    data = {**report.to_json(), **({} if survival is None else {"robustness": survival.to_json()})}
+    if folder is not None:
+        write_json(folder / "report.json", data)
+        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        plot_playback(plan, trace, drive, folder / "playback")
+    if as_json:
+        print_json(data)
+    else:
+        _print(report, survival)
+
+
+def _print(report: Measurements, survival: Robustness | None) -> None:
+    fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
+    stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
+    rows = [
+        (label, f"{p.mechanical_W:.3f}", f"{p.heat_W:.3f}", f"{p.total_W:.3f}")
+        for label, p in (("model", report.predicted), ("engine", report.measured))
+    ]
+    print_table("Mean power [W]", ("", "mechanical", "heat", "total"), rows)
+    lengths = {
+        "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
+        "- largest": report.pressure_max_m,
+        "- RMS in the middle 60 % of the phase": report.pressure_middle_rms_m,
+        "- RMS without averaging over 40 ms": report.pressure_raw_rms_m,
+        "slip of a supporting foot": report.slip_m,
+        **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
+    }
+    rows_mm = [(name, "-" if value is None else f"{1000 * value:.1f} mm") for name, value in lengths.items()]
+    tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
+    print_table("Against the plan", ("", "measured"), [*rows_mm, ("tracking error of the joints", tracking)])
+    for joint, share in report.saturated.items():
+        stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
+    for joint in report.joint_limits:
+        stdout.print(f"{joint} goes beyond its mechanical range")
+    if survival is not None:
+        for title, unit, found in (("push", "N s", survival.push_Ns), ("slope", "degrees", survival.slope_deg)):
+            listed = ", ".join(f"{direction} {value:g}" for direction, value in found.items())
+            stdout.print(f"Largest {title} survived [{unit}]: {listed}", markup=False)
+        for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
+            listed = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
+            stdout.print(f"{title}: {listed}")

@@ -1,0 +1,78 @@
+"""Pictures in a row as GIF or MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from nlp_gait.errors import InputError, MissingExtraError, OutputError
+
+SUFFIXES = (".gif", ".mp4")
+COLOURS = 64  # of a GIF; drawings need few
+
+Frame = np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]
+
+
+def check_video_path(path: Path) -> Path:
+    """The path, if its ending names a format that can be written here.
+
+    Raises:
+        InputError: another ending.
+        MissingExtraError: MP4 without its encoder.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"a video ends in {' or '.join(SUFFIXES)}, got {path.name!r}")
+    if path.suffix.lower() == ".mp4":
+        try:
+            import imageio_ffmpeg  # noqa: F401
+        except ImportError as error:
+            raise MissingExtraError(
+                f"MP4 needs imageio-ffmpeg ({error}); install it with pip install 'nlp-gait[video]', or write a .gif"
+            ) from error
+    return path
+
+
+def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
+    """Write frames (height, width, 3) of equal size.
+
+    Raises:
+        InputError: an ending that is no video.
+        MissingExtraError: MP4 without its encoder.
+        OutputError: the file cannot be written.
+    """
+    check_video_path(path)
+    temporary = path.with_name(f".{path.stem}.tmp{path.suffix.lower()}")
+    try:
+        (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frames, frames_per_s)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
+    from PIL import Image
+
+    images = [Image.fromarray(frame).quantize(COLOURS) for frame in frames]
+    duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
+    images[0].save(path, save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True)
+
+
+def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
+    import imageio_ffmpeg
+
+    writer = None
+    try:
+        for frame in frames:
+            even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])  # for the codec
+            if writer is None:
+                size = (even.shape[1], even.shape[0])
+                writer = imageio_ffmpeg.write_frames(str(path), size, fps=frames_per_s, macro_block_size=2)
+                writer.send(None)
+            writer.send(even)
+    finally:
+        if writer is not None:
+            writer.close()

@@ -1,0 +1,303 @@
+"""Planning one step on stairs: the governing parameters that cost least energy or joint jerk."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX
+
+from nlp_gait.errors import InputError
+from nlp_gait.problems.gait_problem import (
+    Array,
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+)
+from nlp_gait.problems.stairs import ANGLE_LIMITS, KNEE_LIMITS, KNEES, STAIR_PARAMETERS, knee_angles
+from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES
+from nlp_gait.problems.stairs_layout import labels
+from nlp_gait.problems.stairs_plan_samples import PlannedStep, Samples
+from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.stair_gait import PHASES
+from nlp_gait.symbolic.stair_loads import JOINT_RATES, MOVING
+
+Minimise = Literal["energy", "jerk"]
+OBJECTIVES = {
+    "energy": Objective(name="energy", unit="J"),
+    "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3"),
+}
+
+# Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
+# square of the intervals in a phase is kept in reserve [m]; half a millimetre on the usual grid.
+SAMPLING_RESERVE = 0.05
+
+VARIABLES = (
+    *GOVERNING_VARIABLES,
+    Variable(
+        name="rear_share",
+        unit="1",
+        lower=0.0,
+        upper=0.95,
+        description="share of the ground force below the rear toe at the start",
+    ),
+)
+PARAMETERS = (
+    *STAIR_PARAMETERS,
+    *GIVEN_PARAMETERS,
+    Parameter(
+        name="reach_margin",
+        unit="1",
+        default=0.005,
+        description="knees keep 1 - cos(knee) above this: 0.1 rad",
+        minimum=1e-6,
+        maximum=0.5,
+    ),
+    Parameter(
+        name="zmp_margin_m",
+        unit="m",
+        default=0.01,
+        description="least distance of the stance foot's ZMP from its ends",
+        minimum=0.0,
+        maximum=0.08,
+    ),
+    Parameter(
+        name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
+    ),
+    Parameter(name="friction", unit="1", default=0.6, description="mu below both feet", minimum=0.0),
+    Parameter(
+        name="clearance_m", unit="m", default=0.002, description="least height of the swing foot above the stair"
+    ),
+    Parameter(
+        name="acceleration_limit_rad_s2",
+        unit="rad/s^2",
+        default=80.0,
+        description="largest acceleration of a link",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="least_phase_s", unit="s", default=0.1, description="least duration of each phase", minimum=0.0
+    ),
+    Parameter(
+        name="quantum_s",
+        unit="s",
+        default=0.01,
+        description="time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
+        minimum=1e-4,
+    ),
+)
+
+
+def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitProblem:
+    """Planner of one step.
+
+    Args:
+        minimise: energy, the integral of sum |torque x rate| over all joints, or the peak of the joints' jerk (the paper's
+            knot shifting).
+        intervals: of the step, a quarter in each phase.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Bhardwaj et al., section V and Table III.
+    """
+    if minimise not in get_args(Minimise):
+        raise InputError(f"minimise must be one of {', '.join(get_args(Minimise))}, got {minimise!r}")
+    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 4 or intervals % len(PHASES):
+        raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
+    step = PlannedStep(per_phase=intervals // len(PHASES))
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        return _assemble(point, step, minimise, ops)
+
+    def signals(x: Array, p: Array) -> Signals:
+        point = problem.symbols()
+        names = Samples._fields
+        found = ca.Function("samples", [point.x, point.p], list(step.samples(point, Exact())), ["x", "p"], list(names))
+        arrays = {name: np.array(value).T for name, value in zip(names, found(x, p), strict=True)}
+        renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
+        return Signals(joints=MOVING, arrays={**renamed, **arrays})
+
+    problem = GaitProblem(
+        name="stairs-plan",
+        title="Stairs, planned step: least energy or jerk",
+        options={"minimise": minimise, "intervals": intervals},
+        variables=VARIABLES,
+        own_parameters=PARAMETERS,
+        objective=OBJECTIVES[minimise],
+        assemble=assemble,
+        hessian="limited-memory",
+        refine=lambda factor: stairs_plan(minimise=minimise, intervals=intervals * factor),
+        signals=signals,
+    )
+    return problem
+
+
+def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:
+    samples = step.samples(point, ops)
+    jerk = _jerk(samples, step.per_phase, point["quantum_s"])
+    exact = Exact()
+    pressure = samples.stance_pressure.T
+    return Assembly(
+        objective=_energy(samples, step.per_phase, ops) if minimise == "energy" else ops.largest(jerk),
+        constraints=(
+            *_posture_rows(point, samples),
+            *_ground_rows(point, samples),
+            _clearance_rows(point, step, ops),
+            _phase_rows(point),
+        ),
+        indexes={
+            "energy_J": _energy(samples, step.per_phase, exact),
+            "peak_jerk_rad_s3": exact.largest(jerk),
+            "peak_acceleration_rad_s2": exact.largest(ca.vec(_joints(samples.qdd))),
+            "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
+            "zmp_margin_min_m": ca.mmin(exact.min(pressure, load_biped().foot_m - pressure)),
+        },
+    )
+
+
+def _joints(links: MX) -> MX:
+    """Derivatives of joint angles from those of link angles."""
+    return DM(JOINT_RATES) @ links
+
+
+def _energy(samples: Samples, per_phase: int, ops: Nonsmooth) -> MX:
+    """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
+    power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
+    total = MX(0)
+    for first in _phase_starts(per_phase):
+        durations = samples.time[first + per_phase] - samples.time[first]
+        ends = power[:, first] + power[:, first + per_phase]
+        inner = power[:, first : first + per_phase + 1]
+        total += durations / per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
+    return total
+
+
+def _jerk(samples: Samples, per_phase: int, quantum: MX) -> MX:
+    """Joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum of time."""
+    change = _joints(samples.qdd[:, 1:] - samples.qdd[:, :-1])
+    starts = _phase_starts(per_phase)
+    columns = []
+    for k in range(change.shape[1]):
+        jump = k + 1 in starts
+        duration = quantum if jump else samples.time[k + 1] - samples.time[k]
+        columns.append(change[:, k] / duration)
+    return ca.vertcat(*columns)
+
+
+def _phase_starts(per_phase: int) -> tuple[int, ...]:
+    """Number of the first sample of each phase."""
+    return tuple(i * (per_phase + 1) for i in range(len(PHASES)))
+
+
+def _posture_rows(point: Point, samples: Samples) -> tuple[Constraint, ...]:
+    """Reach, link angles, knees and accelerations at every sample."""
+    instants = range(samples.q.shape[1])
+    m = samples.q.shape[1]
+    lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
+    return (
+        Constraint(
+            name="reach",
+            labels=labels(("swing", "stance"), instants),
+            unit="1",
+            scale=0.1,
+            value=ca.vec(samples.reach),
+            upper=1 - point["reach_margin"],
+        ),
+        Constraint(
+            name="link_angle",
+            labels=labels(MOVING, instants),
+            unit="rad",
+            scale=0.1,
+            value=ca.vec(samples.q),
+            lower=lower,
+            upper=upper,
+        ),
+        Constraint(
+            name="knee_angle",
+            labels=labels(tuple(KNEES), instants),
+            unit="rad",
+            scale=0.1,
+            value=ca.vec(knee_angles(samples.q)),
+            lower=MX(KNEE_LIMITS[0]),
+            upper=MX(KNEE_LIMITS[1]),
+        ),
+        Constraint(
+            name="link_acceleration",
+            labels=labels(MOVING, instants),
+            unit="rad/s^2",
+            scale=10.0,
+            value=ca.vec(samples.qdd),
+            lower=-point["acceleration_limit_rad_s2"],
+            upper=point["acceleration_limit_rad_s2"],
+        ),
+    )
+
+
+def _ground_rows(point: Point, samples: Samples) -> tuple[Constraint, ...]:
+    """Load, friction and centre of pressure of the stance foot; the rear toe's force has the same direction."""
+    instants = range(samples.q.shape[1])
+    force, margin = samples.stance_force, point["zmp_margin_m"]
+    grip = point["friction"] * force[1, :]
+    return (
+        Constraint(
+            name="stance_load",
+            labels=labels(("z",), instants),
+            unit="N",
+            scale=100.0,
+            value=force[1, :].T,
+            lower=point["least_stance_force_N"],
+        ),
+        Constraint(
+            name="friction",
+            labels=labels(("forward", "backward"), instants),
+            unit="N",
+            scale=100.0,
+            value=ca.vec(ca.vertcat(grip - force[0, :], grip + force[0, :])),
+            lower=MX(0),
+        ),
+        Constraint(
+            name="stance_zmp",
+            labels=labels(("x",), instants),
+            unit="m",
+            scale=0.01,
+            value=samples.stance_pressure.T,
+            lower=margin,
+            upper=load_biped().foot_m - margin,
+        ),
+    )
+
+
+def _clearance_rows(point: Point, step: PlannedStep, ops: Nonsmooth) -> Constraint:
+    """Toe, sole and ankle of the swing foot above the stair while it is in the air."""
+    heights = step.clearances(point, ops)
+    reserve = SAMPLING_RESERVE / step.per_phase**2
+    return Constraint(
+        name="clearance",
+        labels=labels(("toe", "sole", "ankle"), range(heights.shape[1])),
+        unit="m",
+        scale=0.01,
+        value=ca.vec(heights),
+        lower=point["clearance_m"] + reserve,
+    )
+
+
+def _phase_rows(point: Point) -> Constraint:
+    """Every phase takes time."""
+    ends = ca.vertcat(0, *(point[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s")))
+    return Constraint(
+        name="phase_duration",
+        labels=PHASES,
+        unit="s",
+        scale=0.1,
+        value=ends[1:] - ends[:-1],
+        lower=point["least_phase_s"],
+    )
