@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,7 +58,7 @@ def _results(out: Path, jobs: Sequence[Job]) -> Iterator[Any]:
 
 
 def _run(out: Path, job: Job) -> Any:
-    steps = Steps(out, lambda note: None)
+    steps = Steps(out, lambda note: None, code=(sys.modules[job.compute.__module__],))
     if job.beside is not None and not job.beside.exists():
-        steps.forget(job.name)
+        (out / "steps" / f"{job.name}.json").unlink(missing_ok=True)
     return steps(job.name, job.inputs, lambda: job.compute(**job.arguments))
