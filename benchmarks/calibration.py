@@ -15,7 +15,9 @@ def main() -> None:
     """One Markdown table a phase."""
     for name, shortest in SHORTEST_S.items():
         print(f"\n### {name}\n")
-        print("| time s | model W | engine W | error | CoP RMS mm | engine W, smooth set-points | error | CoP RMS mm | |")
+        print(
+            "| time s | model W | engine W | error | CoP RMS mm | engine W, smooth set-points | error | CoP RMS mm | |"
+        )
         print("|---|---|---|---|---|---|---|---|---|")
         for case in calibrate(nlp_gait.load(name), shortest):
             cells = [f"{case.duration_s:.2f}", f"{case.measurements.predicted.total_W:.3f}"]

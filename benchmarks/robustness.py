@@ -7,8 +7,8 @@ Several minutes; needs the extra ``sim``. The paper's gaits: Gupta, Pratihar, De
 
 import nlp_gait
 from nlp_gait.export.result import Result
-from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
 from nlp_gait.simulation.robustness import DIRECTIONS, robustness
@@ -44,7 +44,9 @@ def gaits() -> dict[str, Result]:
 def main() -> None:
     """Two Markdown tables: undisturbed, and what is survived."""
     plans = {label: plan_of(result) for label, result in gaits().items()}
-    print("| gait | model W (mechanical) | engine W (mechanical) | tilt deg | slip mm | landing mm | pressure RMS, middle, raw mm |")
+    print(
+        "| gait | model W (mechanical) | engine W (mechanical) | tilt deg | slip mm | landing mm | pressure RMS, middle, raw mm |"
+    )
     print("|---|---|---|---|---|---|---|")
     for label, plan in plans.items():
         m = measure(plan, play(plan), Drive())

@@ -23,6 +23,8 @@ MARGIN = 0.04  # [m] around everything that moves
 FRAME_DPI, SHEET_DPI = 80, 150
 # Views by name: the coordinates across and up.
 VIEWS = {"side": (0, 2), "front": (1, 2), "above": (0, 1)}
+# Of the views in a frame: left, bottom, width, height.
+PLACES = {"side": (0.53, 0.48, 0.19, 0.45), "front": (0.79, 0.48, 0.2, 0.45), "above": (0.55, 0.09, 0.42, 0.3)}
 AXIS_NAMES = ("x [m]", "y [m]", "z [m]")
 
 
@@ -32,8 +34,9 @@ def frames(skeleton: Skeleton) -> Iterator[Frame]:
 
     with style():
         figure = new_figure(*((6.0, 5.0) if skeleton.planar else (8.0, 5.0)))
+        figure.set_layout_engine("none")  # fixed places: solving for them costs more than drawing
         figure.set_dpi(FRAME_DPI)
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         for k in range(len(skeleton.t)):
             figure.clear()
             _draw_frame(figure, skeleton, k)
@@ -52,12 +55,15 @@ def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
     low, high = skeleton.box()
     heights = [float((high - low)[VIEWS[view][1]] + 2 * MARGIN) for view in views]
     with style():
-        figure = new_figure(1.6 * poses, 0.7 + sum(1.45 * height / max(_width(skeleton, views), 1e-9) for height in heights))
+        figure = new_figure(
+            1.6 * poses, 0.7 + sum(0.35 + 1.45 * height / _width(skeleton, views) for height in heights)
+        )
         axes = figure.subplots(len(views), poses, squeeze=False, sharey="row", height_ratios=heights)
         for row, view in zip(axes, views, strict=True):
             for axis, k in zip(row, chosen, strict=True):
                 _draw_view(axis, skeleton, int(k), view)
-                axis.label_outer()
+                if axis is not row[0]:
+                    axis.set_ylabel("")
         for axis, k in zip(axes[0], chosen, strict=True):
             axis.set_title(f"{skeleton.t[k]:.2f} s")
         figure.suptitle(f"{skeleton.title}: {_legend(skeleton)}", fontsize=9)
@@ -75,12 +81,11 @@ def _width(skeleton: Skeleton, views: list[str]) -> float:
 def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
     figure.suptitle(f"{skeleton.title}, {skeleton.t[k]:.2f} s: {_legend(skeleton)}", fontsize=8)
     if skeleton.planar:
-        _draw_view(figure.subplots(), skeleton, k, "side")
+        _draw_view(figure.add_axes((0.1, 0.1, 0.85, 0.8)), skeleton, k, "side")
         return
-    grid = figure.add_gridspec(2, 3, width_ratios=(1.5, 1.0, 1.0), height_ratios=(1.6, 1.0))
-    _draw_3d(figure.add_subplot(grid[:, 0], projection="3d"), skeleton, k)
-    for view, cell in (("side", grid[0, 1]), ("front", grid[0, 2]), ("above", grid[1, 1:])):
-        _draw_view(figure.add_subplot(cell), skeleton, k, view)
+    _draw_3d(figure.add_axes((-0.02, 0.02, 0.5, 0.9), projection="3d"), skeleton, k)
+    for view, place in PLACES.items():
+        _draw_view(figure.add_axes(place), skeleton, k, view)
 
 
 def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
@@ -133,9 +138,9 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     low = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN
     high = high + MARGIN
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axis.set_box_aspect(high - low)
+    axis.set_box_aspect(high - low, zoom=1.1)
     axis.view_init(elev=15, azim=-55)
-    axis.tick_params(labelsize=5, pad=-3)
+    axis.set(xticklabels=[], yticklabels=[], zticklabels=[])
 
 
 def _legend(skeleton: Skeleton) -> str:

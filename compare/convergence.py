@@ -1,16 +1,14 @@
-"""Convergence of search algorithms against IPOPT's optimum."""
+"""Convergence: gap to the best known, against evaluations and against seconds."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.figures import COLOURS, new_figure, style
-from compare.record import RunRecord
-from compare.runner import IPOPT
-from nlp_gait.problems.gait_problem import Objective
+from compare.comparison import Comparison, SolverRuns
+from compare.figures import Look, looks, new_figure, style
+from compare.statistics.distribution import band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,72 +16,59 @@ if TYPE_CHECKING:
 
 # Relative gaps below this are drawn at this value: both solvers' tolerances end near it.
 SMALLEST_GAP = 1e-8
+GRID_POINTS = 300
+AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
 
 
-def convergence_figure(records: Sequence[RunRecord], objective: Objective) -> Figure:
-    """Best so far against evaluations for all runs of one problem: value on the left, gap to the best known on the right.
+def convergence_figure(comparison: Comparison) -> Figure:
+    """Bands from the least to the greatest gap of all runs, with the median; against evaluations and seconds.
 
-    Each band goes from the best to the worst run, its line is the median; a line starts where half of the runs are
-    feasible, a band where all are. IPOPT is a level line: the best of its starts.
+    A line begins where half of the runs are feasible, a band where all are. A gradient method is known at its ends only:
+    its runs are points, at what all their calls cost.
     """
-    best = best_known(records, objective)
     with style():
-        figure = new_figure(6.6, 3.0)
-        left, right = figure.subplots(1, 2)
-        for name in dict.fromkeys(record.algorithm for record in records):
-            runs = [record for record in records if record.algorithm == name]
-            if name == IPOPT:
-                _draw_ipopt(left, runs, objective)
-            else:
-                _draw_search(left, right, name, runs, best, objective)
-        left.set_xlabel("evaluations")
-        left.set_ylabel(f"best {objective.name} so far [{objective.unit}]")
-        right.set_xlabel("evaluations")
-        right.set_ylabel("gap to the best known [%]")
-        right.set_yscale("log")
-        for axes in (left, right):
+        figure = new_figure(7.4, 3.1)
+        for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
+            for solver, look in zip(comparison.solvers, looks([s.name for s in comparison.solvers]), strict=True):
+                if all(len(c.gap) <= 1 for c in solver.curves):
+                    _draw_ends(axes, solver, look, axis)
+                else:
+                    _draw_band(axes, solver, look, axis)
+            axes.set_xlabel(AXES[axis])
             axes.set_xscale("log")
-        left.legend()
+            axes.set_yscale("log")
+        figure.axes[0].set_ylabel("gap to the best known [%]")
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        if handles:
+            figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5))
     return figure
 
 
-def best_known(records: Sequence[RunRecord], objective: Objective) -> float:
-    """Best objective that the judge finds feasible; NaN if none is."""
-    costs = [objective.sign * r.verdict.objective for r in records if r.verdict.feasible]
-    return objective.sign * min(costs) if costs else float("nan")
+def _draw_ends(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
+    ends = [(c.total(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
+    label = f"{solver.name}, {len(ends)} of {len(solver.curves)} runs"
+    cost, gap = np.array(ends).T if ends else (np.empty(0), np.empty(0))
+    axes.plot(cost, _shown(gap), look.marker, color=look.colour, label=label, markerfacecolor="none", clip_on=False)
 
 
-def _draw_ipopt(axes: Axes, runs: Sequence[RunRecord], objective: Objective) -> None:
-    value = best_known(runs, objective)
-    solved = sum(run.verdict.feasible for run in runs)
-    axes.axhline(
-        value, color=COLOURS[IPOPT], linestyle="--", label=f"ipopt, best of {len(runs)} starts ({solved} feasible)"
+def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
+    costs = [getattr(c, axis) for c in solver.curves]
+    used = np.concatenate(costs)
+    used = used[used > 0.0]
+    label = f"{solver.name}, {len(costs)} runs"
+    if not used.size:
+        axes.plot([], [], color=look.colour, linestyle=look.line, label=label)
+        return
+    grid = np.geomspace(used.min(), used.max(), GRID_POINTS)
+    best_so_far = [np.minimum.accumulate(c.gap) for c in solver.curves]
+    low, middle, high = band(costs, best_so_far, grid)
+    known, whole = np.isfinite(middle), np.isfinite(high)
+    axes.plot(grid[known], _shown(middle[known]), color=look.colour, linestyle=look.line, label=label)
+    axes.fill_between(
+        grid[whole], _shown(low[whole]), _shown(high[whole]), color=look.colour, alpha=0.15, linewidth=0
     )
 
 
-def _draw_search(
-    left: Axes, right: Axes, name: str, runs: Sequence[RunRecord], best: float, objective: Objective
-) -> None:
-    evaluations, costs = _costs(runs, objective)
-    low, middle, high = np.min(costs, axis=0), np.median(costs, axis=0), np.max(costs, axis=0)
-    colour = COLOURS.get(name, "#666666")
-    label = f"{name}, {len(runs)} runs"
-    for axes, show in (
-        (left, lambda cost: objective.sign * cost),
-        (right, lambda cost: 100 * np.maximum((cost - objective.sign * best) / abs(best), SMALLEST_GAP)),
-    ):
-        known = np.isfinite(middle)
-        axes.plot(evaluations[known], show(middle[known]), color=colour, label=label)
-        whole = np.isfinite(high)
-        axes.fill_between(evaluations[whole], show(low[whole]), show(high[whole]), color=colour, alpha=0.2, linewidth=0)
-
-
-def _costs(runs: Sequence[RunRecord], objective: Objective) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluations (G,) common to all runs and best cost so far (runs, G), infinite while nothing was feasible."""
-    evaluations = np.unique(np.concatenate([run.history.evaluations for run in runs]))
-    rows = []
-    for run in runs:
-        cost = [np.inf if value is None else objective.sign * value for value in run.history.objective]
-        position = np.searchsorted(run.history.evaluations, evaluations, side="right") - 1
-        rows.append(np.where(position >= 0, np.array([*cost, np.inf])[position], np.inf))
-    return evaluations, np.array(rows)
+def _shown(gap: np.ndarray) -> np.ndarray:
+    """Gap in percent, drawn no lower than the smallest one."""
+    return 100.0 * np.maximum(gap, SMALLEST_GAP)

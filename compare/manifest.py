@@ -14,7 +14,9 @@ from typing import Any
 
 from compare.settings import StudySettings, settings_from
 from compare.storage import read_json, write_json
-from nlp_gait.errors import InputError
+from nlp_gait.backends.compiler import find_compiler, lane_flags, native_lanes
+from nlp_gait.backends.native_kernel import BASE_FLAGS
+from nlp_gait.errors import CompilerError, InputError
 
 SCHEMA = 1
 FILE = "study.json"
@@ -30,7 +32,7 @@ class Session:
         started: date and time, UTC.
         machine: processor, system, processors that may be used.
         versions: of Python and of the packages that are there.
-        kernel: how the objective was compiled.
+        kernel: compiler and flags of the objective, or why it is interpreted.
         jobs: worker processes, or the address of the scheduler.
     """
 
@@ -42,7 +44,7 @@ class Session:
     jobs: str
 
     @classmethod
-    def now(cls, command: str, kernel: str, jobs: str) -> Session:
+    def now(cls, command: str, jobs: str) -> Session:
         """Session that begins now, in this process."""
         return cls(
             command=command,
@@ -53,7 +55,7 @@ class Session:
                 "processors": str(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()),
             },
             versions={"python": sys.version.split()[0], **_versions()},
-            kernel=kernel,
+            kernel=_kernel(),
             jobs=jobs,
         )
 
@@ -121,6 +123,14 @@ def _versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def _kernel() -> str:
+    lanes = native_lanes()
+    try:
+        return " ".join([find_compiler().summary, *BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"])
+    except CompilerError as error:
+        return f"interpreted: {error}"
 
 
 def _processor() -> str:

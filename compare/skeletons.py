@@ -123,7 +123,7 @@ def _knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) 
 def _stairs(result: Result, signals: Signals) -> Skeleton:
     """Planar rods from the flat stance foot; its ankle is the origin."""
     q = SX.sym("q", len(MOVING))
-    found = planar_points(load_stair_climber().rods(), link_angles(q), SX(2, 1))
+    found = planar_points(load_stair_climber().rods, link_angles(q), SX(2, 1))
     function = ca.Function("points", [q], list(found.values()))
     samples = len(signals.arrays["t"])
     values = dict(zip(found, function.map(samples)(signals.arrays["q"].T), strict=True))
@@ -131,7 +131,14 @@ def _stairs(result: Result, signals: Signals) -> Skeleton:
     lines = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
     tread = result.problem.value("stair_length_m") / 2
     rise = tread * result.problem.value("rise_run_ratio")
-    edges = [(-1.6 * tread, -1), (-SETBACK, -1), (-SETBACK, 0), (tread - SETBACK, 0), (tread - SETBACK, 1), (1.8 * tread, 1)]
+    edges = [
+        (-1.6 * tread, -1),
+        (-SETBACK, -1),
+        (-SETBACK, 0),
+        (tread - SETBACK, 0),
+        (tread - SETBACK, 1),
+        (1.8 * tread, 1),
+    ]
     zmp = signals.arrays.get("zmp")
     return Skeleton(
         title=result.problem.title,

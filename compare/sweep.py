@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.figures import COLOURS, new_figure, style
-from compare.runner import IPOPT, ProblemSpec, Task, run_task
-from compare.storage import write_text
-from nlp_gait.backends.continuation import Continuation
+from compare.runner import run_task
+from compare.task import IPOPT, ProblemSpec, Stop, Task, check_task
+from nlp_gait.backends.continuation import solve_both_ways
+from nlp_gait.backends.solution import Solution
 from nlp_gait.errors import InputError
-from nlp_gait.problems.gait_problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,96 +77,47 @@ def sweep(
     starts: int = 5,
     evaluations: int = 10_000,
     seed: int = 0,
-    progress: Callable[[SweepPoint], None] | None = None,
+    progress: Callable[[], None] | None = None,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
 
-    IPOPT walks the grid so that each point is a neighbour of the last and starts from it; a search algorithm starts anew
-    at each. Infeasible points are kept, with the rows that stand in the way.
+    IPOPT walks the grid there and back so that each point is a neighbour of the last and starts from it; a search algorithm
+    starts anew at each. Infeasible points are kept, with the rows that stand in the way.
 
     Args:
         spec: problem with its other values.
         axes: at least one.
         algorithm: ``"ipopt"`` or a search algorithm.
-        starts: random starts of IPOPT where no neighbour helps.
+        starts: random starts of IPOPT at both ends of its walk, and where no neighbour helps.
         evaluations: budget of a search run.
         seed: of starts and searches.
-        progress: called after each point.
+        progress: called ``count_solves`` times.
 
     Raises:
-        UnknownNameError: an axis is neither a variable nor a parameter.
-        InputError: a value outside what is allowed.
+        UnknownNameError: an axis is neither a variable nor a parameter; no such algorithm.
+        InputError: a value outside what is allowed, or an axis twice.
     """
-    grid = [_with(spec, axes, at) for at in _snake(axes)]  # all checked before the work
-    path = Continuation(starts=starts, seed=seed)
-    found: dict[tuple[float, ...], SweepPoint] = {}
-    for at, point_spec in zip(_snake(axes), grid, strict=True):
-        task = Task(problem=point_spec, algorithm=algorithm, evaluations=evaluations, seed=seed)
-        named = dict(zip((axis.name for axis in axes), at, strict=True))
-        point = _ipopt_point(named, path, point_spec.load()) if algorithm == IPOPT else _search_point(named, task)
-        found[at] = point
-        if progress is not None:
-            progress(point)
+    names = [axis.name for axis in axes]
+    if len(set(names)) < len(names):
+        raise InputError(f"each axis must be named once, got {', '.join(names)}")
+    walk = _snake(axes)
+    specs = [_with(spec, axes, at) for at in walk]  # all checked before the work
+    named = [dict(zip(names, at, strict=True)) for at in walk]
+    if algorithm == IPOPT:
+        solutions = solve_both_ways([s.load() for s in specs], starts=starts, seed=seed, progress=progress)
+        points = [_ipopt_point(at, solution) for at, solution in zip(named, solutions, strict=True)]
+    else:
+        stop = Stop(evaluations=evaluations)
+        tasks = [Task(problem=s, algorithm=algorithm, stop=stop, seed=seed) for s in specs]
+        check_task(tasks[0])
+        points = [_search_point(at, task, progress) for at, task in zip(named, tasks, strict=True)]
+    found = dict(zip(walk, points, strict=True))
     return [found[at] for at in itertools.product(*(axis.values for axis in axes))]
 
 
-def sweep_csv(points: Sequence[SweepPoint], problem: GaitProblem) -> str:
-    """Table of all points, one row each, units in the header."""
-    axes, names = list(points[0].at), list(problem.names)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    unit = problem.objective.unit
-    objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
-    # A variable may be an axis too; its column then says what the axis asked for, exactly.
-    columns = [name for name in names if name not in axes]
-    writer.writerow([*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"])
-    for point in points:
-        at = [repr(value) for value in point.at.values()]
-        x = [repr(point.x[name]) for name in columns]
-        numbers = [repr(point.objective), str(point.feasible).lower(), repr(point.violation)]
-        writer.writerow([*at, *numbers, *x, point.evaluations, f"{point.time_s:.4f}", point.status])
-    return text.getvalue()
-
-
-def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Figure:
-    """Objective over the first axis, one line for each combination of the others; infeasible points as crosses."""
-    first, *others = points[0].at
-    objective = problem.objective
-    with style():
-        figure = new_figure(4.2, 3.0)
-        axes = figure.subplots()
-        groups = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
-        for number, group in enumerate(groups):
-            line = [p for p in points if tuple(p.at[name] for name in others) == group]
-            good = [p for p in line if p.feasible]
-            bad = [p.at[first] for p in line if not p.feasible]
-            label = ", ".join(f"{name} = {value:g}" for name, value in zip(others, group, strict=True)) or algorithm
-            colour = COLOURS.get(algorithm) if not others else f"C{number % 7}"
-            axes.plot([p.at[first] for p in good], [p.objective for p in good], "o-", color=colour, label=label)
-            lowest = min((p.objective for p in points if p.feasible), default=0.0)
-            if bad:
-                axes.plot(bad, [lowest] * len(bad), "x", color=colour, label="infeasible")
-        axes.set_xlabel(_with_unit(problem, first))
-        axes.set_ylabel(f"optimal {objective.name}" + (f" [{objective.unit}]" if objective.unit != "1" else ""))
-        axes.legend()
-    return figure
-
-
-def write_sweep(folder: Path, points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> list[Path]:
-    """Write the table and the picture of a sweep; returns their paths."""
-    from compare.figures import save
-
-    stem = folder / f"{problem.name}-sweep-{'-'.join(points[0].at)}-{algorithm}"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, sweep_csv(points, problem))
-    return [table, *save(sweep_figure(points, problem, algorithm), stem)]
-
-
-def _with_unit(problem: GaitProblem, name: str) -> str:
-    units = {v.name: v.unit for v in problem.variables} | {q.name: q.unit for q in problem.parameters}
-    unit = units[name]
-    stem = name.removesuffix("_" + unit.replace("/", "_").replace("^", ""))
-    return f"{stem.replace('_', ' ')} [{unit}]" if unit != "1" else stem
+def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
+    """How often a sweep solves a problem: IPOPT twice at each point of the grid."""
+    return math.prod(len(axis.values) for axis in axes) * (2 if algorithm == IPOPT else 1)
 
 
 def _with(spec: ProblemSpec, axes: Sequence[Axis], at: Sequence[float]) -> ProblemSpec:
@@ -197,8 +141,7 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
     return points
 
 
-def _ipopt_point(at: Mapping[str, float], path: Continuation, problem: GaitProblem) -> SweepPoint:
-    solution = path.solve(problem)
+def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
     return SweepPoint(
         at=at,
         objective=solution.objective,
@@ -211,8 +154,10 @@ def _ipopt_point(at: Mapping[str, float], path: Continuation, problem: GaitProbl
     )
 
 
-def _search_point(at: Mapping[str, float], task: Task) -> SweepPoint:
+def _search_point(at: Mapping[str, float], task: Task, progress: Callable[[], None] | None) -> SweepPoint:
     record = run_task(task)
+    if progress is not None:
+        progress()
     verdict = record.verdict
     return SweepPoint(
         at=at,

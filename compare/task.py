@@ -130,6 +130,7 @@ class Task:
         named = isinstance(self.algorithm, str)
         parts: dict[str, Any] = {
             "problem": {"name": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)},
+            "objective": asdict(problem.objective),
             "algorithm": self.algorithm if named else plain_settings(self.algorithm),
             "settings": dict(self.settings),
             "seed": self.run_seed,

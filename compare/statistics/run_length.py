@@ -70,7 +70,7 @@ class Curve:
         return float(getattr(self, axis)[hit[0]]) if hit.size else math.inf
 
     def total(self, axis: str = "evaluations") -> float:
-        """Cost of the whole run."""
+        """Cost of the whole run; 0 if it failed before it began."""
         costs = getattr(self, axis)
         return float(costs[-1]) if len(costs) else 0.0
 
@@ -88,8 +88,8 @@ def curve(record: RunRecord, objective: Objective, reference: float, weighting: 
     if evaluations.size:  # derivatives, where there are any, are spent by the end
         evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))
     values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
-    if record.verdict.violation > 0 and not record.verdict.feasible:
-        values[:] = math.nan  # what the judge refuses reached nothing
+    if not record.verdict.feasible:
+        values[:] = math.nan  # what the judge refuses has reached nothing
     gaps = np.array([relative_gap(value, reference, objective) for value in values])
     return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
 

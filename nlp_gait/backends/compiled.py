@@ -50,7 +50,7 @@ class CompiledObjective:
         )
         self.description = evaluator.description
         self._evaluator = evaluator
-        self._row_bounds = tuple(np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+        self._lower, self._upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
         self._p = np.array(problem.p)
         self._threads = threads
         self._time_per_row_s = 0.0
@@ -102,7 +102,7 @@ class CompiledObjective:
             self._time_per_row_s = (time.perf_counter() - started) * max(parts, 1) / rows
 
     def _part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
-        self._evaluator(X, self._p, *self._row_bounds, f, violation, g)
+        self._evaluator(X, self._p, self._lower, self._upper, f, violation, g)
 
     @cached_property
     def _pool(self) -> ThreadPoolExecutor:

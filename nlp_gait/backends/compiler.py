@@ -7,6 +7,7 @@ import os
 import platform
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -42,14 +43,14 @@ class Compiler:
         """Program and first line of the version."""
         return f"{' '.join(self.command)} ({self.version.splitlines()[0] if self.version else 'version unknown'})"
 
-    def build(self, source: Path, library: Path, flags: Sequence[str], time_limit_s: float = TIME_LIMIT_S) -> None:
+    def build(self, source: Path, library: Path, flags: Sequence[str]) -> None:
         """Compile one C++ file into a shared library.
 
         Raises:
             CompilerError: the compiler fails or does not end in time.
         """
         command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
-        _run(command, time_limit_s)
+        _run(command, TIME_LIMIT_S)
 
 
 def find_compiler() -> Compiler:
@@ -77,27 +78,40 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
 
 def _candidates(cxx: str, cc: str) -> list[tuple[str, ...]]:
     named = [tuple(shlex.split(variable)) for variable in (cxx, cc) if variable.strip()]
-    found = [(name,) for name in COMMON_NAMES]
+    found: list[tuple[str, ...]] = [(name,) for name in COMMON_NAMES]
     if find_spec("ziglang") is not None:
-        found.append((sys.executable, "-m", "ziglang", "c++"))
+        found.append((sys.executable, "-m", "ziglang", "cc"))
     return named + found
 
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:
+    """Standard output of a program that ends with status 0 in time."""
     program = Path(command[0]).name
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=time_limit_s, stdin=subprocess.DEVNULL
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,  # so that what the compiler has started can be ended with it
         )
-    except subprocess.TimeoutExpired as error:
-        raise CompilerError(f"{program} did not end within {time_limit_s:g} s") from error
     except OSError as error:
         raise CompilerError(f"{program} cannot be run: {error}") from error
-    if done.returncode != 0:
-        lines = [line for line in done.stderr.splitlines() if line.strip()]
+    try:
+        output, messages = process.communicate(timeout=time_limit_s)
+    except subprocess.TimeoutExpired as error:
+        raise CompilerError(f"{program} did not end within {time_limit_s:g} s") from error
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    if process.returncode != 0:
+        lines = [line.strip() for line in messages.splitlines() if line.strip()]
         reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
-        raise CompilerError(f"{program} failed with exit status {done.returncode}: {reason.strip()}")
-    return done.stdout
+        raise CompilerError(f"{program} failed with exit status {process.returncode}: {reason}")
+    return output
 
 
 @functools.cache

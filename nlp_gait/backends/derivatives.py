@@ -10,7 +10,7 @@ import casadi as ca
 from nlp_gait.backends.compiler import find_compiler
 from nlp_gait.backends.library_cache import load_library
 
-FLAGS = ("-O1", "-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-w")
+FLAGS = ("-O1", "-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-ffp-contract=off", "-w")
 
 
 def compiled_functions(functions: Sequence[ca.Function]) -> list[ca.Function]:

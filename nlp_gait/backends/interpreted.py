@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel_source import Kernel
 from nlp_gait.problems.gait_problem import Array
 
+# Candidates that one call of the virtual machine takes; more would only take more memory.
+BLOCK = 64
+
 
 class InterpretedKernel:
-    """Evaluates a kernel candidate by candidate.
+    """Evaluates a kernel candidate by candidate, without the global interpreter lock of Python in between.
 
     Attributes:
         description: for people.
@@ -17,19 +21,28 @@ class InterpretedKernel:
 
     def __init__(self, kernel: Kernel) -> None:
         """Take the kernel as it is."""
-        self._function = kernel.function
+        n, k, m = kernel.function.size1_in(0), kernel.function.size1_in(1), kernel.function.size1_out(1)
+        x, p = ca.MX.sym("x", n, BLOCK), ca.MX.sym("p", k)
+        cost, g = kernel.function.map(BLOCK)(x, ca.repmat(p, 1, BLOCK))
+        self._function = ca.Function("block", [x, p], [cost, g])
         self._weights = kernel.weights
+        self._shape = n, m
         self.description = "interpreted by CasADi's virtual machine"
 
-    def __call__(self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None) -> None:
+    def __call__(
+        self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
+    ) -> None:
         """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n)."""
-        for i, x in enumerate(X):
-            cost, rows = self._function(x, p)
-            values = np.array(rows).ravel()
+        block = np.zeros((self._shape[0], BLOCK))
+        for first in range(0, len(X), BLOCK):
+            rows = slice(first, min(first + BLOCK, len(X)))
+            count = rows.stop - rows.start
+            block[:, :count] = X[rows].T
+            cost, values = (np.array(output)[:, :count].T for output in self._function(block, p))
             # Plain maximum, not fmax: a NaN must not pass for feasible.
             excess = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-            finite = np.isfinite(x).all()
-            f[i] = float(cost) if finite else np.inf
-            violation[i] = excess @ self._weights if finite else np.inf
+            finite = np.isfinite(X[rows]).all(axis=1)
+            f[rows] = np.where(finite, cost[:, 0], np.inf)
+            violation[rows] = np.where(finite, excess @ self._weights, np.inf)
             if g is not None:
-                g[i] = values
+                g[rows] = values

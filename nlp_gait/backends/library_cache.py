@@ -1,16 +1,18 @@
 """Shared libraries built from generated source, kept in the user's cache folder.
 
-A library is stored under a hash of everything that it depends on, written to a temporary name and renamed, so that two
-processes at once end with one good file. Beside it stands its checksum: what does not match it is built again.
+A library's name is a hash of everything that it depends on and the checksum of the file. It is written under another name
+and renamed, so that two processes at once end with a good file each can use; what does not match its checksum is built again.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
 import logging
 import os
 import platform
+import shutil
 import stat
 import sys
 import tempfile
@@ -26,7 +28,9 @@ FOLDER_VARIABLE = "NLP_GAIT_CACHE"
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
-def load_library(source: str, compiler: Compiler, flags: Sequence[str], symbols: Sequence[str]) -> tuple[ctypes.CDLL, Path]:
+def load_library(
+    source: str, compiler: Compiler, flags: Sequence[str], symbols: Sequence[str]
+) -> tuple[ctypes.CDLL, Path]:
     """Library of a C++ source, from the cache if a good one is there, else built now.
 
     Args:
@@ -42,27 +46,49 @@ def load_library(source: str, compiler: Compiler, flags: Sequence[str], symbols:
         CompilerError: the compiler fails, or what it built cannot be loaded.
     """
     key = _key(source, compiler, flags)
-    for folder in (cache_folder(), _private_folder()):
-        library = folder / f"{key}{SUFFIX}"
+    folders = (cache_folder(), _private_folder())
+    for library in [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]:
         loaded = _load(library, symbols)
         if loaded is not None:
             return loaded, library
+    with tempfile.TemporaryDirectory(prefix="nlp-gait-build-") as workshop:
+        written, built = Path(workshop) / "source.cpp", Path(workshop) / f"library{SUFFIX}"
         try:
-            _build(source, compiler, flags, library)
+            written.write_text(source, encoding="utf-8")
         except OSError as error:
-            LOG.warning("cannot write to the cache folder %s (%s); using a temporary folder for this process", folder, error)
-            continue
-        loaded = _load(library, symbols)
-        if loaded is None:
-            raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
-        return loaded, library
-    raise CompilerError("neither the cache folder nor a temporary folder can be written; free some disk space")
+            raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
+        compiler.build(written, built, flags)
+        library = _stored(built, key, folders)
+    loaded = _load(library, symbols)
+    if loaded is None:
+        raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
+    return loaded, library
+
+
+def _stored(built: Path, key: str, folders: Sequence[Path]) -> Path:
+    """Where a new library was put: the first folder that takes it, under its final name at once."""
+    name = f"{key}-{_digest(built)}{SUFFIX}"
+    for folder in folders:
+        try:
+            with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
+                copy = Path(landing) / name
+                shutil.copyfile(built, copy)
+                os.replace(copy, folder / name)  # never written in place: another library of that name may be in use
+            return folder / name
+        except OSError as error:
+            _warn_once(
+                f"cannot write to the cache folder {folder} ({error}); compiled code is kept for this process only"
+            )
+    raise CompilerError(
+        "compiled code can be written neither to the cache folder nor to a temporary one; free some space"
+    )
 
 
 def cache_folder() -> Path:
-    """Folder of the user's cached libraries, made if it can be: ``$NLP_GAIT_CACHE``, else below ``$XDG_CACHE_HOME`` or ~/.cache.
+    """Folder of the user's cached libraries: ``$NLP_GAIT_CACHE``, else nlp-gait in ``$XDG_CACHE_HOME`` or ~/.cache.
 
-    Where that is a link, belongs to somebody else, or cannot be made, a temporary folder of this process takes its place.
+    It is made if it can be. Where it is a link, belongs to somebody else, or cannot be made, a temporary folder of this
+    process takes its place.
     """
     named = os.environ.get(FOLDER_VARIABLE)
     base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "nlp-gait"
@@ -109,39 +135,25 @@ def _private_folder() -> Path:
 
 
 def _key(source: str, compiler: Compiler, flags: Sequence[str]) -> str:
-    parts = (source, *compiler.command, compiler.version, *flags, platform.system(), platform.machine(), *platform.libc_ver())
+    machine = (platform.system(), platform.machine(), *platform.libc_ver())
+    parts = (source, *compiler.command, compiler.version, *flags, *machine)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def _build(source: str, compiler: Compiler, flags: Sequence[str], library: Path) -> None:
-    """Build beside the target, then move into place: first the checksum, then the library."""
-    with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as folder:
-        written = Path(folder) / "kernel.cpp"
-        built = Path(folder) / library.name
-        written.write_text(source, encoding="utf-8")
-        compiler.build(written, built, flags)
-        checksum = Path(folder) / "checksum"
-        checksum.write_text(_digest(built), encoding="ascii")
-        os.replace(checksum, _checksum_file(library))
-        os.replace(built, library)
-
-
 def _load(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
-    """The library if it is there, whole, and has the functions; else None."""
+    """The library if it is whole and has the functions; else None, and the file is removed if it can be."""
     try:
-        if library.is_symlink() or _checksum_file(library).read_text(encoding="ascii") != _digest(library):
-            return None
-        loaded = ctypes.CDLL(str(library))
-        for symbol in symbols:
-            getattr(loaded, symbol)
-    except (OSError, AttributeError, UnicodeDecodeError):
-        return None
-    return loaded
-
-
-def _checksum_file(library: Path) -> Path:
-    return library.with_suffix(".sha256")
+        if not library.is_symlink() and library.stem.endswith(_digest(library)):
+            loaded = ctypes.CDLL(str(library))
+            for symbol in symbols:
+                getattr(loaded, symbol)
+            return loaded
+    except (OSError, AttributeError):
+        pass
+    with contextlib.suppress(OSError):
+        library.unlink()
+    return None
 
 
 def _digest(library: Path) -> str:
-    return hashlib.sha256(library.read_bytes()).hexdigest()
+    return hashlib.sha256(library.read_bytes()).hexdigest()[:32]

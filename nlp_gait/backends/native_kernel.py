@@ -12,8 +12,10 @@ from nlp_gait.backends.kernel_source import SYMBOLS, Kernel, kernel_source
 from nlp_gait.backends.library_cache import load_library
 from nlp_gait.problems.gait_problem import Array
 
-# No -ffast-math: NaN and infinity keep their meaning. Hidden symbols let the compiler inline CasADi's helpers.
-BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=fast", "-fno-math-errno", "-w")
+# No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing here: so
+# results are the virtual machine's bit for bit, but for what vector functions of libm round differently. Hidden symbols let
+# the compiler inline CasADi's helpers.
+BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 
 
@@ -44,7 +46,9 @@ class NativeKernel:
         self.lanes = lanes
         self.description = f"compiled by {compiler.summary}, {lanes} candidates at a time"
 
-    def __call__(self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None) -> None:
+    def __call__(
+        self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
+    ) -> None:
         """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n); all arrays contiguous, aligned doubles."""
         memory = self._memory()
         failed = self._evaluate(

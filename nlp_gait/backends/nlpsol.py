@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -27,8 +30,7 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = {
         "print_header": False,
         "print_iteration": False,
         "print_status": False,
-        "qpsol": "qrqp",  # the default, qpOASES, prints its licence whatever the options
-        "qpsol_options": {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False},
+        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
     },
     "uno": {"uno.logger": "SILENT"},
 }
@@ -106,7 +108,8 @@ def solve_with(name: str, problem: GaitProblem, x0: Array) -> NlpEnd:
     iterations, evaluations, stats = 0, Evaluations(), {}
     started = time.perf_counter()
     for width in widths:
-        result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+        with _silent():
+            result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
         primal = np.array(result["x"]).ravel()
         stats = solver.stats()
         iterations += int(stats.get("iter_count") or 0)
@@ -134,7 +137,8 @@ def _make(name: str, model: NlpModel) -> ca.Function:
     reason = probe(name)
     if reason is not None:
         raise InputError(f"NLP solver {name!r} does not run in this installation: {reason}")
-    return ca.nlpsol(name, name, model.nlp, {"print_time": False, "error_on_fail": False, **OPTIONS[name]})
+    with _silent():
+        return ca.nlpsol(name, name, model.nlp, {"print_time": False, "error_on_fail": False, **OPTIONS[name]})
 
 
 def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:
@@ -146,6 +150,22 @@ def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:
         "lbg": np.concatenate([lower, ties]),
         "ubg": np.concatenate([upper, ties + np.inf]),
     }
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Nothing written to stdout inside, not by C code either: qpOASES prints its licence whatever the options."""
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        if os.name == "posix":
+            ctypes.CDLL(None).fflush(None)  # else what C has buffered appears later
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _counts(stats: Mapping[str, Any]) -> Evaluations:

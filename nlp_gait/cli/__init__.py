@@ -1,4 +1,4 @@
-"""Command line: ``nlp-gait list | evaluate | solve | search | compare | sweep | simulate | export | animate``.
+"""Command line: ``nlp-gait list | evaluate | solve | search | compare | report | sweep | reproduce | simulate | export | animate``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -13,6 +13,8 @@ from nlp_gait.cli.compare import compare
 from nlp_gait.cli.evaluate import evaluate
 from nlp_gait.cli.export import export
 from nlp_gait.cli.list import list_problems
+from nlp_gait.cli.report import report
+from nlp_gait.cli.reproduce import reproduce
 from nlp_gait.cli.search import search
 from nlp_gait.cli.simulate import simulate
 from nlp_gait.cli.solve import solve
@@ -30,7 +32,9 @@ app.command("evaluate")(evaluate)
 app.command("solve")(solve)
 app.command("search")(search)
 app.command("compare")(compare)
+app.command("report")(report)
 app.command("sweep")(sweep)
+app.command("reproduce")(reproduce)
 app.command("simulate")(simulate)
 app.command("export")(export)
 app.command("animate")(animate)

@@ -113,6 +113,11 @@ def parse_numbers(text: str) -> list[float]:
     return [_number("x", part, "--x") for part in text.split(",")]
 
 
+def quantity(value: float, unit: str, digits: str = ".6f") -> str:
+    """Number with its unit; a pure number has none."""
+    return f"{value:{digits}}" + ("" if unit == "1" else f" {unit}")
+
+
 def print_json(data: Any) -> None:
     """One JSON object on stdout; what is not finite is null, for not every reader takes NaN."""
     sys.stdout.write(json.dumps(_finite(data), indent=1, allow_nan=False) + "\n")

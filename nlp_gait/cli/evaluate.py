@@ -23,6 +23,7 @@ from nlp_gait.cli.common import (
     print_json,
     print_table,
     problem_spec,
+    quantity,
     stdout,
 )
 
@@ -65,7 +66,7 @@ def evaluate(
 
 def _print(evaluation: Evaluation) -> None:
     objective = evaluation.objective
-    stdout.print(f"{evaluation.problem}: {objective['name']} {objective['value']:.6f} {objective['unit']}")
+    stdout.print(f"{evaluation.problem}: {objective['name']} {quantity(objective['value'], objective['unit'])}")
     dense = evaluation.dense or {}
     rows = [
         (name, f"{v:.6f}", f"{dense[name]:.6f}" if name in dense else "-") for name, v in evaluation.indexes.items()
@@ -77,7 +78,7 @@ def _print(evaluation: Evaluation) -> None:
             stdout.print(f"feasible on the {title}" if title == "own samples" or evaluation.dense else "")
             continue
         table = [
-            (v.name, f"{v.value:.6g}", _bound(v.lower), _bound(v.upper), f"{v.violation:.3g} {v.unit}")
+            (v.name, f"{v.value:.6g}", _bound(v.lower), _bound(v.upper), quantity(v.violation, v.unit, ".3g"))
             for v in violated[:SHOWN_VIOLATIONS]
         ]
         title = f"Infeasible on the {title}: {len(violated)} rows, worst first"

@@ -18,7 +18,9 @@ def export(
         Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
     ],
     format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
-    out: Annotated[Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
+    ] = None,
     period_ms: Annotated[int, typer.Option(min=1, help="Time between rows.")] = PERIOD_MS,
 ) -> None:
     """Write a gait in a format that other tools read.

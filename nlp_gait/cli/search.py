@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,21 +19,41 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    fail,
     print_json,
     print_table,
     problem_spec,
     progress_bar,
+    quantity,
     stdout,
 )
+from nlp_gait.cli.study_options import (
+    Handle,
+    PenaltyWeight,
+    Stagnation,
+    Target,
+    TimeLimit,
+    handling_of,
+    stop_of,
+)
+
+if TYPE_CHECKING:
+    from compare.record import RunRecord
 
 
 @command
 def search(
     problem: ProblemName,
-    algorithm: Annotated[str, typer.Option(help="pso, ga, aco, aco-grid.")] = "pso",
+    algorithm: Annotated[str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...")] = "pso",
     runs: Annotated[int, typer.Option(min=1, help="Independent runs.")] = 11,
     seed: Seed = 0,
     evaluations: Annotated[int, typer.Option(min=1, help="Budget of one run.")] = 10_000,
+    handling: Handle = "deb",
+    penalty_weight: PenaltyWeight = None,
+    target: Target = None,
+    stagnation: Stagnation = None,
+    time_limit: TimeLimit = None,
+    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each run's result.")] = False,
     robot: Robot = None,
     intervals: Intervals = None,
     derivatives: Derivatives = None,
@@ -48,45 +68,66 @@ def search(
 ) -> None:
     """Search a problem with a metaheuristic on the compiled exact functions.
 
-    Example: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`
+    Runs whose objective fails altogether are listed with the reason; exit status 1 if all of them do.
+
+    Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
+    `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
     """
-    from compare.runner import Task
+    from compare.comparison import compare_problems
+    from compare.settings import SolverSpec, StudySettings
     from compare.study import Study, default_jobs, run_study
     from compare.table import HEADER, cells, summarise
 
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
-    tasks = tuple(
-        Task(problem=spec, algorithm=algorithm, evaluations=evaluations, seed=seed, run=run) for run in range(runs)
+    settings = StudySettings(
+        problems=(spec,),
+        solvers=(SolverSpec(algorithm=algorithm, runs=runs, polish=polish),),
+        handling=handling_of(handling, penalty_weight),
+        stop=stop_of(evaluations, target, stagnation, time_limit),
+        seed=seed,
     )
-    with progress_bar(f"{algorithm} runs", runs) as advance:
+    tasks = settings.tasks()
+    with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
         records = run_study(
             Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
             progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
         )
+    loaded = spec.load()
     if as_json:
-        plain = [record.to_json() for record in records]
-        listed = [
+        print_json(
             {
-                "run": r["run"],
-                "seed": r["seed"],
-                "objective": r["objective"],
-                "violation": r["violation"],
-                "evaluations": r["evaluations"]["f"],
-                "failed_evaluations": r["failed_evaluations"],
-                "time_s": r["time_s"]["solve"],
-                "status": r["status"],
-                "x": r["x"],
-                "verdict": r["verdict"],
+                "problem": problem,
+                "algorithm": algorithm,
+                "options": dict(loaded.options),
+                "runs": [_run(r) for r in records if not _is_polish(r)],
+                **({"polished": [_run(r) for r in records if _is_polish(r)]} if polish else {}),
             }
-            for r in plain
+        )
+    else:
+        unit = loaded.objective.unit
+        rows = [
+            (r.algorithm, str(r.run), str(r.seed), quantity(r.verdict.objective, unit), f"{r.verdict.violation:.3g}", r.status)
+            for r in records
         ]
-        print_json({"problem": problem, "algorithm": algorithm, "options": plain[0]["options"], "runs": listed})
-        return
-    objective = spec.load().objective
-    rows = [
-        (str(r.run), str(r.seed), f"{r.verdict.objective:.6f} {objective.unit}", f"{r.verdict.violation:.3g}", r.status)
-        for r in records
-    ]
-    print_table(f"{problem}, {algorithm}", ("run", "seed", objective.name, "violation", "why it ended"), rows)
-    print_table("All runs", HEADER, [cells(summary, objective) for summary in summarise(records, objective)])
-    stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
+        header = ("solver", "run", "seed", loaded.objective.name, "violation", "why it ended")
+        print_table(f"{problem}, {algorithm}", header, rows)
+        for comparison in compare_problems(records):
+            print_table("All runs", HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
+        stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
+    if not any(record.x for record in records):
+        fail(f"no run has a result; the first {records[0].status}")
+
+
+def _is_polish(record: RunRecord) -> bool:
+    return "polishes" in record.definition
+
+
+def _run(record: RunRecord) -> dict[str, Any]:
+    """What scripts rely on."""
+    plain = record.to_json()
+    same = ("run", "seed", "objective", "violation", "failed_evaluations", "status", "x", "verdict")
+    return {
+        **{key: plain[key] for key in same},
+        "evaluations": plain["evaluations"]["f"],
+        "time_s": plain["time_s"]["solve"],
+    }

@@ -26,6 +26,7 @@ from nlp_gait.cli.common import (
     print_table,
     problem_spec,
     progress_bar,
+    quantity,
     stdout,
 )
 
@@ -60,7 +61,7 @@ def solve(
             starts=starts,
             seed=seed,
             x0=first,
-            progress=lambda outcome: advance(f"{outcome.objective:.6g} {loaded.objective.unit}, {outcome.status}"),
+            progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
         )
     if target is not None:
         from compare.storage import write_json
@@ -75,13 +76,13 @@ def solve(
 
 
 def _print(solution: Solution) -> None:
-    unit = solution.objective_unit
+    value = quantity(solution.objective, solution.objective_unit)
     converged = sum(start.success for start in solution.starts)
-    stdout.print(f"{solution.problem}: {solution.objective_name} {solution.objective:.6f} {unit} ({solution.status})")
+    stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
     print_table("Optimum", ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
         rows = [
-            (a.name, a.side, f"{a.bound:g} {a.unit}", f"{a.price:.4g} {a.price_unit}")
+            (a.name, a.side, quantity(a.bound, a.unit, "g"), f"{a.price:.4g} {a.price_unit}")
             for a in solution.active_constraints
         ]
         print_table("What holds it back", ("bound", "side", "at", "price of raising it"), rows)

@@ -48,16 +48,15 @@ def sweep(
 
     Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
     """
-    import math
-
     from compare.storage import writable_folder
-    from compare.sweep import parse_axis, write_sweep
+    from compare.sweep import count_solves, parse_axis
     from compare.sweep import sweep as run_sweep
+    from compare.sweep_report import write_sweep
 
     folder = writable_folder(out)
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
     axes = [parse_axis(text) for text in over]
-    with progress_bar("points", math.prod(len(axis.values) for axis in axes)) as advance:
+    with progress_bar("solves", count_solves(axes, algorithm)) as advance:
         points = run_sweep(
             spec,
             axes,
@@ -65,7 +64,7 @@ def sweep(
             starts=starts,
             evaluations=evaluations,
             seed=seed,
-            progress=lambda point: advance(f"{point.objective:.6g}"),
+            progress=lambda: advance(""),
         )
     loaded = spec.load()
     written = write_sweep(folder, points, loaded, algorithm)
@@ -74,7 +73,11 @@ def sweep(
         return
     header = (*points[0].at, loaded.objective.name, "status")
     rows = [
-        (*(f"{v:g}" for v in p.at.values()), f"{p.objective:.6f} {loaded.objective.unit}" if p.feasible else "-", p.status)
+        (
+            *(f"{v:g}" for v in p.at.values()),
+            f"{p.objective:.6f} {loaded.objective.unit}" if p.feasible else "-",
+            p.status,
+        )
         for p in points
     ]
     print_table(f"{problem} by {algorithm}", header, rows)

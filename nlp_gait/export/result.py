@@ -28,7 +28,7 @@ class Result:
 
 
 def load_result(path: Path) -> Result:
-    """Result from a JSON object with ``problem``, ``x`` by variable name and, where not the defaults, ``options`` and ``parameters``.
+    """Result from a JSON object with ``problem``, ``x`` by variable name and, if not the defaults, ``options``, ``parameters``.
 
     Raises:
         InputError: the file cannot be read, is damaged, or holds values that the problem does not allow.
@@ -47,7 +47,9 @@ def load_result(path: Path) -> Result:
 
 def _result(raw: Any) -> Result:
     if not isinstance(raw, dict):
-        raise InputError(f"must be a JSON object, got {type(raw).__name__}; write one with `nlp-gait solve ... --out FILE`")
+        raise InputError(
+            f"must be a JSON object, got {type(raw).__name__}; write one with `nlp-gait solve ... --out FILE`"
+        )
     name = raw.get("problem")
     if not isinstance(name, str):
         raise InputError(f"'problem' must be the name of a problem, got {name!r}; see `nlp-gait list`")

@@ -18,7 +18,7 @@ def write_npz(path: Path, signals: Signals) -> None:
     """
     temporary = path.with_name(f".{path.name}.tmp.npz")
     try:
-        np.savez(temporary, joints=np.array(signals.joints), **signals.arrays)
+        np.savez(temporary, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)
         temporary.replace(path)
     except OSError as error:
         temporary.unlink(missing_ok=True)

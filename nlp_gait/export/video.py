@@ -10,7 +10,7 @@ import numpy as np
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
 
 SUFFIXES = (".gif", ".mp4")
-COLOURS = 64  # of a GIF; drawings need few
+COLOURS = 128  # of a GIF; fewer lose small marks
 
 Frame = np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]
 
@@ -56,7 +56,10 @@ def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> Non
 def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
     from PIL import Image
 
-    images = [Image.fromarray(frame).quantize(COLOURS) for frame in frames]
+    images = [
+        Image.fromarray(frame).quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        for frame in frames
+    ]
     duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
     images[0].save(path, save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True)
 

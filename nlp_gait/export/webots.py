@@ -1,8 +1,8 @@
 """Webots `.motion` files, written and strictly read back.
 
 Grammar, after Webots' own parser (`src/controller/c/motion.c`) and stricter where that guesses: a header
-``#WEBOTS_MOTION,V1.0,<motor>,...``; then rows ``[[MM:]SS:]mmm,<pose name>,<radians or *>,...`` with strictly increasing times and one
-value a motor; lines shorter than 4,096 characters; an empty line ends the file. Webots interpolates linearly between rows.
+``#WEBOTS_MOTION,V1.0,<motor>,...``; then rows ``[[MM:]SS:]mmm,<pose name>,<radians or *>,...`` with strictly increasing times and
+one value a motor; lines shorter than 4,096 characters; an empty line ends the file. Webots interpolates linearly between rows.
 """
 
 from __future__ import annotations

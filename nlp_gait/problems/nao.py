@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from casadi import DM, SX, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problems.gait_problem import Variable
+from nlp_gait.problems.nao_legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
@@ -17,7 +17,6 @@ from nlp_gait.symbolic.trajectories import Motion, constant, cubic, stack
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
 
-LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
 # Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
 JOINTS = tuple(
@@ -33,31 +32,25 @@ HELD_ARM_ANGLES = {  # section 3.1 [rad]
     "LWristYaw": 0.0,
     "RWristYaw": 0.0,
 }
-# Hip height and velocities at both ends of a phase: the first variables of every phase (section 4).
-HIP_VARIABLES = (
-    Variable(name="hip_height_m", unit="m", lower=0.25, upper=0.31, description="x1, torso origin at both ends"),
-    Variable(name="hip_vz_start_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x2, vertical velocity"),
-    Variable(name="hip_vz_end_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x3"),
-    Variable(name="hip_vx_start_m_s", unit="m/s", lower=0.001, upper=0.2, description="x4, sagittal velocity"),
-    Variable(name="hip_vx_end_m_s", unit="m/s", lower=0.001, upper=0.2, description="x5"),
-    Variable(name="hip_vy_start_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x6, lateral velocity"),
-    Variable(name="hip_vy_end_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x7"),
-)
 
 
 def nao(robot: str, rotational_inertia: bool) -> Robot:
-    """Robot of a NAO problem: head and neck one with the torso, links as point masses if asked for.
+    """Robot of a NAO problem: joints that no gait moves are locked at zero, links are point masses if asked for.
+
+    Of NAO these are the head and the neck, which become one with the torso; another robot may have fingers, or no neck.
 
     Raises:
-        InputError: the robot has not the joints that the gait moves.
+        InputError: the robot has not the joints that the gait moves, or its legs are of another kind.
     """
     loaded = load_robot(robot)
     try:
-        for joint in (*JOINTS, *HEAD_JOINTS):
+        for joint in JOINTS:
             loaded.joint(joint)
     except UnknownNameError as error:
         raise InputError(f"robot {loaded.name!r} does not suit the NAO problems: {error}") from error
-    welded = weld(loaded, HEAD_JOINTS)
+    welded = weld(loaded, [joint for joint in loaded.joints if joint not in JOINTS])
+    for side in "LR":
+        leg_geometry(welded, side)
     return welded if rotational_inertia else point_masses(welded)
 
 
@@ -71,7 +64,7 @@ def hip_motion(x: SX, along: tuple[float, float], across: tuple[float, float], d
     """Motion of the torso's origin as cubics in x, y and z (3,) [m].
 
     Args:
-        x: values of HIP_VARIABLES.
+        x: values of the variables that ``nao_legs.hip_variables`` makes.
         along: x at both ends [m].
         across: y at both ends [m].
         duration: of the phase [s].
@@ -92,13 +85,13 @@ def leg_joints(
     robot: Robot, side: str, hip: Motion, ankle: Motion, margin: SX, ops: Nonsmooth
 ) -> tuple[dict[str, Motion], SX]:
     """Joint motions of one leg under an upright torso, and the cosine of its knee."""
-    hip_joint = DM(robot.joint(f"{side}HipYawPitch").origin_m)
-    thigh = -robot.joint(f"{side}KneePitch").origin_m[2]
-    tibia = -robot.joint(f"{side}AnklePitch").origin_m[2]
+    geometry = leg_geometry(robot, side)
     hip_to_ankle = Motion(
-        ankle.position - hip.position - hip_joint, ankle.velocity - hip.velocity, ankle.acceleration - hip.acceleration
+        ankle.position - hip.position - DM(geometry.hip_m),
+        ankle.velocity - hip.velocity,
+        ankle.acceleration - hip.acceleration,
     )
-    leg = leg_angles(hip_to_ankle, thigh, tibia, margin, ops)
+    leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
     rows = [Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS))]
     joints = {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
     return {f"{side}HipYawPitch": constant(0.0), **joints}, leg.reach

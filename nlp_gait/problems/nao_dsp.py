@@ -7,7 +7,7 @@ torso, which depends on where the hip is between the feet.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 from casadi import DM, MX, SX, fmax, vertcat
 
@@ -15,7 +15,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import GaitProblem, Variable
 from nlp_gait.problems.nao import (
     GRAVITY,
-    HIP_VARIABLES,
     JOINTS,
     LEAST_DURATION,
     arm_joints,
@@ -24,6 +23,7 @@ from nlp_gait.problems.nao import (
     nao,
     upright_links,
 )
+from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Robot
@@ -33,10 +33,8 @@ from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
 
-# Section 4.2 and Table 5 [m].
-SOLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}
-HIP_X, HIP_Y = (0.07, 0.11), (0.025, -0.025)
-MEAN_DBM = (0.08, 0.08)
+# Section 4.2: least mean margins of 0.08 m, in the box of 0.21 m by 0.18 m around NAO's soles.
+MEAN_DBM_SHARES = (8 / 21, 4 / 9)
 ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
     "LShoulderPitch": (1.0, 1.5),
     "LElbowRoll": (-0.64, -0.50),
@@ -45,12 +43,10 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
 }
 FEET = {"L": "left", "R": "right"}
 
-VARIABLES = (
-    *HIP_VARIABLES,
-    Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8"),
-)
+DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
 
 TorsoShare = Literal["printed", "lever"]
+Point2: TypeAlias = tuple[float, float]
 
 
 def nao_dsp(
@@ -60,6 +56,7 @@ def nao_dsp(
     derivatives: Derivatives = "analytic",
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "printed",
+    step_length_m: float = 0.06,
     samples_per_interval: int = 1,
 ) -> GaitProblem:
     """Double support of NAO.
@@ -70,27 +67,32 @@ def nao_dsp(
         derivatives: analytic, or finite differences of the sampled angles as in the paper.
         rotational_inertia: False takes every link as a point mass, in torques and ZMP.
         torso_share: how the torso's mass is shared between the legs (see ``torso_shares``).
+        step_length_m: from foot to foot.
         samples_per_interval: above 1 for a grid that is denser than the intervals.
     """
     if torso_share not in get_args(TorsoShare):
         raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
+    check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
+    soles = _soles(model, step_length_m)
+    box = support_box(model, soles)
+    variables = (*hip_variables(model), DURATION)
     return phase_problem(
         name="nao-dsp",
         title="NAO, double support: least mean power",
-        variables=VARIABLES,
+        variables=variables,
         phase=Phase(
             robot=model,
-            variables=len(VARIABLES),
+            variables=len(variables),
             duration="double_support_time_s",
-            plan=_planner(model),
-            loads=_loads(model, torso_share),
+            plan=_planner(model, soles),
+            loads=_loads(model, soles, torso_share),
             intervals=intervals,
             samples_per_interval=samples_per_interval,
             derivatives=derivatives,
         ),
-        margins=lambda zmp, ops: double_support_margins(zmp, model, ops),
-        mean_dbm_m=MEAN_DBM,
+        margins=lambda zmp, ops: double_support_margins(zmp, box, ops),
+        mean_dbm_m=_mean_margins(box),
         make=nao_dsp,
         options={
             "robot": robot,
@@ -98,19 +100,56 @@ def nao_dsp(
             "derivatives": derivatives,
             "rotational_inertia": rotational_inertia,
             "torso_share": torso_share,
+            "step_length_m": step_length_m,
         },
     )
 
 
-def _planner(robot: Robot) -> Planner:
-    """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
-    ankles = {
-        side: stack(*map(constant, (*xy, robot.feet[FEET[side]].ankle_height_m))) for side, xy in SOLES_XY.items()
-    }
+class Box(NamedTuple):
+    """Sides of the rectangle around both soles [m]."""
+
+    back: float
+    front: float
+    right: float
+    left: float
+
+
+def _soles(robot: Robot, step: float) -> dict[str, Point2]:
+    """Ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2)."""
+    return {"L": (step, leg_geometry(robot, "L").hip_m[1]), "R": (2 * step, leg_geometry(robot, "R").hip_m[1])}
+
+
+def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box:
+    """Rectangle around both soles, whose ankles stand at ``soles`` by side."""
+    feet = {side: robot.feet[foot] for side, foot in FEET.items()}
+    return Box(
+        back=min(soles[side][0] - foot.back_m for side, foot in feet.items()),
+        front=max(soles[side][0] + foot.front_m for side, foot in feet.items()),
+        right=min(soles[side][1] - foot.right_m for side, foot in feet.items()),
+        left=max(soles[side][1] + foot.left_m for side, foot in feet.items()),
+    )
+
+
+def _mean_margins(box: Box) -> Point2:
+    """Least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
+    along, across = MEAN_DBM_SHARES
+    return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
+
+
+def _planner(robot: Robot, soles: Mapping[str, Point2]) -> Planner:
+    """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics.
+
+    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, rounded to a micrometre so
+    that the paper's numbers come out exactly, and from halfway to the left foot to halfway to the right one.
+    """
+    (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
+    sixth = (front_x - rear_x) / 6
+    hip_x, hip_y = (round(rear_x + sixth, 6), round(front_x - sixth, 6)), (left_y / 2, right_y / 2)
+    ankles = {side: stack(*map(constant, (*xy, robot.feet[FEET[side]].ankle_height_m))) for side, xy in soles.items()}
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
         duration = fmax(x[7], LEAST_DURATION)
-        hip = hip_motion(x[:7], HIP_X, HIP_Y, duration, phase)
+        hip = hip_motion(x[:7], hip_x, hip_y, duration, phase)
         left, left_reach = leg_joints(robot, "L", hip, ankles["L"], margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, ankles["R"], margin, ops)
         return Plan(
@@ -123,7 +162,7 @@ def _planner(robot: Robot) -> Planner:
     return plan
 
 
-def torso_shares(hip_y: SX, rule: TorsoShare) -> dict[str, SX]:
+def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) -> dict[str, SX]:
     """Share of the torso's mass that each leg carries, from the hip's distances to the feet; both add up to 1.
 
     With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
@@ -132,17 +171,18 @@ def torso_shares(hip_y: SX, rule: TorsoShare) -> dict[str, SX]:
         hip_y: position of the hip across the walking direction [m].
         rule: ``"printed"`` is proportional to the distance *from* that leg's own foot, as in the equations; ``"lever"`` to
             the distance from the other foot, as the text says: the nearer foot carries more.
+        feet_y: of the left and the right foot [m]; by default those of NAO.
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (28), (29).
     """
-    from_left, from_right = SOLES_XY["L"][1] - hip_y, hip_y - SOLES_XY["R"][1]
-    width = SOLES_XY["L"][1] - SOLES_XY["R"][1]
+    from_left, from_right = feet_y[0] - hip_y, hip_y - feet_y[1]
+    width = feet_y[0] - feet_y[1]
     left, right = from_left / width, from_right / width  # (eqs. 28, 29)
     return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
 
 
-def _loads(robot: Robot, rule: TorsoShare) -> Loader:
+def _loads(robot: Robot, soles: Mapping[str, Point2], rule: TorsoShare) -> Loader:
     """Torques of each half from its own foot, and the combined ZMP of both feet."""
     halves = {
         side: tree_from(robot, robot.feet[foot].link, [joint for joint in JOINTS if joint.startswith(side)])
@@ -152,30 +192,25 @@ def _loads(robot: Robot, rule: TorsoShare) -> Loader:
 
     def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        shares = torso_shares(hip[1], rule)
+        shares = torso_shares(hip[1], rule, (soles["L"][1], soles["R"][1]))
         torques: dict[str, SX] = {}
         zmps, ground_loads = [], []
         for side, tree in halves.items():
             half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
             offset = zmp_of_wrench(wrench, robot.feet[FEET[side]].ankle_height_m, weight)
             torques |= half
-            zmps.append(DM(SOLES_XY[side]) + offset)
+            zmps.append(DM(soles[side]) + offset)
             ground_loads.append(ground_load(wrench, weight))
         return Loads(torques, combined_zmp(zmps, ground_loads))
 
     return loads
 
 
-def double_support_margins(zmp: MX, robot: Robot, ops: Nonsmooth) -> tuple[MX, MX]:
+def double_support_margins(zmp: MX, box: Box, ops: Nonsmooth) -> tuple[MX, MX]:
     """Balance margins in x and y, (1, N + 1) each [m]: distances to the sides of the box around both soles.
 
     Source:
         Gupta, Pratihar, Deb (2023), Fig. 8 (b).
     """
-    feet = {side: robot.feet[foot] for side, foot in FEET.items()}
-    back = min(SOLES_XY[side][0] - foot.back_m for side, foot in feet.items())
-    front = max(SOLES_XY[side][0] + foot.front_m for side, foot in feet.items())
-    right = min(SOLES_XY[side][1] - foot.right_m for side, foot in feet.items())
-    left = max(SOLES_XY[side][1] + foot.left_m for side, foot in feet.items())
     x, y = zmp[0, :].T, zmp[1, :].T
-    return ops.min(front - x, x - back).T, ops.min(left - y, y - right).T
+    return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from casadi import DM, MX, SX, fmax, vertcat
 
 from nlp_gait.problems.gait_problem import GaitProblem, Variable
 from nlp_gait.problems.nao import (
     GRAVITY,
-    HIP_VARIABLES,
     LEAST_DURATION,
     arm_joints,
     hip_motion,
@@ -17,6 +17,7 @@ from nlp_gait.problems.nao import (
     nao,
     upright_links,
 )
+from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Foot, Robot
@@ -26,11 +27,8 @@ from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, stack
 
-# Section 4.1 and Table 3 [m]: the left foot supports, the right foot swings.
-SUPPORT_XY = (0.06, 0.05)
-SWING_X, SWING_Y = (0.0, 0.12), -0.05
-HIP_X, HIP_Y = (0.03, 0.09), 0.025
-MEAN_DBM = (0.05, 0.02)
+# Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
+MEAN_DBM_SHARES = (1 / 3, 1 / 4)
 ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
     "LShoulderPitch": (2.0, 1.0),
     "LElbowRoll": (-0.42, -0.64),
@@ -38,8 +36,7 @@ ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
     "RElbowRoll": (0.64, 0.42),
 }
 
-VARIABLES = (
-    *HIP_VARIABLES,
+OWN_VARIABLES = (
     Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
     Variable(name="single_support_time_s", unit="s", lower=0.4, upper=4.0, description="x9"),
 )
@@ -51,6 +48,7 @@ def nao_ssp(
     intervals: int = 10,
     derivatives: Derivatives = "analytic",
     rotational_inertia: bool = True,
+    step_length_m: float = 0.06,
     samples_per_interval: int = 1,
 ) -> GaitProblem:
     """Single support of NAO.
@@ -60,47 +58,74 @@ def nao_ssp(
         intervals: equal parts of the phase over which torques may change by the limit.
         derivatives: analytic, or finite differences of the sampled angles as in the paper.
         rotational_inertia: False takes every link as a point mass, in torques and ZMP.
+        step_length_m: from foot to foot; the swing foot moves by twice as much.
         samples_per_interval: above 1 for a grid that is denser than the intervals.
     """
+    check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
     foot = model.feet["left"]
+    stance = _stance(model, step_length_m)
+    variables = (*hip_variables(model), *OWN_VARIABLES)
     return phase_problem(
         name="nao-ssp",
         title="NAO, single support: least mean power",
-        variables=VARIABLES,
+        variables=variables,
         phase=Phase(
             robot=model,
-            variables=len(VARIABLES),
+            variables=len(variables),
             duration="single_support_time_s",
-            plan=_planner(model),
-            loads=_loads(model),
+            plan=_planner(model, stance),
+            loads=_loads(model, stance),
             intervals=intervals,
             samples_per_interval=samples_per_interval,
             derivatives=derivatives,
         ),
-        margins=lambda zmp, ops: single_support_margins(zmp, SUPPORT_XY, foot, ops),
-        mean_dbm_m=MEAN_DBM,
+        margins=lambda zmp, ops: single_support_margins(zmp, stance.support_xy, foot, ops),
+        mean_dbm_m=_mean_margins(foot),
         make=nao_ssp,
         options={
             "robot": robot,
             "intervals": intervals,
             "derivatives": derivatives,
             "rotational_inertia": rotational_inertia,
+            "step_length_m": step_length_m,
         },
     )
 
 
-def _planner(robot: Robot) -> Planner:
+class _Stance(NamedTuple):
+    """Where the left foot stands, and paths of the right foot and of the hip [m]."""
+
+    support_xy: tuple[float, float]
+    swing_x: tuple[float, float]
+    swing_y: float
+    hip_x: tuple[float, float]
+    hip_y: tuple[float, float]
+
+
+def _stance(robot: Robot, step: float) -> _Stance:
+    """Each foot below its own hip joint, the hip halfway to the supporting one (section 4.1, Table 3)."""
+    left, right = (leg_geometry(robot, side).hip_m[1] for side in "LR")
+    return _Stance((step, left), (0.0, 2 * step), right, (step / 2, 1.5 * step), (left / 2, left / 2))
+
+
+def _mean_margins(foot: Foot) -> tuple[float, float]:
+    """Least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
+    along, across = MEAN_DBM_SHARES
+    return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
+
+
+def _planner(robot: Robot, stance: _Stance) -> Planner:
     """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
-    ankle_height = robot.feet["left"].ankle_height_m
+    ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
         lift, duration = x[7], fmax(x[8], LEAST_DURATION)
-        hip = hip_motion(x[:7], HIP_X, (HIP_Y, HIP_Y), duration, phase)
-        support = stack(constant(SUPPORT_XY[0]), constant(SUPPORT_XY[1]), constant(ankle_height))
-        forward = cubic(SX(SWING_X[0]), SX(SWING_X[1]), SX(0), SX(0), duration, phase)
-        rise = parabola_lift(forward, *SWING_X, lift)
-        swing = stack(forward, constant(SWING_Y), rise._replace(position=rise.position + ankle_height))
+        hip = hip_motion(x[:7], stance.hip_x, stance.hip_y, duration, phase)
+        support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
+        forward = cubic(SX(stance.swing_x[0]), SX(stance.swing_x[1]), SX(0), SX(0), duration, phase)
+        rise = parabola_lift(forward, *stance.swing_x, lift)
+        swing = stack(forward, constant(stance.swing_y), rise._replace(position=rise.position + ankle_heights[1]))
         left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
         return Plan(
@@ -113,7 +138,7 @@ def _planner(robot: Robot) -> Planner:
     return plan
 
 
-def _loads(robot: Robot) -> Loader:
+def _loads(robot: Robot, stance: _Stance) -> Loader:
     """Torques of the whole tree from the support foot, and the ZMP from the ground's wrench on that foot."""
     foot = robot.feet["left"]
     tree, upright = tree_from(robot, foot.link), upright_links(robot)
@@ -122,7 +147,7 @@ def _loads(robot: Robot) -> Loader:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
         torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
-        return Loads(torques, DM(SUPPORT_XY) + offset)
+        return Loads(torques, DM(stance.support_xy) + offset)
 
     return loads
 

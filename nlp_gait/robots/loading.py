@@ -1,4 +1,4 @@
-"""Read robot files: one JSON object a robot, which may extend another and replace some of its records."""
+"""Read robot files: one JSON object a robot, which may extend another one, or a URDF, and replace some of its records."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot
+from nlp_gait.robots.tree import reversed_joint
+from nlp_gait.robots.urdf import urdf_record
 
 SCHEMA = 1
 
@@ -27,27 +30,80 @@ def robot_names() -> tuple[str, ...]:
 
 @cache
 def load_robot(name_or_path: str) -> Robot:
-    """Robot by its name, or from a file (a path that ends in ``.json``).
+    """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
 
     Raises:
         UnknownNameError: no such robot.
         RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
+        MissingExtraError: a URDF cannot be read without its extra.
     """
-    return _robot(_merged(name_or_path))
+    return _robot(_merged(_beside_urdf(name_or_path) if name_or_path.endswith(".urdf") else name_or_path))
 
 
-def _merged(name_or_path: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
-    raw = _read(name_or_path)
-    base_name = raw.get("extends")
-    if base_name is None:
+def _beside_urdf(path: str) -> str:
+    """The robot file that extends a URDF and lies beside it under the same name."""
+    partner = Path(path).with_suffix(".json")
+    if not partner.is_file():
+        raise RobotDataError(
+            f"robot file {path!r}: a URDF says nothing about soles; write {str(partner)!r} with "
+            f'{{"schema": {SCHEMA}, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'
+        )
+    if _resolved(_read(str(partner)).get("extends"), str(partner)) != path:
+        raise RobotDataError(
+            f"robot file {str(partner)!r}: 'extends' must be {Path(path).name!r}, beside which it lies"
+        )
+    return str(partner)
+
+
+def _merged(source: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Record of a robot with what it extends."""
+    raw = _read(source)
+    about = raw.get("inertia_about")
+    if about not in (None, "com", "joint"):
+        raise RobotDataError(f"robot {source!r}: 'inertia_about' must be 'com' or 'joint', got {about!r}")
+    if isinstance(raw.get("links"), dict):
+        raw["links"] = _stamped(raw["links"], inertia_about=about)
+    if "extends" not in raw:
         return raw
-    if base_name in seen or not isinstance(base_name, str):
-        raise RobotDataError(f"robot {name_or_path!r}: 'extends' must name another robot, got {base_name!r}")
-    base = _merged(base_name, (*seen, name_or_path))
+    base_source = _resolved(raw["extends"], source)
+    if base_source is None or base_source in seen:
+        raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {raw['extends']!r}")
+    if base_source.endswith(".urdf"):
+        base = urdf_record(base_source, about_joint=about == "joint")
+        base["links"] = _stamped(base["links"], inertia_about=about and "com")
+    else:
+        base = _merged(base_source, (*seen, source))
+    base["joints"] = _renamed(_group(base, "joints", base_source), _group(raw, "joint_names", source), source)
     merged = {**base, **raw}
     for group in ("links", "joints", "feet", "sources"):
-        merged[group] = {**_group(base, group, base_name), **_group(raw, group, name_or_path)}
+        merged[group] = {**_group(base, group, base_source), **_group(raw, group, source)}
     return merged
+
+
+def _stamped(records: Mapping[str, Any], **stamp: object) -> dict[str, Any]:
+    """Records with one more field; what is no record is left for the check to come."""
+    return {name: {**record, **stamp} if isinstance(record, dict) else record for name, record in records.items()}
+
+
+def _renamed(joints: Mapping[str, Any], names: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Joints under new names, given as new to old; a minus sign before the old one reverses the joint's sense."""
+    old = {new: str(name).removeprefix("-") for new, name in names.items()}
+    for name in old.values():
+        if name not in joints:
+            raise unknown(f"joint in joint_names of {source!r}", name, joints)
+    renamed = {name: joint for name, joint in joints.items() if name not in old.values()}
+    for new, name in old.items():
+        if new in renamed:
+            raise RobotDataError(f"robot {source!r}: joint_names gives {new!r} to {name!r}, but that name is taken")
+        renamed |= _stamped({new: joints[name]}, reversed=str(names[new]).startswith("-"))
+    return renamed
+
+
+def _resolved(base: Any, source: str) -> str | None:
+    """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
+    if not isinstance(base, str):
+        return None
+    return str(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
 
 
 def _read(name_or_path: str) -> dict[str, Any]:
@@ -74,6 +130,7 @@ def _robot(raw: Mapping[str, Any]) -> Robot:
     name = _get(raw, "name", str, "robot")
     owner = f"robot {name!r}"
     links = {key: _link(key, value) for key, value in _records(raw, "links", owner)}
+    check_inertias(name, [links[key] for key, value in _records(raw, "links", owner) if not value.get("inertia_about")])
     joints = {key: _joint(key, value) for key, value in _records(raw, "joints", owner)}
     feet = {key: _foot(key, value) for key, value in _records(raw, "feet", owner)}
     return Robot(
@@ -89,12 +146,13 @@ def _robot(raw: Mapping[str, Any]) -> Robot:
 
 def _link(name: str, raw: Mapping[str, Any]) -> Link:
     owner = f"link {name!r}"
-    return Link(
+    link = Link(
         name=name,
         mass_kg=_number(raw, "mass_kg", owner),
         com_m=_numbers(raw, "com_m", 3, owner),  # type: ignore[arg-type]
         inertia_com_kgm2=_numbers(raw, "inertia_com_kgm2", 6, owner),  # type: ignore[arg-type]
     )
+    return shifted_to_com(link) if raw.get("inertia_about") == "joint" else link
 
 
 def _joint(name: str, raw: Mapping[str, Any]) -> Joint:
@@ -106,7 +164,7 @@ def _joint(name: str, raw: Mapping[str, Any]) -> Joint:
     limits = _numbers(raw, "limits_rad", 2, owner)
     planning = _numbers(raw, "planning_limits_rad", 2, owner) if "planning_limits_rad" in raw else limits
     motor = raw.get("motor")
-    return Joint(
+    joint = Joint(
         name=name,
         parent=_get(raw, "parent", str, owner),
         child=_get(raw, "child", str, owner),
@@ -118,6 +176,7 @@ def _joint(name: str, raw: Mapping[str, Any]) -> Joint:
         torque_limit_Nm=_number(raw, "torque_limit_Nm", owner),
         motor=None if motor is None else _motor(motor, owner),
     )
+    return reversed_joint(joint) if raw.get("reversed") else joint
 
 
 def _motor(raw: Any, owner: str) -> Motor:

@@ -89,6 +89,13 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
     return replace(robot, links=links, joints=kept)
 
 
+def reversed_joint(joint: Joint) -> Joint:
+    """The same joint with its angle counted the other way round."""
+    (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
+    x, y, z = joint.axis
+    return replace(joint, axis=(-x, -y, -z), limits_rad=(-high, -low), planning_limits_rad=(-plan_high, -plan_low))
+
+
 def point_masses(robot: Robot) -> Robot:
     """The same robot with every link's inertia about its centre of mass set to zero."""
     zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -12,8 +12,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.export.result import Result
 from nlp_gait.problems.gait_problem import GaitProblem
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.measurements import Measurements, measure
+from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
 
@@ -51,7 +51,9 @@ def random_gait(problem: GaitProblem, duration: str, duration_s: float, rng: np.
         feasible = np.flatnonzero(violation == 0.0)
         if feasible.size:
             return Result(problem=fixed, x=candidates[feasible[0]])
-    raise InputError(f"none of {DRAWS * BATCH} random gaits of {problem.name!r} with {duration} = {duration_s:g} is feasible")
+    raise InputError(
+        f"none of {DRAWS * BATCH} random gaits of {problem.name!r} with {duration} = {duration_s:g} is feasible"
+    )
 
 
 def calibrate(

@@ -16,5 +16,7 @@ def mujoco() -> ModuleType:
     try:
         import mujoco as module
     except ImportError as error:
-        raise MissingExtraError(f"simulation needs MuJoCo ({error}); install it with pip install 'nlp-gait[sim]'") from error
+        raise MissingExtraError(
+            f"simulation needs MuJoCo ({error}); install it with pip install 'nlp-gait[sim]'"
+        ) from error
     return module

@@ -155,7 +155,7 @@ def _saturated(plan: Plan, torque: Array, drive: Drive) -> dict[str, float]:
 
 def _beyond_range(plan: Plan, q: Array) -> tuple[str, ...]:
     ranges = np.array([plan.robot.joint(name).limits_rad for name in plan.joints])
-    beyond = ((q < ranges[:, 0]) | (q > ranges[:, 1])).any(axis=0)
+    beyond = np.any((q < ranges[:, 0]) | (q > ranges[:, 1]), axis=0).tolist()
     return tuple(name for name, hit in zip(plan.joints, beyond, strict=True) if hit)
 
 

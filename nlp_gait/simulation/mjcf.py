@@ -43,7 +43,8 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
         gravity: [m/s^2], along -z.
         friction: coefficient of sliding friction between robot and floor.
     """
-    root, _ = _document(robot.name, gravity)
+    root, option = _document(robot.name, gravity)
+    Xml.SubElement(option, "flag", autoreset="disable")  # a simulation that diverges must show it
     Xml.SubElement(
         Xml.SubElement(root, "default"),
         "geom",
@@ -64,8 +65,8 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
     actuators = Xml.SubElement(root, "actuator")
     for name, joint in robot.joints.items():
         limit = drive.torque_limit(joint)
-        gains = {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
-        Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit), **gains)
+        actuator = Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit))
+        actuator.attrib |= {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
     return _text(root)
 
 
@@ -85,10 +86,10 @@ def _document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
 
 def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
     """Texture of the floor and convex hulls of the soles."""
-    sky = {"rgb1": "1 1 1", "rgb2": "0.85 0.9 0.95"}
-    Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384", **sky)
-    colours = {"rgb1": "0.95 0.96 0.97", "rgb2": "0.85 0.87 0.9"}
-    Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256", **colours)
+    sky = Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384")
+    sky.attrib |= {"rgb1": "1 1 1", "rgb2": "0.85 0.9 0.95"}
+    tiles = Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256")
+    tiles.attrib |= {"rgb1": "0.95 0.96 0.97", "rgb2": "0.85 0.87 0.9"}
     Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texrepeat="60 60")
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
@@ -124,7 +125,9 @@ def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
     if isinstance(shape, Prism):
         Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name, rgba="0.35 0.38 0.42 1")
     elif shape.start == shape.end:
-        Xml.SubElement(element, "geom", name=name, type="sphere", pos=_numbers(*shape.start), size=_numbers(shape.radius))
+        Xml.SubElement(
+            element, "geom", name=name, type="sphere", pos=_numbers(*shape.start), size=_numbers(shape.radius)
+        )
     else:
         ends = _numbers(*shape.start, *shape.end)
         Xml.SubElement(element, "geom", name=name, type="capsule", fromto=ends, size=_numbers(shape.radius))

@@ -11,14 +11,13 @@ from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.export.result import Result
-from nlp_gait.export.sampled import sampled
+from nlp_gait.export.sampled import finely_sampled
 from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS, JOINTS, nao
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 
 SIDES = ("left", "right")
-INTERVALS = 1000  # of the grid that the splines run through: their error is below 1e-9 rad
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 
 
@@ -89,11 +88,9 @@ def plan_of(result: Result) -> Plan:
     """
     problem = result.problem
     robot = problem.options.get("robot")
-    duration = next((name for name in problem.names if name.endswith("_time_s")), None)
-    if not isinstance(robot, str) or duration is None or not problem.name.startswith("nao-"):
+    if not isinstance(robot, str) or not problem.name.startswith("nao-"):
         raise InputError(f"only gaits of the NAO problems can be simulated, got one of {problem.name!r}")
-    time = float(result.x[problem.variable_index(duration)])
-    signals = sampled(result, time / INTERVALS)
+    signals = finely_sampled(result)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
     return Plan(

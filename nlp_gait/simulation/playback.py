@@ -76,7 +76,7 @@ def play(
     model, data = prepared(plan, conditions, drive, sole)
     at = _Addresses(model, plan)
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
-    times = np.arange(steps) * TIME_STEP
+    times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
     # A set-point holds until the next one.
     commands = plan.at("q", np.floor(times / drive.period_s + 1e-9) * drive.period_s)
     least_height = FALLEN_HEIGHT * float(plan.at("hip", np.zeros(1))[0, 2])
@@ -88,26 +88,26 @@ def play(
         if observe is not None:
             observe(model, data)
         q, qd = data.qpos[at.angles], data.qvel[at.rates]
-        torso, upright = data.xpos[at.torso].copy(), data.xmat[at.torso, 8]
-        feet = data.site_xpos[at.soles]
-        engine.mj_step(model, data)
-        rows.append((q, qd, data.actuator_force[at.actuators], torso, upright, feet, *_pressure(data, at)))
+        engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
+        torso, upright = data.xpos[at.torso].copy(), float(data.xmat[at.torso, 8])
+        feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
+        rows.append((q, qd, torque, torso, upright, feet, *_pressure(data, at)))
         if upright < math.cos(FALLEN_TILT) or torso[2] < least_height or not math.isfinite(torso[2]):
             fell_at_s = t
             break
-    q, qd, torque, torso, upright, feet, loads, pressure = (np.array(column) for column in zip(*rows, strict=True))
+    columns = [np.array(column, dtype=float) for column in zip(*rows, strict=True)]
     n = len(rows)
     return Trace(
         t=times[:n],
-        q=q,
-        qd=qd,
-        torque=torque,
         set_points=commands[:n],
-        torso=torso,
-        tilt=np.arccos(np.clip(upright, -1.0, 1.0)),
-        feet=feet,
-        loads=loads,
-        pressure=pressure,
+        q=columns[0],
+        qd=columns[1],
+        torque=columns[2],
+        torso=columns[3],
+        tilt=np.arccos(np.clip(columns[4], -1.0, 1.0)),
+        feet=columns[5],
+        loads=columns[6],
+        pressure=columns[7],
         fell_at_s=fell_at_s,
     )
 

@@ -44,9 +44,9 @@ def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
     with _unsimplified():
         outputs = function.call([*others, last])
         remaining, symbols, extracted = ca.extract_parametric(outputs, last, {"extract_trivial": True})
-    table = ca.Function("table", [last], [ca.vertcat(*extracted)])
+    table = ca.Function("table", [last], [ca.vertcat(*extracted)]).map(values.shape[1])
     names = function.name_in(), function.name_out()
-    return ca.Function(function.name(), [*others, ca.vertcat(*symbols)], remaining, *names), table.map(values.shape[1])(values)
+    return ca.Function(function.name(), [*others, ca.vertcat(*symbols)], remaining, *names), table(values)
 
 
 class _Node(NamedTuple):

@@ -45,6 +45,15 @@ class Nonsmooth(Protocol):
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Elementwise: ``below`` where switch < 0, else ``above``."""
 
+    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
+        """States (n, N) after each of N steps, ``step`` from (state (n, 1), input (m, 1)) to the next state.
+
+        Args:
+            step: one step.
+            initial: (n, 1) state before the first.
+            inputs: (m, N), a column for each step.
+        """
+
 
 class Exact:
     """The functions as the papers mean them."""
@@ -77,6 +86,10 @@ class Exact:
         """A true jump, written without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
 
+    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
+        """One step after the other, in a loop at run time."""
+        return step.mapaccum(inputs.shape[1])(initial, inputs)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lift:
@@ -85,14 +98,16 @@ class Lift:
     Attributes:
         variable: (k, 1) symbols.
         value: (k, 1) what they equal at the exact function (a start value, in terms of x and earlier lifts).
-        rows: (r, 1) expressions that must be >= 0.
+        rows: (r, 1) expressions that must be >= 0, or == 0 if the lift is tight.
         from_above: True if the variable may only exceed the exact value (abs), False if only fall short of it (min).
+        tight: True if the rows leave the variable no freedom: it equals the exact value at every feasible point.
     """
 
     variable: MX
     value: MX
     rows: MX
-    from_above: bool
+    from_above: bool = True
+    tight: bool = False
 
 
 class Lifted:
@@ -139,3 +154,13 @@ class Lifted:
         self.smoothed = True
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
+
+    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
+        """Multiple shooting: all states are variables, tied by one equation for each step."""
+        n, steps = initial.shape[0], inputs.shape[1]
+        states = MX.sym(f"states_{len(self.lifts)}", n * steps)
+        path = ca.reshape(states, n, steps)
+        reached = step.map(steps)(ca.horzcat(initial, path[:, :-1]), inputs)
+        exact = step.mapaccum(steps)(initial, inputs)
+        self.lifts.append(Lift(variable=states, value=ca.vec(exact), rows=ca.vec(path - reached), tight=True))
+        return path

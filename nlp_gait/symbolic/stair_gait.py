@@ -89,6 +89,35 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
+def ankle_on_toe(foot: Foot, sole: SX, toe: SX) -> SX:
+    """(2,) ankle from where it is with the foot flat [m], while the tip of the toe stands still.
+
+    Source:
+        Bhardwaj et al., eqs. (1), (2).
+    """
+    return ca.vertcat(
+        foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
+        foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)
+    )
+
+
+def landed_ankle(plan: StairPlan, foot: Foot, s: SX) -> SX:
+    """(2,) ankle of the foot that landed last, from where it will stand flat [m], during the next step's double support.
+
+    It follows the rear ankle's way backwards in time: about the toe, then about the sole.
+
+    Args:
+        plan: of the next step.
+        foot: its lengths.
+        s: (4,) fractions of the next step's phases.
+    """
+    t1, t2 = plan.durations[0], plan.durations[1]
+    remaining = t2 + t1 - ca.dot(plan.durations[:2], s[:2])
+    first = ca.fmin(remaining / t1, 1)
+    second = ca.fmax((remaining - t1) / t2, 0)
+    return ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(first, second, 0, 0)))
+
+
 def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
@@ -97,12 +126,8 @@ def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
         lies on the cycloid's tangent and its argument is 2 u^2 - u^3, so that the velocity is continuous at both ends; the
         cycloid ends so far ahead that the foot, once flat, stands exactly two treads on.
     """
-    sole, toe = foot_angles(plan, ca.vertcat(s[:2], 0, 0))
-    on_toe = ca.vertcat(
-        foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
-        foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)
-    )
-    lift_off = ca.vertcat(foot.toe * (1 - ca.cos(plan.toe_angle)), foot.toe * ca.sin(plan.toe_angle))
+    rising = ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
+    lift_off = ankle_on_toe(foot, SX(0), plan.toe_angle)
     radius = stair.rise  # half of the double rise
     distance = 2 * stair.tread
     first = _first_cycloid_angle(ca.pi - distance / radius)
@@ -124,7 +149,7 @@ def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
     v0, v1, rise = start_rate * track_time, plan.end_rate * track_time, ca.pi - caught
     c = s[3]
     angle = caught + c * (v0 + c * (3 * rise - 2 * v0 - v1 + c * (v0 + v1 - 2 * rise)))
-    return on_toe + (bridge - p1) + (cycloid(angle) - p4)
+    return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
 def hip(plan: StairPlan, stair: Stair, gravity: float, s: SX) -> SX:

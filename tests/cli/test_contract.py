@@ -79,7 +79,8 @@ def test_solve_search_and_compare(tmp_path):
     assert all({"objective", "violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
     out = tmp_path / "study"
     nlp_gait("compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--out", str(out))
-    assert (out / "nao-ssp.md").read_text().count("| pso |") == 1
+    assert (out / "report.md").read_text().count("| pso | 2 |") == 1
+    assert "<svg" in (out / "report.html").read_text()
     assert (out / "nao-ssp-convergence.png").stat().st_size > 10_000
     assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 5
 

@@ -9,7 +9,6 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.problems import GaitProblem, load
 from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.problems.nao import GRAVITY
-from nlp_gait.problems.nao_dsp import SOLES_XY
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
@@ -28,6 +27,7 @@ FEASIBLE = {
     "nao-dsp": (0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0),
 }
 SEEDS = range(6)
+SOLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}  # section 4.2 [m]
 
 
 def motions(problem: GaitProblem) -> list[Array]:

@@ -11,6 +11,7 @@ import pytest
 
 from nlp_gait.errors import RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot, robot_names
+from tests.robots.files import written
 
 
 def link(mass: Any = 1.0, inertia: Any = (1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)) -> dict[str, Any]:
@@ -43,12 +44,6 @@ def tiny() -> dict[str, Any]:
         "joints": {"LHip": joint("torso", "left"), "RHip": joint("torso", "right")},
         "feet": {"left": foot("left"), "right": foot("right")},
     }
-
-
-def written(folder: Path, raw: object) -> str:
-    path = folder / "robot.json"
-    path.write_text(raw if isinstance(raw, str) else json.dumps(raw), encoding="utf-8")
-    return str(path)
 
 
 def with_joint_ring(raw: dict[str, Any]) -> None:

@@ -1,0 +1,1 @@
+"""Speed of the package against what one would otherwise use: ``python -m benchmarks``."""

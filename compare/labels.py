@@ -1,0 +1,22 @@
+"""Names of variables as people read them: ``hip_vx_start_m_s`` is the hip vx start in m/s."""
+
+from __future__ import annotations
+
+
+def axis_label(name: str, unit: str) -> str:
+    """Label of an axis, for example ``hip height [m]``."""
+    words = name_in_words(name, unit)
+    return words if unit == "1" else f"{words} [{unit}]"
+
+
+def quantity(name: str, unit: str, value: float) -> str:
+    """For example ``hip height = 0.31 m``."""
+    return f"{name_in_words(name, unit)} = {value:g}" + ("" if unit == "1" else f" {unit}")
+
+
+def name_in_words(name: str, unit: str) -> str:
+    """Name without its unit, for example ``hip height``."""
+    for end in ("lower", "upper"):
+        if name.endswith(f".{end}"):
+            return f"{end} bound of {name_in_words(name.removesuffix(f'.{end}'), unit)}"
+    return name.removesuffix("_" + unit.replace("/", "_").replace("^", "")).replace("_", " ")

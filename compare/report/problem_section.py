@@ -1,0 +1,200 @@
+"""The section of a report on one problem."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from compare.comparison import Comparison
+from compare.convergence import convergence_figure
+from compare.distributions import ecdf_figure, final_gap_figure
+from compare.published import published_rows
+from compare.record import RunRecord
+from compare.report.document import Figure, Section, Table, table
+from compare.significance import compare_pairs
+from compare.statistics.run_length import TARGETS
+from compare.table import HEADER, SolverSummary, cells, count, summarise
+
+SHOWN_CONSTRAINTS = 15
+
+
+def problem_section(comparison: Comparison) -> Section:
+    """Tables, figures and lists on one problem."""
+    summaries = summarise(comparison)
+    objective = comparison.objective
+    unit = "" if objective.unit == "1" else f" [{objective.unit}]"
+    stem = file_stem(comparison.problem)
+    figures = (
+        Figure(
+            name=f"{stem}-convergence",
+            caption="Best so far: bands from the best to the worst run, lines are medians; a gradient run is a point at its end.",
+            drawing=convergence_figure(comparison),
+        ),
+        Figure(
+            name=f"{stem}-runtime",
+            caption="Share of all pairs of run and target solved within a cost; 31 targets from 100 % to 1e-4 % above the best known.",
+            drawing=ecdf_figure(comparison),
+        ),
+        Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),
+    )
+    return Section(
+        title=f"{comparison.problem}: {objective.name}{unit}, to {objective.sense}",
+        text=(
+            "Claims are the solvers' own. Everything else is the judge's: the exact functions at the reported point, on the "
+            "problem's own samples. Gaps are measured from the best feasible value known here; evaluations are equivalent ones.",
+        ),
+        tables=(table(HEADER, [cells(s, comparison) for s in summaries], "Solvers, best median first"),),
+        figures=figures,
+        sections=tuple(
+            section
+            for section in (
+                _costs(comparison, summaries),
+                _tests(comparison),
+                _binding(comparison),
+                _published(comparison),
+                _failures(comparison),
+                _between(comparison),
+            )
+            if section is not None
+        ),
+    )
+
+
+def file_stem(label: str) -> str:
+    """Label as the beginning of a file's name."""
+    return "".join(c if c.isalnum() or c in "-_+." else "." for c in label)
+
+
+def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
+    targets = [f"{100 * target:g} %" for target in TARGETS]
+    unit = comparison.objective.unit
+    runtime = table(
+        ("solver", *(f"to {t}" for t in targets), *(f"seconds to {t}" for t in targets)),
+        [
+            (s.algorithm, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
+            for s in summaries
+        ],
+        "Expected running time to targets above the best known: all runs' cost until then, divided by the successes",
+    )
+    times = table(
+        ("solver", "feasible between samples", "95 % interval of the median", "build", "compile", "solve, median"),
+        [
+            (
+                s.algorithm,
+                "-" if s.dense_feasible is None else f"{s.dense_feasible}/{s.runs}",
+                "-" if s.median_interval is None else f"{s.median_interval[0]:.6f} to {s.median_interval[1]:.6f}",
+                f"{s.build_s:.2f} s",
+                f"{s.compile_s:.2f} s",
+                f"{s.time_s:.3f} s",
+            )
+            for s in summaries
+        ],
+        f"Uncertainty of the median [{unit}] over the feasible runs (bootstrap), and where the time goes; build and compile are "
+        "the longest, paid once by each process",
+    )
+    calls = table(
+        ("solver", "f", "g", "gradient", "Jacobian", "Hessian", "failed"),
+        [(solver.name, *_mean_calls(solver.records)) for solver in comparison.solvers],
+        "Calls in a run, mean",
+    )
+    return Section(title="What it costs", tables=(runtime, times, calls))
+
+
+def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
+    means = [
+        sum(r.evaluations.get(kind, 0) for r in records) / len(records)
+        for kind in ("f", "g", "gradient", "jacobian", "hessian")
+    ]
+    failed = sum(r.failed_evaluations for r in records) / len(records)
+    return [f"{value:.1f}" if value % 1 else f"{value:.0f}" for value in (*means, failed)]
+
+
+def _tests(comparison: Comparison) -> Section | None:
+    pairs = compare_pairs(comparison)
+    if not pairs:
+        return None
+    rows = [
+        (
+            f"{pair.first} < {pair.second}",
+            _p(pair.rank_sum),
+            "-" if pair.signed_rank is None else _p(pair.signed_rank),
+            str(pair.paired_runs),
+            f"{pair.a12:.3f}",
+        )
+        for pair in pairs
+    ]
+    return Section(
+        title="Are the differences real?",
+        text=(
+            "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over "
+            "runs with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no "
+            "difference; above 0.71: large).",
+        ),
+        tables=(table(("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"), rows),),
+    )
+
+
+def _binding(comparison: Comparison) -> Section | None:
+    priced = [
+        (cost, record)
+        for solver in comparison.solvers
+        for cost, record in zip(solver.costs, solver.records, strict=True)
+        if record.active_constraints and record.verdict.feasible
+    ]
+    if not priced:
+        return None
+    record = min(priced, key=lambda item: item[0])[1]
+    rows = [
+        (a.name, a.side, f"{a.bound:g} {a.unit}", f"{a.price:.4g} {a.price_unit}")
+        for a in record.active_constraints[:SHOWN_CONSTRAINTS]
+    ]
+    left_out = len(record.active_constraints) - len(rows)
+    note = f" {left_out} cheaper ones are left out." if left_out else ""
+    return Section(
+        title="What binds at the optimum",
+        text=(
+            f"At the best optimum of {record.algorithm} (run {record.run}). The price is the change of the optimal "
+            f"{comparison.objective.name} for each unit by which the bound is raised; the dearest come first.{note}",
+        ),
+        tables=(table(("constraint", "side", "at", "price of raising it"), rows),),
+    )
+
+
+def _published(comparison: Comparison) -> Section | None:
+    found = published_rows(comparison)
+    if found is None:
+        return None
+    header, rows, note = found
+    return Section(title="The paper's values next to ours", text=(note,), tables=(table(header, rows),))
+
+
+def _failures(comparison: Comparison) -> Section | None:
+    failed = [r for r in comparison.records if not r.verdict.feasible]
+    if not failed:
+        return None
+    rows = [(r.algorithm, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
+    made = table(("solver", "run", "seed", "why it ended", "violated, worst first"), rows)
+    return Section(title="Runs that ended infeasible or failed", tables=(_as_prose(made),))
+
+
+def _between(comparison: Comparison) -> Section | None:
+    rows = [
+        (r.algorithm, str(r.run), "; ".join(r.verdict.violated[:3]))
+        for r in comparison.records
+        if r.verdict.feasible and r.verdict.dense_feasible is False
+    ]
+    if not rows:
+        return None
+    made = table(("solver", "run", "violated between the samples, worst first"), rows)
+    return Section(title="Feasible on their own samples, violated between them", tables=(_as_prose(made),))
+
+
+def _as_prose(made: Table) -> Table:
+    return replace(made, prose=True)
+
+
+def _p(value: float) -> str:
+    return f"{value:.4f}" if value >= 1e-4 else f"{value:.1e}"
+
+
+def _seconds(value: float) -> str:
+    return "-" if value == float("inf") else f"{value:.3g}"

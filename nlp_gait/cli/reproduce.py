@@ -1,0 +1,36 @@
+"""``nlp-gait reproduce``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlp_gait.cli.common import command, progress_bar, stdout
+from nlp_gait.errors import unknown
+
+# Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress.
+REPRODUCTIONS = {
+    "nao": "compare.reproductions.nao",
+    "walk12": "compare.reproductions.walk12",
+    "stairs": "compare.reproductions.stairs",
+}
+
+
+@command
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
+    out: Annotated[Path, typer.Option(help="Folder for tables, figures and report.md; finished steps in it are kept.")],
+) -> None:
+    """Compute a paper's tables and figures anew and put them beside the printed ones.
+
+    Example: `nlp-gait reproduce nao --out reproduction`
+    """
+    if paper not in REPRODUCTIONS:
+        raise unknown("reproduction", paper, REPRODUCTIONS)
+    module = import_module(REPRODUCTIONS[paper])
+    with progress_bar(paper, module.STEPS) as advance:
+        module.reproduce(out, progress=advance)
+    stdout.print(f"wrote {out / 'report.md'}", soft_wrap=True)

@@ -1,0 +1,174 @@
+"""The closed loop on stairs: desired angles, one quantum of the nine-link dynamics, and what a quantum costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.problems.gait_problem import Point
+from nlp_gait.problems.stairs import GRAVITY, SETBACK, stair_of
+from nlp_gait.problems.stairs_governing import GOVERNING, governing, plan_of
+from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.symbolic.contact import Contact, Ground
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.planar_biped import LINKS, biped_dynamics, centres, points
+from nlp_gait.symbolic.quantised import (
+    Controller,
+    State,
+    after,
+    controller_torque,
+    explicit_acceleration,
+    implicit_acceleration,
+)
+from nlp_gait.symbolic.stair_loads import LEAST_LOAD, link_angles
+from nlp_gait.symbolic.stair_posture import posture
+from nlp_gait.symbolic.stair_profile import Stair, stair_height
+
+Scheme = Literal["implicit", "explicit"]
+QUANTUM = 0.01  # dt [s], (eq. 43)
+EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
+# Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
+CONTACTS = ("T", "S", "A", "S'", "T'")
+N = len(LINKS)
+# Constants of a rollout, with their sizes: gains, stair, ground, share of gravity, disturbance.
+CONSTANTS = {"kp": N, "kd": N, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
+
+
+class Rollout(NamedTuple):
+    """The closed loop at the end of every quantum; columns are quanta.
+
+    Attributes:
+        desired: (18, m) desired angles and rates.
+        state: (18, m) angles [rad] and rates [rad/s] of the nine links.
+        torque: (9, m) generalised torques of the links [Nm].
+        zmp: (1, m) ahead of the stance ankle, on the virtual slope in double support [m].
+    """
+
+    desired: MX
+    state: MX
+    torque: MX
+    zmp: MX
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClosedLoop:
+    """Closed loop over whole quanta of time.
+
+    Attributes:
+        quanta: number of steps of the rollout.
+        scheme: of the quantised dynamics.
+    """
+
+    quanta: int
+    scheme: Scheme
+
+    def rollout(self, point: Point, kp: MX, kd: MX, ops: Nonsmooth) -> Rollout:
+        """States, torques and ZMP from gains kp, kd (9,) and the problem's parameters."""
+        stair = stair_of(point)
+        size = ca.vertcat(stair.tread, stair.rise)
+        times = np.arange(self.quanta + 1) * QUANTUM
+        plan = ca.repmat(ca.vertcat(governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
+        desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        constants = ca.vertcat(
+            kp,
+            kd,
+            size,
+            *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
+            point["gravity_compensation"],
+            point["disturbance_Nm"],
+        )
+        aims = desired[:, 1:] if self.scheme == "implicit" else desired[:, :-1]
+        inputs = ca.vertcat(aims, DM(times[None, :-1]), ca.repmat(constants, 1, self.quanta))
+        initial = desired[:, 0]
+        states = ops.rollout(self.step, initial, inputs)
+        before = ca.horzcat(initial, states[:, :-1])
+        slope = ca.repmat(stair.rise / stair.tread, 1, self.quanta) * (DM(times[None, 1:]) < point["t2_s"])
+        torque, zmp = self._outcome.map(self.quanta)(before, states, inputs, slope)
+        return Rollout(desired[:, 1:], states, torque, zmp)
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """(state (18,), input) to the state one quantum later; an input is aim (18,), time and constants."""
+        state, given, parts = _symbols()
+        q, v = state
+        found = points(load_biped().rods, q, SX(2, 1))
+        motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, q)
+        stair = Stair(parts["size"][0], parts["size"][1])
+        contacts = [
+            Contact(
+                found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH),
+                ca.jacobian(found[name][1], q).T,
+                ca.jacobian(found[name][0], q).T,
+            )
+            for name in CONTACTS
+        ]
+        control, aim, ground = _control(parts), State(parts["aim"][:N], parts["aim"][N:]), Ground(*ca.vertsplit(parts["ground"]))
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
+        if self.scheme == "implicit":
+            acceleration = implicit_acceleration(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
+        else:
+            acceleration = explicit_acceleration(motion, state, control, aim, contacts, ground, disturbance)
+        following = after(state, acceleration, QUANTUM)
+        return ca.Function("step", [ca.vertcat(*state), given], [ca.cse(ca.vertcat(*following))])
+
+    @cached_property
+    def _outcome(self) -> ca.Function:
+        """(state, next state, input, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
+        state, given, parts = _symbols()
+        following = State(SX.sym("q_next", N), SX.sym("v_next", N))
+        slope = SX.sym("slope")
+        rods = load_biped().rods
+        G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
+        acted = following if self.scheme == "implicit" else state
+        torque = controller_torque(_control(parts), State(parts["aim"][:N], parts["aim"][N:]), acted, G)
+
+        acceleration = (following.v - state.v) / QUANTUM
+        weight, moment, pull = SX(0), SX(0), SX(0)
+        for link, middle in centres(points(rods, state.q, SX(2, 1))).items():
+            rod = rods[link]
+            velocity = ca.jtimes(middle, state.q, state.v)
+            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration)
+            spin = acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
+            weight += rod.mass * (a[1] + GRAVITY)
+            pull += rod.mass * a[0]
+            moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
+        least = LEAST_LOAD * load_biped().mass_kg * GRAVITY
+        zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
+        inputs = [ca.vertcat(*state), ca.vertcat(*following), given, slope]
+        return ca.Function("outcome", inputs, ca.cse([torque, zmp]))
+
+
+def _symbols() -> tuple[State, SX, dict[str, SX]]:
+    """State, input, and the input's parts by name."""
+    sizes = {"aim": 2 * N, "time": 1, **CONSTANTS}
+    given = SX.sym("given", sum(sizes.values()))
+    ends = np.cumsum([0, *sizes.values()])
+    parts = {name: given[int(ends[i]) : int(ends[i + 1])] for i, name in enumerate(sizes)}
+    return State(SX.sym("q", N), SX.sym("v", N)), given, parts
+
+
+def _control(parts: dict[str, SX]) -> Controller:
+    return Controller(parts["kp"], parts["kd"], parts["gravity_share"])
+
+
+def _desired(ops: Nonsmooth) -> ca.Function:
+    """(time, governing parameters with stair and reach margin) to the desired angles and rates (18,)."""
+    s, passing = SX.sym("s", 4), SX.sym("passing", 4)
+    values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
+    plan = plan_of(values)
+    step = posture(
+        load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
+    )
+    given = ca.vertcat(values, size, margin)
+    pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
+    time = SX.sym("time")
+    starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
+    passed = (time - starts) / plan.durations
+    shares = ca.fmin(ca.fmax(passed, 0), 1)
+    now = (passed >= 0) * (passed < 1)
+    return ca.Function("desired", [time, given], [ca.cse(ca.vertcat(*pose(shares, now, given)))])

@@ -1,0 +1,134 @@
+"""Quantised dynamics with spring-damper contacts and Coulomb friction, linearly implicit: stable at any stiffness and gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+# A contact fades in over this height [m], and out again as its force falls through this one [N]: no branch, no jump.
+FADE_HEIGHT, FADE_FORCE = 2e-4, 1.0
+# Slower than this a contact sticks: it creeps at the share of this speed that its load has of the friction limit [m/s].
+CREEP_SPEED = 5e-3
+
+
+class Ground(NamedTuple):
+    """Spring and damper below a contact, and friction: k_s [N/m], k_d [N s/m], mu."""
+
+    stiffness: SX
+    damping: SX
+    friction: SX
+
+
+class Contact(NamedTuple):
+    """Point that may touch the ground.
+
+    Attributes:
+        height: above the ground [m].
+        normal: (n,) derivative of the height by the coordinates.
+        tangent: (n,) derivative of the forward position by the coordinates.
+    """
+
+    height: SX
+    normal: SX
+    tangent: SX
+
+
+class Response(NamedTuple):
+    """What happens within one quantum of time.
+
+    Attributes:
+        acceleration: (n,).
+        normal_forces: one for each contact [N].
+        tangent_forces: one for each contact [N].
+    """
+
+    acceleration: SX
+    normal_forces: SX
+    tangent_forces: SX
+
+
+def implicit_response(
+    mass: SX, force: SX, velocity: SX, contacts: Sequence[Contact], ground: Ground, quantum: SX | float
+) -> Response:
+    """Acceleration over one quantum of time dt, with the contact forces at its end.
+
+    Spring, damper and friction act at the position and velocity that the acceleration leads to, so none of them can
+    overshoot. A first pass without friction finds which contacts press, a second one adds friction and lets go of those
+    that would pull.
+
+    Args:
+        mass: (n, n) symmetric: the inertia, with what other implicit forces add to it.
+        force: (n,) all forces but those of the contacts.
+        velocity: (n,) now.
+        contacts: points that may touch.
+        ground: below them.
+        quantum: dt [s].
+
+    Source:
+        Bhardwaj et al., eqs. (33)-(35), (44)-(46), taken at the end of the quantum; the printed explicit scheme is stable
+        only for k dt / 2 < c < 2 m / dt.
+    """
+    k, c, mu = ground
+    stiff = k * quantum**2 / 2 + c * quantum  # force that one unit of normal acceleration takes away
+    rates = [ca.dot(contact.normal, velocity) for contact in contacts]
+    slips = [ca.dot(contact.tangent, velocity) for contact in contacts]
+    ahead = [contact.height + quantum * rate for contact, rate in zip(contacts, rates, strict=True)]
+    free = [-k * height - c * rate for height, rate in zip(ahead, rates, strict=True)]  # (eq. 33)
+    touching = [(1 - ca.tanh(height / FADE_HEIGHT)) / 2 for height in ahead]
+
+    solved = _solve_with(mass, force, contacts, touching, free, stiff, [contact.tangent for contact in contacts])
+    first, yields = solved[:, 0], ca.horzsplit(solved[:, 1:])
+    shares, grips = [], []
+    for contact, touch, push, slip, give in zip(contacts, touching, free, slips, yields, strict=True):
+        pressed = touch * (push - stiff * ca.dot(contact.normal, first))
+        keeps = (1 + ca.tanh(pressed / FADE_FORCE)) / 2
+        limit = mu * keeps * pressed  # (eq. 34)
+        speed = ca.sqrt((slip + quantum * ca.dot(contact.tangent, first)) ** 2 + CREEP_SPEED**2)
+        left = speed - quantum * ca.dot(contact.tangent, give) * limit  # after a quantum at the friction limit
+        shares.append(touch * keeps)
+        grips.append(limit / (CREEP_SPEED + (left + ca.sqrt(left**2 + CREEP_SPEED**2)) / 2))
+
+    for contact, grip, slip in zip(contacts, grips, slips, strict=True):
+        mass = mass + grip * quantum * contact.tangent @ contact.tangent.T
+        force = force - grip * slip * contact.tangent
+    acceleration = _solve_with(mass, force, contacts, shares, free, stiff, [])
+    normal, tangent = [], []
+    for contact, share, push, grip, slip in zip(contacts, shares, free, grips, slips, strict=True):
+        normal.append(share * (push - stiff * ca.dot(contact.normal, acceleration)))
+        tangent.append(-grip * (slip + quantum * ca.dot(contact.tangent, acceleration)))
+    return Response(acceleration, ca.vertcat(*normal), ca.vertcat(*tangent))
+
+
+def _solve_with(
+    mass: SX,
+    force: SX,
+    contacts: Sequence[Contact],
+    shares: Sequence[SX],
+    free: Sequence[SX],
+    stiff: SX,
+    more: Sequence[SX],
+) -> SX:
+    """Acceleration under the given shares of the contacts' normal forces (eq. 35), beside it those under unit forces."""
+    for contact, share, push in zip(contacts, shares, free, strict=True):
+        mass = mass + share * stiff * contact.normal @ contact.normal.T
+        force = force + share * push * contact.normal
+    return solve_symmetric(mass, ca.horzcat(force, *more))
+
+
+def solve_symmetric(A: SX, B: SX) -> SX:
+    """Solution of A X = B (n, m) for a symmetric positive definite A (n, n), by L D L^T, without branches."""
+    n = A.shape[0]
+    L, d = SX.eye(n), [SX(0)] * n
+    for j in range(n):
+        d[j] = A[j, j] - sum((L[j, k] ** 2 * d[k] for k in range(j)), SX(0))
+        for i in range(j + 1, n):
+            L[i, j] = (A[i, j] - sum((L[i, k] * L[j, k] * d[k] for k in range(j)), SX(0))) / d[j]
+    rows = [B[i, :] for i in range(n)]
+    for i in range(n):
+        rows[i] -= sum((L[i, k] * rows[k] for k in range(i)), SX(1, B.shape[1]))
+    for i in reversed(range(n)):
+        rows[i] = rows[i] / d[i] - sum((L[k, i] * rows[k] for k in range(i + 1, n)), SX(1, B.shape[1]))
+    return ca.vertcat(*rows)

@@ -1,0 +1,102 @@
+"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, printed and linearly implicit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from nlp_gait.symbolic.contact import Contact, Ground, implicit_response, solve_symmetric
+from nlp_gait.symbolic.lagrange import EquationsOfMotion
+
+
+class Controller(NamedTuple):
+    """PD controller with a share of gravity compensated.
+
+    Attributes:
+        proportional: (n,) K_p [N m/rad].
+        derivative: (n,) K_d [N m s/rad].
+        gravity_share: 1 takes all of gravity off the PD terms, 0 is as printed.
+    """
+
+    proportional: SX
+    derivative: SX
+    gravity_share: SX
+
+
+class State(NamedTuple):
+    """Coordinates and rates, (n,) each."""
+
+    q: SX
+    v: SX
+
+
+def after(state: State, acceleration: SX, quantum: float) -> State:
+    """State one quantum of time later (eqs. 44, 45)."""
+    q, v = state
+    return State(q + v * quantum + acceleration * quantum**2 / 2, v + acceleration * quantum)
+
+
+def controller_torque(control: Controller, desired: State, state: State, gravity: SX) -> SX:
+    """(n,) generalised torque (eqs. 50-52), with the share of gravity that is compensated."""
+    errors = control.proportional * (desired.q - state.q) + control.derivative * (desired.v - state.v)
+    return errors + control.gravity_share * gravity
+
+
+def implicit_acceleration(
+    motion: EquationsOfMotion,
+    state: State,
+    control: Controller,
+    desired: State,
+    contacts: Sequence[Contact],
+    ground: Ground,
+    disturbance: SX,
+    quantum: float,
+) -> SX:
+    """(n,) acceleration when controller and contacts act on the state at the end of the quantum: finite at every gain.
+
+    Args:
+        motion: equations of motion at the state.
+        state: now.
+        control: gains.
+        desired: at the end of the quantum.
+        contacts: points that may touch the ground.
+        ground: below them.
+        disturbance: (n,) generalised force.
+        quantum: dt [s].
+
+    Source:
+        Bhardwaj et al., eqs. (46)-(52), taken at the end of the quantum.
+    """
+    coasting = after(state, SX(state.q.shape[0], 1), quantum)
+    stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
+    force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
+    return implicit_response(
+        motion.M + ca.diag(stiffness), force, state.v, contacts, ground, quantum
+    ).acceleration
+
+
+def explicit_acceleration(
+    motion: EquationsOfMotion,
+    state: State,
+    control: Controller,
+    desired: State,
+    contacts: Sequence[Contact],
+    ground: Ground,
+    disturbance: SX,
+) -> SX:
+    """(n,) acceleration of the printed scheme: controller and contacts act on the state at the start of the quantum.
+
+    It is stable only for K_d below twice the least inertia over dt: 0.018 N m s/rad at the toe and dt = 0.01 s.
+
+    Source:
+        Bhardwaj et al., eqs. (33)-(35), (46)-(52); ``desired`` at the start of the quantum, friction against the slip.
+    """
+    force = controller_torque(control, desired, state, motion.G) - motion.C @ state.v - motion.G + disturbance
+    for contact in contacts:
+        rate, slip = ca.dot(contact.normal, state.v), ca.dot(contact.tangent, state.v)
+        pressed = (contact.height <= 0) * (-ground.stiffness * contact.height - ground.damping * rate)  # (eq. 33)
+        force += pressed * (contact.normal - ground.friction * ca.sign(slip) * contact.tangent)  # (eqs. 34, 35)
+    return solve_symmetric(motion.M, force)

@@ -1,0 +1,87 @@
+"""CSV, JSON, MJCF and NAOqi exports."""
+
+import csv
+import json
+import xml.etree.ElementTree as Xml
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.errors import InputError, OutputError, UnknownNameError
+from nlp_gait.export.formats import FORMATS, write_as
+from nlp_gait.export.result import Result, load_result
+
+DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
+
+
+@pytest.fixture(scope="module")
+def result():
+    problem = nlp_gait.load("nao-dsp").with_values(torque_change_limit_Nm=1.0)
+    return Result(problem=problem, x=problem.check_x(DSP))
+
+
+def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_path):
+    path = tmp_path / "gait.csv"
+    write_as("csv", path, result, 100)
+    header, *rows = csv.reader(path.read_text().splitlines())
+    assert header[0] == "t [s]" and "tau LKneePitch [Nm]" in header and "zmp y [m]" in header and "com z [m]" in header
+    assert all(name.endswith("]") for name in header) and len(set(header)) == len(header)
+    table = np.array(rows, dtype=float)
+    assert table.shape == (21, len(header))  # ten intervals of 200 ms, halved
+    signals = result.problem.signals(result.x, result.problem.p)
+    knee = signals.joints.index("LKneePitch")
+    np.testing.assert_allclose(
+        table[::2, header.index("tau LKneePitch [Nm]")], signals.arrays["tau"][:, knee], rtol=1e-12
+    )
+
+
+def test_json_can_be_played_again(result, tmp_path):
+    path = tmp_path / "gait.json"
+    write_as("json", path, result, 200)
+    data = json.loads(path.read_text())
+    assert data["signals"]["qd RHipPitch"]["unit"] == "rad/s" and len(data["signals"]["t"]["values"]) == 11
+    again = load_result(path)
+    np.testing.assert_array_equal(again.x, result.x)
+    assert again.problem.value("torque_change_limit_Nm") == 1.0
+
+
+def test_naoqi_keys_move_every_motor_once_after_an_approach(result, tmp_path):
+    path = tmp_path / "gait.json"
+    write_as("naoqi", path, result, 40)
+    data = json.loads(path.read_text())
+    assert data["isAbsolute"] is True
+    assert "LHipYawPitch" in data["names"] and "RHipYawPitch" not in data["names"]  # one motor
+    assert len(data["names"]) == len(data["keys"]) == len(data["times"]) == 21
+    times = data["times"][0]
+    assert times[0] == 2.0 and times[-1] == 4.0 and len(times) == 51 == len(data["keys"][3])
+    assert np.diff(times).min() > 0.0
+
+
+def test_mjcf_is_the_whole_robot(result, tmp_path):
+    path = tmp_path / "nao.xml"
+    write_as("mjcf", path, result, 40)
+    root = Xml.parse(path).getroot()
+    assert root.get("model") == "nao-v5"
+    assert sum(float(e.get("mass")) for e in root.iter("inertial")) == pytest.approx(5.30535)
+
+
+def test_what_a_problem_has_not_is_refused(tmp_path):
+    problem = nlp_gait.load("walk12")
+    walk = Result(problem=problem, x=problem.check_x((0.13, 0.1135, 0.02, 0.0204)))
+    for name in ("webots", "naoqi"):
+        with pytest.raises(InputError, match="no robot with motors; export it as csv or json"):
+            write_as(name, tmp_path / "x", walk, 40)
+    with pytest.raises(InputError, match="only gaits of the NAO problems"):
+        write_as("mjcf", tmp_path / "x", walk, 40)
+    write_as("csv", tmp_path / "x.csv", walk, 40)
+    assert "left_stance [1]" in (tmp_path / "x.csv").read_text().splitlines()[0]
+    with pytest.raises(UnknownNameError, match="webots"):
+        write_as("webot", tmp_path / "x", walk, 40)
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_an_unwritable_path_is_an_output_error_and_leaves_nothing(result, tmp_path, name):
+    with pytest.raises(OutputError, match="cannot write"):
+        write_as(name, tmp_path / "no" / "folder", result, 200)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,99 @@
+"""Inertia tensors about the wrong point are found and explained, and those of the real robots pass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots import Link, load_robot, robot_names
+from nlp_gait.robots.inertia import check_inertias, joint_distance_ratio, shifted_to_com
+from nlp_gait.robots.tree import inertia_matrix
+from tests.robots.custom import about_joints, humanoid, nao, six
+from tests.robots.files import written
+
+# Sums of products of numbers with six digits.
+TOLERANCE = 1e-15
+ROD = Link(name="rod", mass_kg=3.0, com_m=(0.0, 0.0, -0.5), inertia_com_kgm2=(0.25, 0.25, 0.0, 0.0, 0.0, 0.0))
+BALL = Link(name="ball", mass_kg=1.0, com_m=(0.1, 0.0, 0.0), inertia_com_kgm2=(0.02, 0.02, 0.02, 0.0, 0.0, 0.0))
+
+
+def test_ratios_by_hand() -> None:
+    """A rod of 1 m and 3 kg held at its end: 0.25 m^2 against m L^2 / 12 / m = 1/12 m^2; a ball: 0.01 against 0.01."""
+    assert joint_distance_ratio(ROD) == pytest.approx(3.0)
+    assert joint_distance_ratio(BALL) == pytest.approx(1.0)
+
+
+def test_the_wrong_tensor_of_a_rod_has_three_quarters_and_is_shifted_back() -> None:
+    wrong = Link(name="rod", mass_kg=3.0, com_m=ROD.com_m, inertia_com_kgm2=(1.0, 1.0, 0.0, 0.0, 0.0, 0.0))
+    assert joint_distance_ratio(wrong) == pytest.approx(0.75)
+    assert shifted_to_com(wrong).inertia_com_kgm2 == pytest.approx(ROD.inertia_com_kgm2)
+
+
+def test_a_tensor_that_no_body_has_about_its_joint_is_refused() -> None:
+    with pytest.raises(RobotDataError, match="link 'rod': inertia_com_kgm2 has principal moments"):
+        shifted_to_com(ROD)
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_the_real_robots_pass_by_a_wide_margin(name: str) -> None:
+    links = load_robot(name).links.values()
+    assert sum(joint_distance_ratio(link) > 1.0 for link in links) > len(links) / 2
+
+
+@pytest.mark.parametrize("make", [nao, humanoid])
+def test_tensors_about_the_joints_are_found_and_shifted_on_request(tmp_path: Path, make: Any) -> None:
+    wrong = about_joints(make())
+    with pytest.raises(
+        RobotDataError, match=r"look as if taken about the joints.*none of its 25 links.*\"joint\""
+    ) as said:
+        load_robot(written(tmp_path, wrong))
+    assert "l_ankle 0.93" in str(said.value)
+    load_robot.cache_clear()
+    shifted = load_robot(written(tmp_path, wrong | {"inertia_about": "joint"}))
+    load_robot.cache_clear()
+    right = load_robot(written(tmp_path, make()))
+    for name, link in right.links.items():
+        np.testing.assert_allclose(
+            inertia_matrix(shifted.links[name]), inertia_matrix(link), rtol=0, atol=TOLERANCE, err_msg=name
+        )
+
+
+def test_who_says_that_they_are_right_is_believed(tmp_path: Path) -> None:
+    wrong = about_joints(nao())
+    robot = load_robot(written(tmp_path, wrong | {"inertia_about": "com"}))
+    assert six(inertia_matrix(robot.links["LThigh"])) == wrong["links"]["LThigh"]["inertia_com_kgm2"]
+
+
+def test_the_statement_holds_for_the_links_of_its_own_file_only(tmp_path: Path) -> None:
+    links = {"LThigh": about_joints(nao())["links"]["LThigh"]}
+    raw = {"schema": 1, "name": "mixed", "extends": "nao-v5", "inertia_about": "joint", "links": links}
+    mixed, plain = load_robot(written(tmp_path, raw)), load_robot("nao-v5")
+    for name, link in plain.links.items():
+        np.testing.assert_allclose(inertia_matrix(mixed.links[name]), inertia_matrix(link), rtol=0, atol=TOLERANCE)
+
+
+def test_another_statement_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotDataError, match="'inertia_about' must be 'com' or 'joint', got 'origin'"):
+        load_robot(written(tmp_path, nao() | {"inertia_about": "origin"}))
+
+
+def test_few_links_or_links_near_their_joints_prove_nothing() -> None:
+    far = Link(name="far", mass_kg=1.0, com_m=(0.09, 0.0, 0.0), inertia_com_kgm2=BALL.inertia_com_kgm2)  # ratio 0.81
+    near = Link(name="near", mass_kg=1.0, com_m=(0.05, 0.0, 0.0), inertia_com_kgm2=BALL.inertia_com_kgm2)  # 0.25
+
+    def named(*links: Link) -> list[Link]:
+        return [
+            Link(name=f"{k}", mass_kg=v.mass_kg, com_m=v.com_m, inertia_com_kgm2=v.inertia_com_kgm2)
+            for k, v in enumerate(links)
+        ]
+
+    check_inertias("few", named(*[far] * 4))
+    check_inertias("near", named(far, far, near, near, near))
+    check_inertias("one that is right", named(far, far, far, far, ROD))
+    for links in ([far] * 5, [far, far, far, near, near, near]):
+        with pytest.raises(RobotDataError, match=rf"robot 'wrong'.*none of its {len(links)} links"):
+            check_inertias("wrong", named(*links))

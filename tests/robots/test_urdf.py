@@ -1,0 +1,287 @@
+"""Robots from URDF files: the same robot as from JSON whatever frames it is written in, and a message for what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from nlp_gait.errors import GaitError, MissingExtraError, RobotDataError
+from nlp_gait.robots import Robot, load_robot, urdf
+from nlp_gait.robots.tree import inertia_matrix
+from nlp_gait.robots.urdf import urdf_record
+from tests.robots.custom import about_joints, as_urdf, humanoid, nao, partner
+from tests.robots.files import written
+
+pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+
+# Rotations to and fro on lengths below 1 m and masses of about 1 kg.
+TOLERANCE = 1e-12
+ZERO = Rotation.identity()
+SET_EULER = {"LThigh": Rotation.from_euler("xyz", (0.3, -1.1, 2.0)), "LTibia": Rotation.from_euler("x", 1.5)}
+
+
+def assert_same(one: Robot, other: Robot) -> None:
+    assert (one.root, set(one.links), set(one.joints)) == (other.root, set(other.links), set(other.joints))
+    for name, link in one.links.items():
+        assert link.mass_kg == pytest.approx(other.links[name].mass_kg, rel=TOLERANCE)
+        np.testing.assert_allclose(link.com_m, other.links[name].com_m, rtol=0, atol=TOLERANCE)
+        np.testing.assert_allclose(
+            inertia_matrix(link), inertia_matrix(other.links[name]), rtol=0, atol=TOLERANCE, err_msg=name
+        )
+    for name, joint in one.joints.items():
+        twin = other.joints[name]
+        assert (joint.parent, joint.child, joint.limits_rad) == (twin.parent, twin.child, twin.limits_rad)
+        assert (joint.torque_limit_Nm, joint.velocity_limit_rad_s) == (twin.torque_limit_Nm, twin.velocity_limit_rad_s)
+        np.testing.assert_allclose(joint.origin_m, twin.origin_m, rtol=0, atol=TOLERANCE)
+        np.testing.assert_allclose(joint.axis, twin.axis, rtol=0, atol=TOLERANCE)
+
+
+def stored(folder: Path, tree: ElementTree.Element | str, robot: object = None) -> str:
+    """Path of a URDF, with its robot file beside it."""
+    path = folder / "robot.urdf"
+    path.write_text(tree if isinstance(tree, str) else ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
+    written(folder, partner(nao(), "robot.urdf") if robot is None else robot)
+    load_robot.cache_clear()
+    return str(path)
+
+
+@given(angles=st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 3), min_size=24, max_size=24))
+def test_the_axes_in_which_a_urdf_is_written_do_not_matter(
+    tmp_path_factory: pytest.TempPathFactory, angles: list[tuple[float, float, float]]
+) -> None:
+    raw = humanoid()
+    folder = tmp_path_factory.mktemp("urdf")
+    links = [name for name in raw["links"] if name != raw["root"]]
+    turned = {name: Rotation.from_euler("xyz", triple) for name, triple in zip(links, angles, strict=True)}
+    json_path = folder / "json"
+    json_path.mkdir()
+    assert_same(load_robot(stored(folder, as_urdf(raw, turned))), load_robot(written(json_path, raw)))
+
+
+def test_the_robot_file_and_its_urdf_name_the_same_robot(tmp_path: Path) -> None:
+    path = stored(tmp_path, as_urdf(nao()), partner(nao(), "robot.urdf", name="mine"))
+    by_urdf, by_json = load_robot(path), load_robot(str(tmp_path / "robot.json"))
+    assert by_urdf.name == by_json.name == "mine"
+    assert by_urdf.feet == load_robot("nao-v5").feet
+    assert_same(by_urdf, by_json)
+
+
+def test_links_behind_joints_that_do_not_turn_become_one_with_those_before(tmp_path: Path) -> None:
+    """A camera of 0.2 kg on the head, a base without mass above the torso, and a gripper that slides, at zero."""
+    tree = as_urdf(nao())
+    for parent, child, kind, mass in (
+        ("base_link", "torso", "fixed", None),
+        ("Head", "camera", "fixed", "0.2"),
+        ("l_wrist", "grip", "prismatic", "0.1"),
+    ):
+        link = ElementTree.SubElement(tree, "link", name=parent if child == "torso" else child)
+        if mass:
+            inertial = ElementTree.SubElement(link, "inertial")
+            ElementTree.SubElement(inertial, "mass", value=mass)
+            ElementTree.SubElement(inertial, "inertia", dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "0"))
+        joint = ElementTree.SubElement(tree, "joint", name=f"to_{child}", type=kind)
+        ElementTree.SubElement(joint, "parent", link=parent)
+        ElementTree.SubElement(joint, "child", link=child)
+        if child != "torso":
+            ElementTree.SubElement(joint, "origin", xyz="0.1 0 0")
+    robot, plain = load_robot(stored(tmp_path, tree)), load_robot("nao-v5")
+    assert robot.root == "base_link"
+    assert set(robot.links) == (set(plain.links) - {"torso"}) | {"base_link"}
+    head, before = robot.links["Head"], plain.links["Head"]
+    assert head.mass_kg == pytest.approx(before.mass_kg + 0.2)
+    assert head.com_m[0] == pytest.approx((before.mass_kg * before.com_m[0] + 0.2 * 0.1) / head.mass_kg)
+    between = before.mass_kg * 0.2 / head.mass_kg * ((0.1 - before.com_m[0]) ** 2 + before.com_m[2] ** 2)
+    assert inertia_matrix(head)[1, 1] == pytest.approx(inertia_matrix(before)[1, 1] + between)
+    assert robot.links["l_wrist"].mass_kg == pytest.approx(plain.links["l_wrist"].mass_kg + 0.1)
+    assert robot.links["base_link"].com_m == pytest.approx(plain.links["torso"].com_m)
+
+
+def test_joints_get_the_names_of_nao_and_may_be_reversed(tmp_path: Path) -> None:
+    raw = nao()
+    renamed = {f"joint_{i}": joint for i, joint in enumerate(raw["joints"].values())}
+    names = dict(zip(raw["joints"], renamed, strict=True))
+    knee = renamed[names["LKneePitch"]]
+    low, high = knee["limits_rad"]
+    knee["axis"], knee["limits_rad"] = [0.0, -1.0, 0.0], [-high, -low]
+    names["LKneePitch"] = f"-{names['LKneePitch']}"
+    raw["joints"] = renamed
+    mine = load_robot(stored(tmp_path, as_urdf(raw), partner(nao(), "robot.urdf", joint_names=names)))
+    assert_same(mine, load_robot("nao-v5"))
+
+
+def test_wheels_and_missing_axes_get_the_defaults_of_the_format(tmp_path: Path) -> None:
+    tree = as_urdf(nao())
+    joint = tree.find("joint[@name='HeadYaw']")
+    assert joint is not None
+    joint.set("type", "continuous")
+    for tag in ("axis", "origin"):
+        part = joint.find(tag)
+        assert part is not None
+        joint.remove(part)
+    yaw = load_robot(stored(tmp_path, tree)).joint("HeadYaw")
+    assert (yaw.axis, yaw.origin_m) == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert yaw.limits_rad == (-np.pi, np.pi)
+
+
+def test_shapes_and_plugins_are_not_even_parsed(tmp_path: Path) -> None:
+    tree = as_urdf(nao())
+    thigh = tree.find("link[@name='LThigh']")
+    assert thigh is not None
+    ElementTree.SubElement(ElementTree.SubElement(thigh, "visual"), "nonsense")
+    ElementTree.SubElement(tree, "gazebo").text = "nonsense"
+    assert_same(load_robot(stored(tmp_path, tree)), load_robot("nao-v5"))
+
+
+@pytest.mark.parametrize("about_com_too", [False, True])
+def test_tensors_about_the_joints_are_shifted_if_the_file_says_so(tmp_path: Path, about_com_too: bool) -> None:
+    """Also for links in other axes than the root's, and for a link that the robot file adds."""
+    raw = about_joints(nao())
+    path = stored(tmp_path, as_urdf(raw, SET_EULER), partner(nao(), "robot.urdf", inertia_about="joint"))
+    if about_com_too:
+        wrong = {"LThigh": raw["links"]["LThigh"]}
+        path = stored(
+            tmp_path, as_urdf(raw, SET_EULER), partner(nao(), "robot.urdf", inertia_about="joint", links=wrong)
+        )
+    assert_same(load_robot(path), load_robot("nao-v5"))
+
+
+def without(tag: str, name: str, part: str) -> Callable[[ElementTree.Element], None]:
+    def change(tree: ElementTree.Element) -> None:
+        element = tree.find(f"{tag}[@name='{name}']")
+        assert element is not None
+        where = element.find("inertial") if part == "mass" else element
+        assert where is not None
+        found = where.find(part)
+        assert found is not None
+        where.remove(found)
+
+    return change
+
+
+def with_attribute(path: str, key: str, value: str | None) -> Callable[[ElementTree.Element], None]:
+    def change(tree: ElementTree.Element) -> None:
+        element = tree.find(path)
+        assert element is not None
+        if value is None:
+            del element.attrib[key]
+        else:
+            element.set(key, value)
+
+    return change
+
+
+KNEE = "joint[@name='LKneePitch']"
+DAMAGES = [
+    (with_attribute("link[@name='LThigh']/inertial/inertia", "izz", None), r"link\[@name='LThigh'\]/inertial/.*: izz"),
+    (without("link", "LThigh", "mass"), r"link\[@name='LThigh'\]/inertial.*: mass"),
+    (without("link", "LThigh", "inertial"), r"link 'LThigh': mass_kg must be > 0, got 0\.0"),
+    (with_attribute(f"{KNEE}/origin", "rpy", "0 0 x"), r"joint\[@name='LKneePitch'\]/origin"),
+    (with_attribute(f"{KNEE}/origin", "xyz", "nan 0 0"), r"joint 'LKneePitch': <origin> must hold finite .* xyz \[nan"),
+    (
+        with_attribute("link[@name='LTibia']/inertial/origin", "xyz", "0 inf 0"),
+        r"link 'LTibia': <origin> must hold finite",
+    ),
+    (without("joint", "LKneePitch", "limit"), r"joint 'LKneePitch': <limit> must give effort and velocity"),
+    (with_attribute(f"{KNEE}/limit", "effort", "0"), r"joint 'LKneePitch': torque_limit_Nm must be > 0"),
+    (with_attribute(f"{KNEE}/axis", "xyz", "0 0 0"), r"joint 'LKneePitch': axis must be a unit vector"),
+    (with_attribute(f"{KNEE}/parent", "link", "tail"), r"joint 'LKneePitch': link 'tail' does not exist"),
+    (with_attribute(f"{KNEE}/child", "link", "RTibia"), r"link 'RTibia' already has a parent"),
+    (with_attribute(f"{KNEE}/parent", "link", "l_ankle"), r"joint 'LKneePitch' is part of a ring of joints"),
+    (with_attribute(f"{KNEE}/child", "link", "torso"), r"exactly one link must have no parent, got LTibia|ring|none"),
+    (with_attribute(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' is there twice"),
+    (with_attribute("link[@name='LTibia']", "name", "RTibia"), r"link 'RTibia' is there twice"),
+    (with_attribute(KNEE, "type", "hinge"), "is no URDF of a robot"),
+]
+
+
+@pytest.mark.parametrize(("damage", "message"), DAMAGES, ids=[message[:40] for _, message in DAMAGES])
+def test_what_is_wrong_with_a_urdf_is_said(
+    tmp_path: Path, damage: Callable[[ElementTree.Element], None], message: str
+) -> None:
+    tree = as_urdf(nao())
+    damage(tree)
+    with pytest.raises(RobotDataError, match=message):
+        load_robot(stored(tmp_path, tree))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is not valid XML"),
+        ("<robot name='a'><link name='b'>", "is not valid XML"),
+        ("<mujoco/>", "is no URDF of a robot"),
+        ("<robot name='a'/>", "exactly one link must have no parent, got none"),
+    ],
+    ids=["empty", "cut off", "another format", "no link"],
+)
+def test_what_is_no_urdf_is_said(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(RobotDataError, match=message):
+        load_robot(stored(tmp_path, text))
+
+
+def test_a_missing_urdf_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotDataError, match=r"nowhere\.urdf' cannot be read"):
+        load_robot(written(tmp_path, partner(nao(), "nowhere.urdf")))
+
+
+LAUGHS = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 12))
+ENTITIES = {
+    "another file": ('<!ENTITY e SYSTEM "secret.txt">', "&e;"),
+    "another file in an attribute": ('<!ENTITY e SYSTEM "secret.txt">', "<link name='&e;'/>"),
+    "own": ('<!ENTITY e "1.0">', "<link name='&e;'/>"),
+    "definitions from elsewhere": ('<!ENTITY % e SYSTEM "evil.dtd"> %e;', ""),
+    "a billion laughs": (f'<!ENTITY l0 "ha">{LAUGHS}', "<link name='&l11;'/>"),
+}
+
+
+@pytest.mark.parametrize(("definition", "use"), ENTITIES.values(), ids=ENTITIES.keys())
+def test_entities_are_refused_unread(tmp_path: Path, definition: str, use: str) -> None:
+    (tmp_path / "secret.txt").write_text("hunter2")
+    text = ElementTree.tostring(as_urdf(nao()), encoding="unicode").replace("</robot>", f"{use}</robot>")
+    with pytest.raises(
+        RobotDataError, match="must not have a DOCTYPE or entities|is not valid XML: .*[Ee]ntit"
+    ) as error:
+        load_robot(stored(tmp_path, f"<!DOCTYPE robot [{definition}]>{text}"))
+    assert "hunter2" not in str(error.value)
+
+
+def test_a_urdf_alone_is_answered_with_the_robot_file_to_write(tmp_path: Path) -> None:
+    path = stored(tmp_path, as_urdf(nao()))
+    (tmp_path / "robot.json").unlink()
+    with pytest.raises(
+        RobotDataError, match=r"says nothing about soles; write '.*robot\.json' with \{\"schema\": 1, .*feet"
+    ):
+        load_robot(path)
+
+
+def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
+    path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
+    with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', beside which it lies"):
+        load_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ({"LKneePitch": "left_knee"}, r"unknown joint in joint_names of .*robot\.json' 'left_knee'"),
+        ({"RKneePitch": "LKneePitch"}, "joint_names gives 'RKneePitch' to 'LKneePitch', but that name is taken"),
+        (["LKneePitch"], r"'joint_names' must be an object, got \['LKneePitch'\]"),
+        ({"LKneePitch": 3}, r"unknown joint in joint_names of .*robot\.json' '3'"),
+    ],
+)
+def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object, message: str) -> None:
+    with pytest.raises(GaitError, match=message):
+        load_robot(stored(tmp_path, as_urdf(nao()), partner(nao(), "robot.urdf", joint_names=names)))
+
+
+def test_without_the_extra_its_name_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(urdf, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r"need the package urdf-parser-py.*pip install 'nlp-gait\[urdf\]'"):
+        urdf_record(stored(tmp_path, as_urdf(nao())))

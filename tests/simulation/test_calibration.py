@@ -1,0 +1,30 @@
+"""Random feasible gaits against the engine."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+import nlp_gait  # noqa: E402
+from compare.judge import evaluate  # noqa: E402
+from nlp_gait.errors import InputError  # noqa: E402
+from nlp_gait.simulation.calibration import calibrate, random_gait  # noqa: E402
+
+
+def test_gaits_are_feasible_seeded_and_go_from_slow_to_fast():
+    problem = nlp_gait.load("nao-dsp")
+    cases = list(calibrate(problem, shortest_s=1.5, count=2, seed=3))
+    assert [case.duration_s for case in cases] == pytest.approx([2.0, 1.5])
+    for case in cases:
+        assert case.result.x[-1] == pytest.approx(case.duration_s)
+        assert evaluate(problem, case.result.x).feasible
+        assert case.smooth.power_error != case.measurements.power_error
+        assert abs(case.smooth.power_error) < 0.3
+    again = random_gait(problem, "double_support_time_s", 2.0, np.random.default_rng(3))
+    np.testing.assert_array_equal(again.x, cases[0].result.x)
+
+
+def test_a_duration_without_feasible_gaits_is_an_error(monkeypatch):
+    monkeypatch.setattr("nlp_gait.simulation.calibration.DRAWS", 1)
+    with pytest.raises(InputError, match=r"none of 2000 .* double_support_time_s = 0.2"):
+        random_gait(nlp_gait.load("nao-dsp"), "double_support_time_s", 0.2, np.random.default_rng(0))

@@ -1,0 +1,34 @@
+"""Two independent implementations of rigid-body dynamics agree."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from nlp_gait.simulation.inverse_dynamics import engine_torques  # noqa: E402
+
+# Both are double precision; what remains is rounding.
+AGREEMENT_NM = 1e-9
+
+
+@pytest.mark.parametrize("name", ["ssp optimum", "ssp ga", "dsp optimum", "dsp pso"])
+@pytest.mark.parametrize("options", [{}, {"robot": "nao-v6"}])
+def test_engine_and_model_need_the_same_torques(gait, name, options):
+    result = gait(name, **options)
+    signals = result.problem.signals(result.x, result.problem.p)
+    assert np.abs(signals.arrays["tau"]).max() > 1.0
+    np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
+
+
+def test_lever_rule_and_fast_motion(gait):
+    result = gait("dsp optimum", torso_share="lever")
+    result.x[-1] = 0.3  # accelerations fifty times as large
+    signals = result.problem.signals(result.x, result.problem.p)
+    np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
+
+
+def test_a_wrong_mass_is_noticed(gait):
+    """The oracle is not blind: another robot's torques differ by far more than rounding."""
+    v5, v6 = gait("ssp optimum"), gait("ssp optimum", robot="nao-v6")
+    signals = v5.problem.signals(v5.x, v5.problem.p)
+    assert np.abs(engine_torques(v6, signals) - signals.arrays["tau"]).max() > 1e-3

@@ -1,0 +1,95 @@
+"""The generated model: masses, limits, shapes."""
+
+import sys
+import xml.etree.ElementTree as Xml
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import InputError, MissingExtraError
+from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS
+from nlp_gait.robots import load_robot
+from nlp_gait.robots.tree import weld
+from nlp_gait.simulation.conditions import Conditions
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.mjcf import free_model
+from nlp_gait.simulation.shapes import Prism, link_shapes
+
+NAO = load_robot("nao-v5")
+
+
+def test_stall_and_continuous_limits_come_from_motor_and_gear():
+    knee = NAO.joint("LKneePitch")
+    assert Drive(torque_limits="urdf").torque_limit(knee) == 3.023
+    assert Drive(torque_limits="stall").torque_limit(knee) == pytest.approx(130.85 * 0.065)
+    assert Drive(torque_limits="continuous").torque_limit(knee) == pytest.approx(130.85 * 0.0178)
+    assert Drive(full_error_rad=0.1).stiffness(knee) == pytest.approx(85.05, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Drive(torque_limits="peak"), "urdf, stall, continuous, got 'peak'"),
+        (lambda: Drive(period_s=0.0), "period_s of a drive must be > 0"),
+        (lambda: Drive(full_error_rad=float("nan")), "full_error_rad"),
+        (lambda: Conditions(friction=-1.0), "friction must be > 0, got -1.0"),
+        (lambda: Conditions(slope_rad=(2.0, 0.0)), "slope_rad"),
+        (lambda: link_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),
+    ],
+)
+def test_bad_settings_are_refused(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_soles_are_the_papers_rectangle_or_the_true_outline():
+    rectangle, polygon = ((link_shapes(NAO, sole)["l_ankle"][-1]) for sole in ("rectangle", "polygon"))
+    assert isinstance(rectangle, Prism) and rectangle.bottom == -0.04519
+    assert sorted(rectangle.outline) == [(-0.05, -0.04), (-0.05, 0.04), (0.1, -0.04), (0.1, 0.04)]
+    assert len(polygon.outline) == 20
+
+
+def test_shapes_of_a_welded_head_move_to_the_torso():
+    shapes = link_shapes(NAO, welded=HEAD_JOINTS)
+    assert "Head" not in shapes and "Neck" not in shapes
+    assert any(shape.start == shape.end and shape.start[2] > 0.15 for shape in shapes["torso"])
+
+
+def test_the_engine_reads_our_masses_to_the_last_digit():
+    engine = pytest.importorskip("mujoco")
+    robot = weld(NAO, HEAD_JOINTS)
+    model = engine.MjModel.from_xml_string(free_model(robot, link_shapes(NAO, welded=HEAD_JOINTS), Drive(), GRAVITY))
+    assert model.body_mass.sum() == pytest.approx(5.30535, abs=1e-12)
+    for name, link in robot.links.items():
+        body = model.body(name)
+        assert body.mass[0] == link.mass_kg and tuple(body.ipos) == link.com_m
+        principal = np.linalg.eigvalsh(_tensor(link))
+        np.testing.assert_allclose(sorted(body.inertia), principal, rtol=1e-9)
+    for name, joint in robot.joints.items():
+        assert tuple(model.joint(name).range) == joint.limits_rad
+    assert model.opt.gravity.tolist() == [0.0, 0.0, -9.8]
+
+
+def test_the_document_is_well_formed_without_the_engine():
+    root = Xml.fromstring(free_model(NAO, link_shapes(NAO), Drive(), GRAVITY, friction=0.5))
+    assert len(root.findall(".//joint")) == len(NAO.joints) and len(root.findall(".//freejoint")) == 1
+    assert len(root.findall("./actuator/position")) == len(NAO.joints)
+    assert root.find("./default/geom").get("friction").startswith("0.5 ")
+
+
+def test_slope_tilts_gravity():
+    down = np.array(Conditions(slope_rad=(0.1, 0.0)).gravity(9.8))
+    assert np.linalg.norm(down) == pytest.approx(9.8)
+    assert np.arctan2(-down[0], -down[2]) == pytest.approx(0.1) and down[1] == 0.0
+
+
+def test_without_the_extra_one_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[sim\]'"):
+        mujoco()
+
+
+def _tensor(link):
+    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])

@@ -1,0 +1,150 @@
+"""Gaits played in the engine."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from nlp_gait.simulation.conditions import Conditions, Push  # noqa: E402
+from nlp_gait.simulation.drive import Drive  # noqa: E402
+from nlp_gait.simulation.measurements import measure  # noqa: E402
+from nlp_gait.simulation.plan import plan_of  # noqa: E402
+from nlp_gait.simulation.playback import play  # noqa: E402
+from nlp_gait.simulation.robustness import DIRECTIONS, robustness  # noqa: E402
+
+ONE_NEWTON_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def played(gait):
+    """Plan, trace and measurements by gait, each simulated once."""
+    found = {}
+
+    def get(name):
+        if name not in found:
+            plan = plan_of(gait(name))
+            trace = play(plan)
+            found[name] = (plan, trace, measure(plan, trace, Drive()))
+        return found[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", ["ssp optimum", "ssp pso", "ssp ga", "dsp optimum", "dsp pso", "dsp ga"])
+def test_published_gaits_and_optima_stay_up(played, name):
+    plan, trace, m = played(name)
+    assert not m.fallen and m.fell_at_s is None
+    assert m.largest_tilt_deg < 3.0
+    assert m.tracking_max_rad < 0.03
+    assert m.slip_m < 0.006
+    assert m.joint_limits == ()
+    assert trace.t[-1] == pytest.approx(plan.duration_s + 1.0, abs=0.002)
+
+
+def test_the_measured_power_is_the_predicted_one_and_keeps_the_order(played):
+    optimum, pso, ga = (played(f"ssp {name}")[2] for name in ("optimum", "pso", "ga"))
+    assert optimum.measured.mechanical_W == pytest.approx(optimum.predicted.mechanical_W, rel=0.10)
+    assert optimum.measured.mechanical_W < pso.measured.mechanical_W < ga.measured.mechanical_W
+    assert optimum.measured.total_W < pso.measured.total_W < ga.measured.total_W
+    assert optimum.predicted.total_W == pytest.approx(0.846, abs=0.002)
+
+
+def test_the_swing_foot_lands_where_planned(played):
+    landing = played("ssp optimum")[2].landings["right"]
+    assert landing.planned_m == pytest.approx((0.12, -0.05))
+    assert landing.error_m < 0.010
+    assert played("dsp optimum")[2].landings == {}
+
+
+def test_pressure_follows_the_planned_zmp(played):
+    """Within the drive's compliance: stiffer servos come closer (docs/simulation.md)."""
+    m = played("ssp optimum")[2]
+    assert m.pressure_rms_m < 0.007
+    assert m.pressure_middle_rms_m < 0.0055
+    assert m.pressure_rms_m < m.pressure_raw_rms_m
+    assert played("dsp optimum")[2].pressure_middle_rms_m < 0.0025
+
+
+def test_the_floor_carries_the_robot(played):
+    plan, trace, _ = played("ssp optimum")
+    resting = trace.t > trace.t[-1] - 0.1
+    assert trace.loads[resting].sum(axis=1).mean() == pytest.approx(plan.robot.mass_kg * plan.gravity, rel=0.01)
+    middle = np.abs(trace.t - 2.0) < 0.2
+    assert (trace.loads[middle, 1] == 0.0).all()  # the right foot swings
+
+
+def test_an_infeasible_gait_falls_and_is_reported(gait):
+    plan = plan_of(gait("ssp falling"))
+    sole_edge = 0.05 + plan.robot.feet["left"].left_m
+    assert plan.signals.arrays["zmp"][:, 1].max() > sole_edge
+    trace = play(plan)
+    m = measure(plan, trace, Drive())
+    assert m.fallen and 0.5 < m.fell_at_s < 5.0
+    assert m.largest_tilt_deg > 45.0
+    assert m.to_json()["fallen"] is True
+
+
+def test_twice_the_same_numbers(played):
+    plan, first, m = played("dsp optimum")
+    second = play(plan)
+    for field in dataclasses.fields(first):
+        np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name), err_msg=field.name)
+    assert measure(plan, second, Drive()) == m
+
+
+def test_a_push_moves_and_a_strong_one_fells(played):
+    plan, _, m = played("dsp optimum")
+    pushed = play(plan, Conditions(push=Push(impulse_Ns=(ONE_NEWTON_S, 0.0))))
+    assert pushed.fell_at_s is None
+    assert math.degrees(pushed.tilt.max()) > m.largest_tilt_deg + 0.5
+    assert play(plan, Conditions(push=Push(impulse_Ns=(0.0, 10 * ONE_NEWTON_S)))).fell_at_s is not None
+
+
+def test_slope_friction_and_mass_change_the_world(played):
+    plan, flat, _ = played("dsp optimum")
+    assert play(plan, Conditions(slope_rad=(math.radians(35.0), 0.0))).fell_at_s is not None
+    slippery = play(plan, Conditions(friction=0.02, slope_rad=(math.radians(4.0), 0.0)))
+    assert slippery.feet[-1, 0, 0] < flat.feet[-1, 0, 0] - 0.05  # slides down, that is backward
+    heavy = play(plan, Conditions(mass_factor=1.1))
+    weight = plan.robot.mass_kg * plan.gravity
+    assert heavy.loads[-200:].sum(axis=1).mean() == pytest.approx(1.1 * weight, rel=0.01)
+
+
+def test_torque_limits_are_named_and_hold(played):
+    plan = played("ssp optimum")[0]
+    drive = Drive(torque_limits="continuous")
+    trace = play(plan, drive=drive)
+    m = measure(plan, trace, drive)
+    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
+    assert (np.abs(trace.torque) <= limits + 1e-9).all()
+    assert m.saturated and all(0.0 < share <= 1.0 for share in m.saturated.values())
+
+
+def test_polygon_soles_carry_too(played):
+    plan = played("dsp optimum")[0]
+    assert play(plan, sole="polygon").fell_at_s is None
+
+
+def test_robustness_finds_the_first_fall(played, monkeypatch):
+    """The sweep itself, against a fake robot that falls beyond known limits."""
+    from nlp_gait.simulation import robustness as module
+
+    class FakeTrace:
+        def __init__(self, fell):
+            self.fell_at_s = 1.0 if fell else None
+
+    def fake(plan, conditions, drive):
+        push = (0.0, 0.0) if conditions.push is None else conditions.push.impulse_Ns
+        fell = push[0] > 0.31 or push[1] < -0.12 or conditions.friction < 0.45 or conditions.mass_factor > 1.0
+        return FakeTrace(fell or conditions.slope_rad[0] > math.radians(2.2))
+
+    monkeypatch.setattr(module, "play", fake)
+    found = robustness(played("dsp optimum")[0])
+    assert found.undisturbed
+    assert found.push_Ns == {"forward": 0.3, "backward": module.LARGEST_PUSH, "left": module.LARGEST_PUSH, "right": 0.1}
+    assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
+    assert [value for value, survived in found.friction.items() if not survived] == [0.3, 0.4]
+    assert found.mass_factor == {0.9: True, 1.1: False}
