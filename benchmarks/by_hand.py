@@ -11,9 +11,18 @@ import pinocchio as pin
 import nlp_gait
 from benchmarks.rows import Array
 from nlp_gait.problems.nao import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao_ssp import ARM_SWING, HIP_X, HIP_Y, MEAN_DBM, SUPPORT_XY, SWING_X, SWING_Y
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, inertia_matrix, tree_from
+
+# Gupta, Pratihar, Deb (2023), section 4.1 and Table 3 [m, rad].
+SUPPORT_XY, SWING_X, SWING_Y = (0.06, 0.05), (0.0, 0.12), -0.05
+HIP_X, HIP_Y, MEAN_DBM = (0.03, 0.09), 0.025, (0.05, 0.02)
+ARM_SWING = {
+    "LShoulderPitch": (2.0, 1.0),
+    "LElbowRoll": (-0.42, -0.64),
+    "RShoulderPitch": (1.0, 2.0),
+    "RElbowRoll": (0.64, 0.42),
+}
 
 
 def pinocchio_model(robot: Robot) -> tuple[pin.Model, list[int]]:
@@ -38,11 +47,12 @@ class ByHand:
     """Objective and violation, candidate by candidate.
 
     Attributes:
-        problem: the package's problem that it equals, for comparison.
+        problem: the package's problem that it equals, for comparison; names, lower and upper are its.
     """
 
     def __init__(self) -> None:
         self.problem = nlp_gait.load("nao-ssp", derivatives="finite-difference")
+        self.names, self.lower, self.upper = self.problem.names, self.problem.lower, self.problem.upper
         self.robot = nao("nao-v5", True)
         self.model, self.places = pinocchio_model(self.robot)
         self.data = self.model.createData()
@@ -50,7 +60,7 @@ class ByHand:
         self.foot = self.robot.feet["left"]
         self.foot_body = tree_from(self.robot, self.foot.link)[0]
         limits = [self.robot.joint(name).planning_limits_rad for name in JOINTS]
-        self.lower, self.upper = np.array(limits).T[:, :, None]
+        self.joint_lower, self.joint_upper = np.array(limits).T[:, :, None]
         self.legs = [JOINTS.index(name) for name in PLANNED_JOINTS]
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
@@ -63,16 +73,14 @@ class ByHand:
         q, reach = self.angles(x)
         qd = np.gradient(q, duration / 10, axis=1)
         qdd = np.gradient(qd, duration / 10, axis=1)
-        torque, zmp = np.empty_like(q), np.empty((2, q.shape[1]))
-        for k in range(q.shape[1]):
-            torque[:, k], zmp[:, k] = self.loads(q[:, k], qd[:, k], qdd[:, k])
+        torque, zmp = self.loads(q, qd, qdd)
         power = np.abs(torque * qd).sum(axis=0) + 0.025 * (torque**2).sum(axis=0)
         objective = np.trapezoid(power, dx=0.1)
         along, across = zmp[0], zmp[1]
         dbm_x = np.where(along < 0.0, along + self.foot.back_m, self.foot.front_m - along)
         dbm_y = np.minimum(self.foot.left_m - across, across + self.foot.right_m)
         legs = q[self.legs]
-        lower, upper = self.lower[self.legs], self.upper[self.legs]
+        lower, upper = self.joint_lower[self.legs], self.joint_upper[self.legs]
         excess = [np.maximum(np.maximum(lower - legs, legs - upper), 0.0).sum()]
         excess.append(np.maximum(np.abs(reach) - 0.99, 0.0).sum())
         excess.append(np.maximum(np.abs(np.diff(torque, axis=1)) - 1.2, 0.0).sum())
@@ -123,14 +131,18 @@ class ByHand:
         return start + s * (rate0 + s * (c2 + s * c3))
 
     def loads(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
-        """Torques (22,) and the ZMP (2,) relative to the support ankle at one instant."""
-        position, velocity, acceleration = (np.empty(self.model.nq) for _ in range(3))
-        position[self.places], velocity[self.places], acceleration[self.places] = q, qd, qdd
-        torque = pin.rnea(self.model, self.data, position, velocity, acceleration)
-        above = self.data.liMi[1].act(self.data.f[1])  # on all but the foot, about the ankle
-        weight = np.array([0.0, 0.0, self.foot_body.link.mass_kg * GRAVITY])
-        force = above.linear + weight
-        moment = above.angular + np.cross(self.foot_body.com_offset_m, weight)
+        """Torques (22, 11) and the ZMP (2, 11) relative to the support ankle."""
+        samples = q.shape[1]
+        states = np.empty((3, samples, self.model.nq))
+        states[:, :, self.places] = q.T, qd.T, qdd.T
+        torques, wrenches = np.empty((samples, self.model.nv)), np.empty((samples, 6))
+        for k in range(samples):
+            torques[k] = pin.rnea(self.model, self.data, *states[:, k])
+            # On all but the foot, about the ankle; the ankle's roll turns the moving axes.
+            wrenches[k] = self.data.liMi[1].act(self.data.f[1]).vector
+        foot = self.foot_body.link.mass_kg * GRAVITY
+        fx, fy, fz, mx, my, _ = wrenches.T
+        x, y, _ = self.foot_body.com_offset_m
+        mx, my, fz = mx + y * foot, my - x * foot, fz + foot
         height = self.foot.ankle_height_m
-        zmp = np.array([-(moment[1] + height * force[0]), moment[0] - height * force[1]]) / force[2]
-        return torque[self.places], zmp
+        return torques.T[self.places], np.array([-(my + height * fx), mx - height * fy]) / fz

@@ -68,4 +68,6 @@ def table(rows: list[Row]) -> str:
         verdict = {True: "ok", False: "MISSED", None: ""}[row.met]
         cells.append((row.name, f"{row.value:.4g} {row.unit}", *limits, verdict, row.note))
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells
+    )

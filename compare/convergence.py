@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.comparison import Comparison, SolverRuns
-from compare.figures import Look, looks, new_figure, style
+from compare.figures import Look, legend_below, logarithmic, looks, new_figure, style
 from compare.statistics.distribution import band
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def convergence_figure(comparison: Comparison) -> Figure:
     its runs are points, at what all their calls cost.
     """
     with style():
-        figure = new_figure(7.4, 3.1)
+        figure = new_figure(7.4, 2.8)
         for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
             for solver, look in zip(comparison.solvers, looks([s.name for s in comparison.solvers]), strict=True):
                 if all(len(c.gap) <= 1 for c in solver.curves):
@@ -35,12 +35,9 @@ def convergence_figure(comparison: Comparison) -> Figure:
                 else:
                     _draw_band(axes, solver, look, axis)
             axes.set_xlabel(AXES[axis])
-            axes.set_xscale("log")
-            axes.set_yscale("log")
+            logarithmic(axes, both=True)
         figure.axes[0].set_ylabel("gap to the best known [%]")
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        if handles:
-            figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5))
+        legend_below(figure)
     return figure
 
 
@@ -48,7 +45,7 @@ def _draw_ends(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
     ends = [(c.total(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
     label = f"{solver.name}, {len(ends)} of {len(solver.curves)} runs"
     cost, gap = np.array(ends).T if ends else (np.empty(0), np.empty(0))
-    axes.plot(cost, _shown(gap), look.marker, color=look.colour, label=label, markerfacecolor="none", clip_on=False)
+    axes.plot(cost, _shown(gap), look.marker, color=look.colour, label=label, markerfacecolor="none")
 
 
 def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
@@ -64,9 +61,7 @@ def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
     low, middle, high = band(costs, best_so_far, grid)
     known, whole = np.isfinite(middle), np.isfinite(high)
     axes.plot(grid[known], _shown(middle[known]), color=look.colour, linestyle=look.line, label=label)
-    axes.fill_between(
-        grid[whole], _shown(low[whole]), _shown(high[whole]), color=look.colour, alpha=0.15, linewidth=0
-    )
+    axes.fill_between(grid[whole], _shown(low[whole]), _shown(high[whole]), color=look.colour, alpha=0.15, linewidth=0)
 
 
 def _shown(gap: np.ndarray) -> np.ndarray:

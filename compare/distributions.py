@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.comparison import Comparison
 from compare.convergence import AXES, SMALLEST_GAP
-from compare.figures import looks, new_figure, style
+from compare.figures import legend_below, logarithmic, looks, new_figure, style
 from compare.statistics.distribution import ECDF_TARGETS, ecdf, performance_profile
 from compare.statistics.run_length import TARGETS
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def ecdf_figure(comparison: Comparison) -> Figure:
     """Share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
     with style():
-        figure = new_figure(7.4, 3.1)
+        figure = new_figure(7.4, 2.8)
         names = [solver.name for solver in comparison.solvers]
         for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
             ends = [c.total(axis) for s in comparison.solvers for c in s.curves]
@@ -31,11 +31,11 @@ def ecdf_figure(comparison: Comparison) -> Figure:
                 if at.size:
                     at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
                 axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=solver.name)
-            axes.set_xscale("log")
+            logarithmic(axes)
             axes.set_xlabel(AXES[axis])
             axes.set_ylim(0.0, 1.02)
         figure.axes[0].set_ylabel("share of runs and targets")
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(len(names), 6))
+        legend_below(figure)
     return figure
 
 
@@ -51,15 +51,22 @@ def final_gap_figure(comparison: Comparison) -> Figure:
             gaps = np.array([(cost - reference) / unit for cost in solver.costs])
             known = np.isfinite(gaps)
             shown = 100.0 * np.maximum(gaps[known], SMALLEST_GAP)
-            axes.plot(shown, np.full(shown.size, row), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8)
+            axes.plot(
+                shown, np.full(shown.size, row), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8
+            )
             if known.any():
                 axes.plot(np.median(shown), row, "|", color=look.colour, markersize=16, markeredgewidth=2)
             missing = int((~known).sum())
             if missing:
                 axes.annotate(
-                    f"{missing} infeasible", (1.0, row), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8
+                    f"{missing} infeasible",
+                    (1.0, row),
+                    xycoords=("axes fraction", "data"),
+                    ha="right",
+                    va="center",
+                    fontsize=8,
                 )
-        axes.set_xscale("log")
+        logarithmic(axes)
         axes.set_xlabel("gap to the best known at the end [%], bars: medians")
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(len(names) - 0.5, -0.5)
@@ -69,21 +76,20 @@ def final_gap_figure(comparison: Comparison) -> Figure:
 def profile_figure(comparisons: Sequence[Comparison]) -> Figure:
     """Performance profile of expected running times over problems and targets, for solvers that ran on all of them."""
     with style():
-        figure = new_figure(4.6, 3.1)
-        axes = figure.subplots()
         costs = expected_costs(comparisons)
+        figure = new_figure(4.6, 2.8)
+        axes = figure.subplots()
         profile = performance_profile(costs)
         last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
         for (name, (factor, share)), look in zip(profile.items(), looks(list(profile)), strict=True):
             at, height = np.append(factor, last), np.append(share, share[-1] if share.size else 0.0)
             axes.step(at, height, where="post", color=look.colour, linestyle=look.line, label=name)
-        axes.set_xscale("log")
+        logarithmic(axes)
         axes.set_xlim(left=1.0)
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("factor of the cheapest solver's expected evaluations")
         axes.set_ylabel("share of problems and targets")
-        if costs:
-            figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        legend_below(figure)
     return figure
 
 

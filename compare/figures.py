@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,9 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from compare.storage import write_text
 from nlp_gait.errors import OutputError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # One colour for each solver in every figure (Okabe and Ito); others take those that are left in their order.
@@ -30,6 +33,7 @@ LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 # Ink of axes and text in figures inside a page: replaced by the page's own colour there.
 INK = "#000000"
+LEGEND_ROW_IN = 0.19
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,19 +46,17 @@ class Look:
 
 
 def looks(names: Sequence[str]) -> list[Look]:
-    """A look for each solver, different for all: known ones have their colour, a colour's second user another line."""
+    """A look for each solver, different for all: known ones first have their colour, a colour's second user another line."""
     used: Counter[str] = Counter()
-    found = []
-    for name in names:
-        base = name.split("+")[0]
-        colour = COLOURS.get(name) or COLOURS.get(base)
-        if colour is None:
-            free = [c for c in COLOURS.values() if c not in (COLOURS.get(other) for other in names)] or list(COLOURS.values())
-            colour = min(free, key=lambda c: used[c])
+    found: dict[str, Look] = {}
+    for name in sorted(names, key=lambda name: name not in COLOURS):
+        # A polished search shares its search's colour; what is unknown takes the least used one.
+        known = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
+        colour = known or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
         kind = used[colour]
         used[colour] += 1
-        found.append(Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)]))
-    return found
+        found[name] = Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)])
+    return [found[name] for name in names]
 
 
 @contextmanager
@@ -73,6 +75,39 @@ def new_figure(width_in: float = 6.3, height_in: float = 3.0) -> Figure:
     return Figure(figsize=(width_in, height_in))
 
 
+def legend_below(figure: Figure) -> None:
+    """Legend of the first axes below the figure, which grows by its height."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    if not labels:
+        return
+    letters = 14 * figure.get_figwidth()  # that fit beside each other at the legend's size
+    columns = max(1, min(len(labels), int(letters / (max(map(len, labels)) + 8))))
+    figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN * -(-len(labels) // columns))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def logarithmic(axes: Axes, both: bool = False) -> None:
+    """Make the x axis logarithmic, or both, with powers of ten as plain text: parsing mathematics takes most of the time."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    axes.set_xscale("log")
+    if both:
+        axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis) if both else (axes.xaxis,):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def power_of_ten(value: float) -> str:
+    """For example 10\u207b\u2076; plain from 0.1 to 1000."""
+    if 0.09 < value < 1001.0:
+        return f"{value:g}"
+    exponent = round(math.log10(value)) if value > 0.0 else 0
+    return "10" + str(exponent).translate(
+        str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+    )
+
+
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``<stem>.svg``; returns both paths.
 
@@ -80,32 +115,37 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
         OutputError: they cannot be written.
     """
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
+    write_text(paths[1], svg_text(figure))
+    figure.set_layout_engine("none")  # it stands; finding it again takes as long as drawing
     try:
         with style():
             figure.savefig(paths[0])
-            figure.savefig(paths[1], metadata={"Date": None})
     except OSError as error:
-        raise OutputError(f"cannot write {str(stem)!r}.png and .svg: {error.strerror}") from error
+        raise OutputError(f"cannot write {str(paths[0])!r}: {error.strerror}") from error
     return paths
 
 
-def inline_svg(figure: Figure, prefix: str, title: str) -> str:
-    """Figure as an SVG element for an HTML page: its ink takes the page's colour, its ids begin with the prefix.
-
-    Args:
-        figure: drawn in ``style()``.
-        prefix: letters and digits, unique in the page.
-        title: alternative text, plain letters.
-    """
+def svg_text(figure: Figure) -> str:
+    """Figure as an SVG file; equal figures give equal text."""
     text = io.StringIO()
     with style():
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg = text.getvalue()
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    return text.getvalue()
+
+
+def inline_svg(svg: str, prefix: str, title: str) -> str:
+    """SVG file as an element of an HTML page: without background, its ink in the page's colour.
+
+    Args:
+        svg: of ``svg_text``.
+        prefix: letters and digits, unique in the page, for ids.
+        title: alternative text, plain letters.
+    """
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'\bid="', f'id="{prefix}-', svg)
     svg = re.sub(r"url\(#", f"url(#{prefix}-", svg)
     svg = re.sub(r'href="#', f'href="#{prefix}-', svg)
-    svg = svg.replace(INK, "currentColor").replace("#d0d0d0", "var(--grid)")
+    svg = svg.replace("fill: #ffffff", "fill: none").replace(INK, "currentColor").replace("#d0d0d0", "var(--grid)")
     # Text without a fill is black by default, in a dark page too.
     return svg.replace("<svg ", f'<svg role="img" aria-label="{title}" fill="currentColor" ', 1)

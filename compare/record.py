@@ -81,7 +81,7 @@ class Verdict:
             indexes=evaluation.indexes,
             dense=evaluation.dense,
             dense_feasible=None if evaluation.dense is None else not evaluation.dense_violations,
-            violated=tuple(f"{row.name} by {row.violation:.3g} {row.unit}" for row in worst),
+            violated=tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
         )
 
     @classmethod
@@ -186,7 +186,14 @@ def _from_json(raw: Mapping[str, Any]) -> RunRecord:
     times = {name: _number(raw["time_s"][name], math.nan) for name in ("build", "compile", "solve", "objective")}
     values["history"] = history
     values["time_s"] = Times(**times, history=tuple(float(t) for t in raw["time_s"]["history"]))
-    for name, kind in (("problem", str), ("algorithm", str), ("status", str), ("run", int), ("seed", int), ("success", bool)):
+    for name, kind in (
+        ("problem", str),
+        ("algorithm", str),
+        ("status", str),
+        ("run", int),
+        ("seed", int),
+        ("success", bool),
+    ):
         if not isinstance(values[name], kind):
             raise TypeError(f"{name} must be {kind.__name__}, got {values[name]!r}")
     values["x"] = _numbers(raw["x"])

@@ -13,9 +13,7 @@ from compare.task import IPOPT, SLSQP, ProblemSpec, Task, check_task, solver_nam
 __all__ = ["IPOPT", "ProblemSpec", "Task", "attempt", "check_task", "run_task", "solver_names"]
 
 
-def run_task(
-    task: Task, start: RunRecord | None = None, observe: Callable[..., None] | None = None
-) -> RunRecord:
+def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., None] | None = None) -> RunRecord:
     """Do one run and judge it.
 
     Args:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from compare.task import IPOPT, GRADIENT_SOLVERS, Handling, ProblemSpec, Stop, Task
+from compare.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
 from nlp_gait.errors import InputError, unknown
 
 
@@ -84,7 +85,8 @@ class StudySettings:
         """As ``settings_from`` reads it."""
         return {
             "problem": [
-                {"name": p.name, "label": p.label, "options": dict(p.options), "set": dict(p.values)} for p in self.problems
+                {"name": p.name, "label": p.label, "options": dict(p.options), "set": dict(p.values)}
+                for p in self.problems
             ],
             "solver": [{key: v for key, v in asdict(s).items() if v is not None} for s in self.solvers],
             "runs": self.runs,
@@ -124,6 +126,10 @@ def settings_from(raw: Any, source: str) -> StudySettings:
         InputError: a value of the wrong kind or that is not allowed.
         UnknownNameError: a key that does not exist.
     """
+    try:
+        json.dumps(raw, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{source} may hold finite numbers, texts, lists and tables only: {error}") from error
     read = _Reader(source, "the study", raw)
     stop = {name: read.take(name, kind, None) for name, kind in STOP_KINDS.items()}
     handling = read.table("handling", {"name": "deb"})
@@ -166,6 +172,9 @@ def _solver(raw: Any, source: str) -> SolverSpec:
     return spec
 
 
+REQUIRED: Any = object()
+
+
 class _Reader:
     """Takes values out of a table; what is wrong or left over is an error that names it."""
 
@@ -176,17 +185,21 @@ class _Reader:
         self._raw = dict(raw)
         self._known: list[str] = []
 
-    def take(self, name: str, kind: type, default: Any = ..., at_least: int | None = None) -> Any:
+    def take(self, name: str, kind: type[Any], default: Any = REQUIRED, at_least: int | None = None) -> Any:
         """Value of a key; without a default it is needed."""
         self._known.append(name)
-        value = self._raw.pop(name, default)
-        if value is ...:
+        value: Any = self._raw.pop(name, default)
+        if value is REQUIRED:
             raise InputError(f"{self._where} needs {name!r}")
         if value is default:
             return value
         if kind is float and type(value) is int:
             value = float(value)
-        if type(value) is not kind or (at_least is not None and value < at_least):
+        if (
+            not isinstance(value, kind)
+            or isinstance(value, bool) != (kind is bool)
+            or (at_least is not None and value < at_least)
+        ):
             limit = "" if at_least is None else f" of at least {at_least}"
             raise InputError(f"{self._where}: {name} must be a {kind.__name__}{limit}, got {value!r}")
         return value

@@ -128,7 +128,9 @@ class _Functions:
         if key not in self._slopes:
             f, rows = self._at(z)
             step = np.where(z + STEP <= self.upper, STEP, -STEP)
-            step[self.upper - self.lower < STEP] = STEP  # a fixed variable moves nowhere in SLSQP; its slope is not used
+            step[self.upper - self.lower < STEP] = (
+                STEP  # a fixed variable moves nowhere in SLSQP; its slope is not used
+            )
             shifted_f, shifted_rows = self._evaluate(z + np.diag(step))
             self.gradients += 1
             self._slopes = {key: ((shifted_f - f) / step, ((shifted_rows - rows) / step[:, None]).T)}
@@ -160,4 +162,3 @@ class _Functions:
             self.best = found
         objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None
         self.history.append((self.calls, objective, time.perf_counter() - self.started))
-

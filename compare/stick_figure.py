@@ -34,6 +34,7 @@ def stick_figure(skeleton: Skeleton, times_s: Sequence[float]) -> Figure:
     with style():
         row_in = [min(WIDTH_IN / columns * height / width, 2.2) for width in widths.values()]
         figure = new_figure(WIDTH_IN, sum(row_in) + 1.3)
+        figure.set_layout_engine("compressed")  # equal scales leave gaps otherwise
         grid = figure.subplots(len(VIEWS), columns, sharey=True, squeeze=False, height_ratios=row_in)
         for row, (view, across) in zip(grid, VIEWS.items(), strict=True):
             for axes, time in zip(row, times_s, strict=True):

@@ -13,7 +13,7 @@ from compare.task import Task, check_task
 from compare.workers import default_jobs, run_jobs
 from nlp_gait.errors import InputError
 
-__all__ = ["Study", "default_jobs", "record_file", "run_study"]
+__all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
 
 RECORDS = "records"
 
@@ -43,7 +43,9 @@ class Study:
         files = Counter(record_file(Path(), task) for task in self.tasks)
         twice = next((file for file, count in files.items() if count > 1), None)
         if twice is not None:
-            raise InputError(f"two solvers of the study are called {twice.stem!r} on {twice.parent.name!r}: label them apart")
+            raise InputError(
+                f"two solvers of the study are called {twice.stem!r} on {twice.parent.name!r}: label them apart"
+            )
 
 
 def run_study(
@@ -65,8 +67,7 @@ def run_study(
         InputError: the folder holds another study.
         OutputError: the folder cannot be written to; found out before the first run.
     """
-    for task in {(t.problem.title, t.title): t for t in study.tasks}.values():
-        check_task(task)
+    check_study(study)
     records = _finished(study)
     if kept is not None:
         kept(len(records))
@@ -74,7 +75,10 @@ def run_study(
     for polishing in (False, True):
         waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
         waiting.sort(key=lambda i: _begins(study.tasks[i]))
-        jobs = [(task, records[by_key[_polished(task)]] if polishing else None) for task in (study.tasks[i] for i in waiting)]
+        jobs = [
+            (task, records[by_key[_polished(task)]] if polishing else None)
+            for task in (study.tasks[i] for i in waiting)
+        ]
         for position, record in run_jobs(jobs, study.jobs, study.scheduler):
             index = waiting[position]
             if study.folder is not None:
@@ -83,6 +87,12 @@ def run_study(
             if progress is not None:
                 progress(study.tasks[index], record)
     return [records[index] for index in range(len(study.tasks))]
+
+
+def check_study(study: Study) -> None:
+    """Raise now what would fail in every run of a solver; see ``check_task``."""
+    for task in {(t.problem.title, t.title): t for t in study.tasks}.values():
+        check_task(task)
 
 
 def record_file(folder: Path, task: Task) -> Path:

@@ -144,7 +144,7 @@ class Task:
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
         try:
-            return json.loads(json.dumps(parts))  # type: ignore[no-any-return]
+            return json.loads(json.dumps(parts, allow_nan=False))
         except (TypeError, ValueError) as error:
             raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
 
@@ -160,7 +160,9 @@ def check_task(task: Task) -> None:
     problem = task.problem.load()
     for title in (task.problem.title, task.title):
         if not LABEL.fullmatch(title):
-            raise InputError(f"a label has 1 to 64 letters, digits and . _ + : -, and begins with one of the former; got {title!r}")
+            raise InputError(
+                f"a label has 1 to 64 letters, digits and . _ + : -, and begins with one of the former; got {title!r}"
+            )
     if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
         raise unknown("algorithm", task.algorithm, solver_names())
     if task.algorithm == IPOPT:
@@ -192,7 +194,9 @@ def _checked_names(settings: Mapping[str, Any], known: Any, solver: str) -> Mapp
     names = tuple(known.__dataclass_fields__) if known is not None else ()
     for name in settings:
         if name not in names:
-            raise unknown(f"setting of {solver}", name, names) if names else InputError(
-                f"{solver} has no settings, got {name!r}"
+            raise (
+                unknown(f"setting of {solver}", name, names)
+                if names
+                else InputError(f"{solver} has no settings, got {name!r}")
             )
     return settings

@@ -42,7 +42,9 @@ def _found(comparison: Comparison) -> str:
 def _distance(comparison: Comparison) -> str:
     parts = []
     for solver in comparison.solvers:
-        gap = (solver.median_cost - comparison.objective.sign * comparison.reference) / (abs(comparison.reference) or 1.0)
+        gap = (solver.median_cost - comparison.objective.sign * comparison.reference) / (
+            abs(comparison.reference) or 1.0
+        )
         parts.append(f"{solver.name} {percent(gap) if math.isfinite(gap) else 'mostly infeasible'}")
     pairs = compare_pairs(comparison)
     different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)
@@ -62,5 +64,3 @@ def _cost(comparison: Comparison) -> str:
 
 def _listed(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + (" and " if parts else "") + "".join(parts[-1:])
-
-

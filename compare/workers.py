@@ -84,6 +84,8 @@ def _dask(address: str) -> AbstractContextManager[object]:
     try:
         stack.enter_context(Client(address, timeout="10s", set_as_default=True))
     except (OSError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at {address!r}: {error}; start one with `dask scheduler`") from error
+        raise InputError(
+            f"no Dask scheduler answers at {address!r}: {error}; start one with `dask scheduler`"
+        ) from error
     stack.enter_context(parallel_config(backend="dask"))
     return stack

@@ -29,8 +29,7 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
 """This package's own algorithms."""
 
 ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
-    {"cma": CmaEs, "de": DifferentialEvolution}
-    | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
+    {"cma": CmaEs, "de": DifferentialEvolution} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
 )
 """Those of other packages, which `pip install 'nlp-gait[algorithms]'` brings."""
 

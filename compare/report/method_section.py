@@ -29,7 +29,7 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
     return Section(
         title="Counting",
         text=(
-            "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1 and a "
+            "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1, a "
             "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints each on their own: what finite differences "
             "would cost, so gradient methods are never flattered. A gradient run is taken to reach its targets at its end. A "
             "polished run carries the whole cost of the search before it. Times are wall times of the solve, without building and "
@@ -49,7 +49,14 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
             seeds = f"{solver.records[0].seed} to {solver.records[-1].seed}"
             rows.append((comparison.problem, solver.name, seeds, _plain(settings)))
         problem = comparison.records[0].definition.get("problem", {})
-        rows.append((comparison.problem, "(problem)", "-", _plain({**problem.get("options", {}), **problem.get("parameters", {})})))
+        rows.append(
+            (
+                comparison.problem,
+                "(problem)",
+                "-",
+                _plain({**problem.get("options", {}), **problem.get("parameters", {})}),
+            )
+        )
     return Section(
         title="Settings and seeds", tables=(table(("problem", "solver", "seeds", "settings"), rows, prose=True),)
     )

@@ -40,11 +40,11 @@ def write_report(
 ) -> list[Path]:
     """Write ``report.html``, ``report.md`` and the figures as PNG and SVG; returns the paths of all files."""
     document = document_of(records, manifest, weighting)
+    files = [save(figure.drawing, folder / figure.name) for figure in _figures(document.sections)]
     pages = [folder / "report.html", folder / "report.md"]
-    write_text(pages[0], html(document))
+    write_text(pages[0], html(document, [svg.read_text(encoding="utf-8") for _, svg in files]))
     write_text(pages[1], markdown_page(document))
-    drawn = [path for figure in _figures(document.sections) for path in save(figure.drawing, folder / figure.name)]
-    return pages + drawn
+    return [*pages, *(path for pair in files for path in pair)]
 
 
 def document_of(records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING) -> Document:
@@ -69,18 +69,29 @@ def _over_problems(comparisons: Sequence[Comparison]) -> Section:
     return Section(title="Over all problems", figures=(figure,))
 
 
-def html(document: Document) -> str:
-    """One page without any other file; all text in it is escaped."""
+def html(document: Document, drawings: Sequence[str]) -> str:
+    """One page without any other file; all text in it is escaped.
+
+    Args:
+        document: what to show.
+        drawings: its figures as SVG files, in their order.
+    """
     environment = Environment(loader=PackageLoader("compare.report"), autoescape=True, undefined=StrictUndefined)
-    figures = _figures(document.sections)
-    svg = {figure.name: Markup(inline_svg(figure.drawing, f"f{i}", f"figure {i + 1}")) for i, figure in enumerate(figures)}
+    svg = {
+        figure.name: Markup(inline_svg(drawing, f"f{i}", f"figure {i}"))
+        for i, (figure, drawing) in enumerate(zip(_figures(document.sections), drawings, strict=True), start=1)
+    }
     return environment.get_template("report.html.j2").render(document=document, svg=svg)
 
 
 def markdown_page(document: Document) -> str:
     """Markdown with the figures' PNG files beside it."""
     environment = Environment(
-        loader=PackageLoader("compare.report"), autoescape=False, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("compare.report"),
+        autoescape=False,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["md"] = _literal
     text = environment.get_template("report.md.j2").render(document=document)

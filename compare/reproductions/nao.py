@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,10 @@ import metaheuristics
 import nlp_gait
 from compare.figures import save
 from compare.reproductions import nao_figures as figures
-from compare.reproductions.nao_findings import ALGORITHMS, Findings, PhaseFindings, Points, feasible_range
+from compare.reproductions.nao_findings import ALGORITHMS, Findings, PhaseFindings, Points, best_start, sweep_values
 from compare.reproductions.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W, PrintedPhase
 from compare.reproductions.nao_report import write_report
-from compare.reproductions.nao_runs import Run, read_points, search, solve, sweep
+from compare.reproductions.nao_runs import read_points, search, solve, sweep
 from compare.reproductions.parallel import Job, run_jobs
 from compare.reproductions.resume import fingerprint
 from compare.storage import writable_folder
@@ -23,7 +24,7 @@ from nlp_gait.problems.gait_problem import GaitProblem
 
 RUNS, EVALUATIONS, STARTS = 11, 10_000, 20
 LEVER_STARTS, SWEEP_STARTS = 5, 2
-SWEEP_POINTS = 21
+SWEEP_POINTS = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 LEVER = {"torso_share": "lever"}
 # Notes to `progress`: all jobs, and one for figures and report.
 STEPS = len(PHASES) * (2 * RUNS + STARTS) + LEVER_STARTS + 2 + sum(len(p.optima["pso"].x) for p in PHASES) + 1
@@ -44,7 +45,7 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     problems = {phase.problem: nlp_gait.load(phase.problem) for phase in PHASES}
     results = _run(folder, _first_jobs(folder, problems), progress)
     points = {phase.problem: _points(folder, phase) for phase in PHASES}
-    results |= _run(folder, _sweep_jobs(problems, points), progress)
+    results |= _run(folder, _sweep_jobs(problems, points, results), progress)
     ssp, dsp = (_phase(phase, problems[phase.problem], results, points[phase.problem]) for phase in PHASES)
     findings = Findings(
         ssp=ssp,
@@ -59,7 +60,7 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     write_report(folder, findings)
 
 
-def _run(folder: Path, jobs: list[Job], progress: Callable[[str], None]) -> dict[str, Run]:
+def _run(folder: Path, jobs: list[Job], progress: Callable[[str], None]) -> dict[str, Any]:
     return dict(zip((job.name for job in jobs), run_jobs(folder, jobs, progress), strict=True))
 
 
@@ -94,15 +95,18 @@ def _start_job(name: str, problem: str, seed: int, inputs: Mapping[str, object],
     return Job(name=name, inputs={**inputs, "seed": seed}, compute=solve, arguments=arguments)
 
 
-def _sweep_jobs(problems: Mapping[str, GaitProblem], points: Mapping[str, Mapping[str, Points]]) -> list[Job]:
+def _sweep_jobs(
+    problems: Mapping[str, GaitProblem], points: Mapping[str, Mapping[str, Points]], results: Mapping[str, Any]
+) -> list[Job]:
     """IPOPT over each variable's feasible range, over the paper's swing heights, and over durations."""
+    best = {name: best_start([results[f"{name}-ipopt-{k:02d}"] for k in range(STARTS)])["x"] for name in problems}
     ssp = problems[SSP.problem]
     jobs = [
         _sweep_job("table7-swing-heights", ssp, SWING_HEIGHT, list(SWING_POWER_W["pso"])),
         _sweep_job("durations", ssp, SSP.duration, list(DURATIONS_S)),
     ]
     return jobs + [
-        _sweep_job(f"{name}-sweep-x{i + 1}", problem, i, feasible_range(points[name], i, SWEEP_POINTS))
+        _sweep_job(f"{name}-sweep-x{i + 1}", problem, i, sweep_values(points[name], i, best[name][i], SWEEP_POINTS))
         for name, problem in problems.items()
         for i in range(len(problem.names))
     ]
@@ -137,7 +141,7 @@ def _points(folder: Path, phase: PrintedPhase) -> dict[str, Points]:
 
 
 def _phase(
-    paper: PrintedPhase, problem: GaitProblem, results: Mapping[str, Run], points: Mapping[str, Points]
+    paper: PrintedPhase, problem: GaitProblem, results: Mapping[str, Any], points: Mapping[str, Points]
 ) -> PhaseFindings:
     name = paper.problem
     return PhaseFindings(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.reproductions.nao_findings import ALGORITHMS, NAMES, Findings, PhaseFindings
+from compare.reproductions.nao_findings import ALGORITHMS, Findings, PhaseFindings
 from compare.reproductions.nao_paper import SWING_POWER_W, VELOCITY_RANGES, VelocityRange
 from compare.statistics.tests import a12
 
@@ -45,15 +45,17 @@ def claims(findings: Findings) -> list[Claim]:
 def _better(phase: PhaseFindings) -> Claim:
     pso, ga = phase.final_powers("pso"), phase.final_powers("ga")
     test, effect = phase.test, a12(pso, ga)
-    good = test.p_less < SIGNIFICANT
+    one_sided = "" if test.p_two_sided < SIGNIFICANT else ", significantly in the one-sided test only"
     lead = 100 * (np.median(ga) / np.median(pso) - 1)
     return Claim(
         section="5.3.1" if phase.paper.problem == "nao-ssp" else "5.3.2",
         text=f"PSO is better than GA in {phase.paper.title}",
-        verdict=f"holds in our model by {lead:.2f} % of the median power" if good else FAILS,
+        verdict=f"holds in our model by {lead:.2f} % of the median power{one_sided}"
+        if test.p_less < SIGNIFICANT
+        else FAILS,
         evidence=f"W = {test.rank_sum:.0f}, z = {test.z:.3f}, p = {test.p_two_sided:.3g} (two-sided), {test.p_less:.3g} "
         f"(left-tailed); A12 = {effect:.2f}: PSO wins {100 * effect:.0f} % of all pairs of runs. Medians {np.median(pso):.5f} W "
-        f"and {np.median(ga):.5f} W; IPOPT {phase.best:.5f} W, below every run of both",
+        f"and {np.median(ga):.5f} W; IPOPT {phase.best:.5f} W, the best of all runs {min(pso + ga):.5f} W",
     )
 
 
@@ -107,7 +109,7 @@ def _torque_change(phase: PhaseFindings, claimed: str) -> Claim:
         section="5.1.1",
         text=f"PSO's solution has a torque change {claimed} lower than GA's in single support",
         verdict=f"holds in our model by {100 * (1 - pso / ga):.0f} %" if pso < ga else FAILS,
-        evidence=f"medians over all runs {pso:.4f} Nm and {ga:.4f} Nm; torque change is not minimised, only limited to 1.2 Nm",
+        evidence=f"medians over all runs PSO {pso:.4f} Nm, GA {ga:.4f} Nm; nobody minimises it, it is only limited",
     )
 
 
@@ -134,30 +136,27 @@ def _swing_rise(findings: Findings) -> Claim:
         section="5.1.5",
         text=f"Beyond 0.024 m power rises steeply: at 0.028 m by {claimed[0]:.0f} % (PSO) and {claimed[1]:.0f} % (GA)",
         verdict=f"holds in our model by {true:.1f} %" if steep else FAILS,
-        evidence=f"the true price of 0.028 m is {true:.1f} % ({_swing_power(findings, 0.028):.5f} W); the printed rise is read off "
-        "search histories, which hold few and poor solutions there (see the table of swing heights)",
+        evidence=f"the true price of 0.028 m is {true:.1f} % ({_swing_power(findings, 0.028):.5f} W); the printed rise is read "
+        "off search histories, which hold few and poor solutions there (see the table of swing heights)",
     )
 
 
 def _velocity(findings: Findings, claimed: VelocityRange) -> Claim:
     phase = next(p for p in findings.phases if p.paper is claimed.phase)
-    names = [phase.problem.names[i] for i in claimed.variables]
-    final = [run["x"][i] for runs in phase.searches.values() for run in runs for i in claimed.variables]
-    optimum = [phase.optimum["x"][i] for i in claimed.variables]
-    inside = claimed.low <= min(*final, *optimum) and max(*final, *optimum) <= claimed.high
-    free = ", ".join(
-        f"{name} from {low:.4f} to {high:.4f} m/s"
-        for name, (low, high) in zip(
-            names, (phase.range_within(i, NEARLY_OPTIMAL) for i in claimed.variables), strict=True
-        )
-    )
+    symbols = [f"x{i + 1}" for i in claimed.variables]
+    optimum = np.array([phase.optimum["x"][i] for i in claimed.variables])
+    ends = np.array([[run["x"][i] for i in claimed.variables] for runs in phase.searches.values() for run in runs])
+    within = float(np.mean((claimed.low <= ends) & (ends <= claimed.high)))
+    good = bool(np.all((claimed.low <= optimum) & (optimum <= claimed.high)))
+    ranges = [phase.range_within(i, NEARLY_OPTIMAL) for i in claimed.variables]
+    named = zip(symbols, optimum, ranges, strict=True)
+    found = ", ".join(f"{name} = {best:.4f} ({low:.4f} to {high:.4f})" for name, best, (low, high) in named)
     return Claim(
         section=claimed.section,
-        text=f"The solutions of {phase.paper.title} have {' and '.join(names)} from {claimed.low:g} to {claimed.high:g} m/s",
-        verdict=HOLDS if inside else FAILS,
-        evidence=f"ends of all runs from {min(final):.4f} to {max(final):.4f} m/s; IPOPT "
-        + ", ".join(f"{value:.4f} m/s" for value in optimum)
-        + f"; on the sweep's grid less than {100 * NEARLY_OPTIMAL:.0f} % above the optimum: {free}",
+        text=f"In {phase.paper.title} the solutions have {' and '.join(symbols)} from {claimed.low:g} to {claimed.high:g} m/s",
+        verdict=f"holds in our model by {100 * within:.0f} % of the values at the ends of all runs" if good else FAILS,
+        evidence=f"IPOPT's optimum, and where it costs less than {100 * NEARLY_OPTIMAL:.0f} % more: {found} m/s; the runs end "
+        f"between {ends.min():.4f} and {ends.max():.4f} m/s, {100 * within:.0f} % of the values within the range",
     )
 
 
@@ -172,7 +171,8 @@ def _wider(findings: Findings) -> Claim:
         text="Double support leaves a wider range of sagittal velocities than single support",
         verdict=f"holds in our model by a factor of {dsp / ssp:.1f}" if dsp > ssp else FAILS,
         evidence=f"within {500 * NEARLY_OPTIMAL:.0f} % of the least power, start and end velocity may vary by "
-        f"{widths[1][0]:.3f} and {widths[1][1]:.3f} m/s in double support, {widths[0][0]:.3f} and {widths[0][1]:.3f} m/s in single",
+        f"{widths[1][0]:.3f} and {widths[1][1]:.3f} m/s in double support, {widths[0][0]:.3f} and {widths[0][1]:.3f} m/s in "
+        "single support",
     )
 
 
@@ -182,7 +182,7 @@ def _double_support(phase: PhaseFindings) -> Iterator[Claim]:
         section="5.2.1",
         text="GA's solution has a torque change 3 % lower than PSO's in double support",
         verdict=f"holds in our model by {100 * (1 - ga / pso):.0f} %" if ga < pso else FAILS,
-        evidence=f"medians over all runs {NAMES['pso']} {pso:.4f} Nm, {NAMES['ga']} {ga:.4f} Nm",
+        evidence=f"medians over all runs PSO {pso:.4f} Nm, GA {ga:.4f} Nm",
     )
     durations = phase.sweeps[phase.paper.duration]
     missing = [f"{point['at']:.2f} s" for point in durations if not point["feasible"]]

@@ -10,7 +10,7 @@ import numpy as np
 from compare.figures import COLOURS, new_figure, style
 from compare.labels import axis_label
 from compare.reproductions.nao_findings import ALGORITHMS, NAMES, Findings, PhaseFindings, Points
-from compare.reproductions.nao_paper import SWING_POWER_W
+from compare.reproductions.nao_paper import SWING_HEIGHT, SWING_POWER_W
 from compare.skeletons import skeleton_of
 from compare.stick_figure import stick_figure
 from nlp_gait.export.result import Result
@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAPER_COLOUR = "#E69F00"
-POWER_TICKS_W = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
+POWER_TICKS_W = (0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 # Points that fall into one cell of a panel look like one; the grid is finer than the print.
 CELLS = 400
 POSES_EVERY_S = {"nao-ssp": 1.0, "nao-dsp": 0.25}  # Fig. 20
 POSE_SAMPLES = 40
+READING_TOLERANCE_M = 5e-4  # within which a solution counts as having a swing height
 
 
 def all_figures(findings: Findings) -> Iterator[tuple[str, Figure]]:
@@ -61,7 +62,7 @@ def convergence_figure(phase: PhaseFindings) -> Figure:
             axes.set_xlabel("generation")
             _power_scale(axes)
             axes.legend()
-            axes.label_outer()
+        figure.axes[1].set_ylabel("")
     return figure
 
 
@@ -78,10 +79,8 @@ def scatter_figure(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
                 _envelope(axes, phase, position)
                 axes.set_xlabel(label)
                 _power_scale(axes)
-                axes.label_outer()
-                axes.tick_params(labelbottom=True)
-                axes.xaxis.label.set_visible(True)
-                axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=2, handletextpad=0.4)
+                axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=2, handletextpad=0.4)
+            row[1].set_ylabel("")
     return figure
 
 
@@ -137,7 +136,7 @@ def read_swing_powers(phase: PhaseFindings, algorithm: str, run: int | None) -> 
         run: one run; None for all.
     """
     heights = SWING_POWER_W[algorithm]
-    return [phase.points[algorithm].cheapest_near(7, height, 0.0005, run) for height in heights]
+    return [phase.points[algorithm].cheapest_near(SWING_HEIGHT, height, READING_TOLERANCE_M, run) for height in heights]
 
 
 def _relative(values: list[float]) -> Array:

@@ -10,12 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from compare.reproductions.nao_paper import PrintedPhase
-from compare.reproductions.nao_runs import Run, grid, judged, power_with_legs_twice
+from compare.reproductions.nao_runs import Run, judged, power_with_legs_twice
 from compare.statistics.rank_sum_normal import RankSum, rank_sum_normal
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 
 ALGORITHMS = ("pso", "ga")
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}
+FINE = 2001  # points at which a line between the points of a sweep is read
+# Solutions that cost at most this share more than the best one lie where IPOPT's line bends most.
+CHEAP = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +60,7 @@ class PhaseFindings:
     @cached_property
     def optimum(self) -> Run:
         """Best start of IPOPT."""
-        return min(self.starts, key=lambda start: (not start["success"], start["power_W"]))
+        return best_start(self.starts)
 
     @cached_property
     def converged(self) -> int:
@@ -98,9 +101,11 @@ class PhaseFindings:
         return rank_sum_normal(self.final_powers("pso"), self.final_powers("ga"))
 
     def range_within(self, position: int, share: float) -> tuple[float, float]:
-        """Values of a variable at which IPOPT's optimum costs at most a share more than the best, on the sweep's grid."""
-        good = [p["at"] for p in self.sweeps[position] if p["feasible"] and p["power_W"] <= self.best * (1 + share)]
-        return (min(good), max(good)) if good else (math.nan, math.nan)
+        """Least and greatest value of a variable at which IPOPT's line is at most a share above the best."""
+        at, power = self._line(position)
+        fine = np.linspace(at[0], at[-1], FINE)
+        good = fine[np.interp(fine, at, power) <= self.best * (1 + share)]
+        return (float(good.min()), float(good.max())) if len(good) else (math.nan, math.nan)
 
     @property
     def best(self) -> float:
@@ -112,12 +117,15 @@ class PhaseFindings:
 
         Between the points of the sweep the line is straight, so that it may cut off the inside of a curve.
         """
-        line = [p for p in self.sweeps[position] if p["feasible"]]
-        at, power = [p["at"] for p in line], [p["power_W"] for p in line]
-        if len(line) < 2:
-            return 0.0
+        at, power = self._line(position)
         below = [1 - (p.power_W / np.interp(p.x[:, position], at, power)).min() for p in self.points.values()]
         return max(0.0, *below)
+
+    def _line(self, position: int) -> tuple[Array, Array]:
+        """IPOPT's feasible optima over a variable: its values, ascending, and power [W]."""
+        line = [(p["at"], p["power_W"]) for p in self.sweeps[position] if p["feasible"]]
+        at, power = np.array(line).T
+        return at, power
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,7 +152,22 @@ class Findings:
         return self.ssp, self.dsp
 
 
-def feasible_range(points: Mapping[str, Points], position: int, count: int) -> list[float]:
-    """Values over the range of the feasible solutions that any algorithm evaluated."""
-    columns = [p.x[:, position] for p in points.values()]
-    return grid(min(float(c.min()) for c in columns), max(float(c.max()) for c in columns), count)
+def best_start(starts: Sequence[Run]) -> Run:
+    """Cheapest start of IPOPT that converged to a feasible point."""
+    return min(starts, key=lambda start: (not start["success"], start["power_W"]))
+
+
+def sweep_values(points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]) -> list[float]:
+    """Values of a variable for a sweep, ascending.
+
+    Args:
+        points: feasible solutions by algorithm.
+        position: of the variable in x.
+        optimum: value at IPOPT's optimum, which is one of them.
+        counts: how many over the whole range of the solutions, and how many over the range of the cheap ones.
+    """
+    values = np.concatenate([p.x[:, position] for p in points.values()])
+    power = np.concatenate([p.power_W for p in points.values()])
+    cheap = values[power <= (1 + CHEAP) * power.min()]
+    parts = [np.linspace(part.min(), part.max(), count) for part, count in zip((values, cheap), counts, strict=True)]
+    return np.unique(np.clip([*np.concatenate(parts), optimum], values.min(), values.max())).tolist()

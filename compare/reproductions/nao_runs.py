@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +14,7 @@ import nlp_gait
 from compare.judge import evaluate
 from nlp_gait.backends.continuation import solve_both_ways
 from nlp_gait.problems.gait_problem import Array, GaitProblem
-from nlp_gait.problems.nao import LEG_JOINTS
+from nlp_gait.problems.nao import PLANNED_JOINTS
 
 Run = dict[str, Any]
 
@@ -97,7 +96,7 @@ def judged(problem: GaitProblem, x: Sequence[float] | Array) -> Run:
 
 
 def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
-    """Power if the mechanical term of all leg joints counted twice [W]; see the remark in the report.
+    """Power if the mechanical term of the leg joints that move counted twice [W]; see the remark in the report.
 
     Raises:
         ValueError: the problem has no time histories.
@@ -105,7 +104,7 @@ def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
     if problem.signals is None:
         raise ValueError(f"{problem.name} has no time histories")
     signals = problem.signals(problem.check_x(x), problem.p)
-    legs = [i for i, joint in enumerate(signals.joints) if joint[1:] in ("HipYawPitch", *LEG_JOINTS)]
+    legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
     mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
     share = np.diff(signals.arrays["t"]) / signals.arrays["t"][-1]
     mean = float(np.sum(share * (mechanical[1:] + mechanical[:-1]) / 2))
@@ -123,8 +122,3 @@ def _write_points(path: Path, x: Array, power: Array) -> None:
     temporary = path.with_name(f".{path.name}.tmp.npz")
     np.savez_compressed(temporary, x=x, power_W=power)
     temporary.replace(path)
-
-
-def grid(low: float, high: float, count: int) -> list[float]:
-    """Values from low to high, both included and never exceeded by rounding."""
-    return [min(max(value, low), high) for value in np.linspace(low, high, count).tolist() if math.isfinite(value)]

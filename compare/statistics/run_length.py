@@ -40,7 +40,9 @@ class Weighting:
         """Weight of each kind of call for n variables."""
         second = (n + 1) * (n + 2) / 2
         defaults = {"f": 1.0, "g": 1.0, "gradient": n + 1.0, "jacobian": n + 1.0, "hessian": second}
-        return {kind: default if getattr(self, kind) is None else getattr(self, kind) for kind, default in defaults.items()}
+        return {
+            kind: default if getattr(self, kind) is None else getattr(self, kind) for kind, default in defaults.items()
+        }
 
     def equivalent(self, calls: Mapping[str, int], n: int) -> float:
         """Equivalent evaluations of counted calls."""

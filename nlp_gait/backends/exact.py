@@ -22,7 +22,7 @@ class ExactModel:
 
     Attributes:
         function: (x, p) to ``cost`` (sign * objective: what is minimised), ``violation`` (sum over all rows, each divided
-            by its scale), ``g`` (m,), and ``lower``, ``upper`` (m,), ``indexes``.
+            by its scale; NaN if a row is), ``g`` (m,), and ``lower``, ``upper`` (m,), ``indexes``.
         row_names: (m,) names of the constraint rows; the last n are the variables' bounds.
         row_units: (m,).
         row_scales: (m,) violation that counts as 1, in the row's unit.
@@ -42,7 +42,7 @@ def exact_model(problem: GaitProblem) -> ExactModel:
 
 
 def row_violations(problem: GaitProblem, x: Array) -> list[RowViolation]:
-    """Rows that the exact functions find violated at x by more than the tolerance, worst first."""
+    """Rows that the exact functions find violated at x by more than the tolerance, or NaN, worst first."""
     exact = exact_model(problem)
     _, _, g, lower, upper, _ = (np.array(value).ravel() for value in exact.function(x, problem.p))
     excess = np.maximum(np.maximum(lower - g, g - upper), 0.0)
@@ -55,8 +55,8 @@ def row_violations(problem: GaitProblem, x: Array) -> list[RowViolation]:
             violation=float(excess[i]),
             unit=exact.row_units[i],
         )
-        for i in np.argsort(-excess, kind="stable")
-        if excess[i] > FEASIBILITY_TOLERANCE
+        for i in np.argsort(-np.nan_to_num(excess, nan=np.inf), kind="stable")
+        if not excess[i] <= FEASIBILITY_TOLERANCE
     ]
 
 
@@ -84,7 +84,9 @@ def _build(problem: GaitProblem) -> ExactModel:
     units += [variable.unit for variable in problem.variables]
 
     g, lower, upper, scale = (ca.vertcat(*parts) for parts in (values, lowers, uppers, scales))
-    excess = ca.fmax(ca.fmax(lower - g, g - upper), 0)
+    # fmax takes the other argument for a NaN, and a NaN must not pass for feasible: it is neither above nor below a bound.
+    comparable = (g <= upper) + (g > upper)
+    excess = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable
     outputs = {
         "cost": problem.objective.sign * assembly.objective,
         "violation": ca.sum1(excess / scale),

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import re
-import tempfile
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.ipopt_installation import QUIET, linear_solver
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solution import Evaluations
 from nlp_gait.errors import InputError
@@ -109,9 +107,21 @@ class End:
     guess: Guess
 
     @property
+    def feasible(self) -> bool:
+        """Whether the exact functions find it feasible, with a finite cost."""
+        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
+
+    @property
     def success(self) -> bool:
         """Converged, and feasible for the exact functions."""
-        return self.return_status in CONVERGED and self.violation <= FEASIBILITY_TOLERANCE
+        return self.return_status in CONVERGED and self.feasible
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
+        if self.feasible:
+            return (0.0 if self.success else 1.0), self.cost
+        return 2.0, math.inf if math.isnan(self.violation) else self.violation
 
     @property
     def status(self) -> str:
@@ -133,9 +143,7 @@ class Ipopt:
     def __init__(self, model: NlpModel, settings: IpoptSettings) -> None:
         started = time.perf_counter()
         options: dict[str, Any] = {
-            "print_time": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
+            **QUIET,
             "ipopt.mu_strategy": "adaptive",
             "ipopt.tol": settings.tolerance,
             "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits by what IPOPT relaxes them
@@ -209,12 +217,12 @@ class Ipopt:
     def _bounds(self, problem: GaitProblem) -> dict[str, Array]:
         model = self.model
         lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-        free, ties = np.full(model.lifted, np.inf), np.zeros(model.lift_rows)
+        free = np.full(model.lifted, np.inf)
         return {
             "lbx": np.concatenate([(problem.lower - model.offset) / model.scale, -free]),
             "ubx": np.concatenate([(problem.upper - model.offset) / model.scale, free]),
-            "lbg": np.concatenate([lower, ties]),
-            "ubg": np.concatenate([upper, ties + np.inf]),
+            "lbg": np.concatenate([lower, np.zeros(len(model.tie_upper))]),
+            "ubg": np.concatenate([upper, model.tie_upper]),
         }
 
 
@@ -222,24 +230,6 @@ def ipopt_for(problem: GaitProblem, settings: IpoptSettings) -> Ipopt:
     """IPOPT for a problem, made once for all its copies."""
     settings = replace(settings, hessian=settings.hessian or problem.hessian)
     return problem.built(f"ipopt {settings}", lambda: Ipopt(nlp_model(problem), settings))
-
-
-@cache
-def linear_solver() -> str:
-    """Linear solver that IPOPT uses by default in this installation, read from its own log."""
-    x = ca.MX.sym("x")
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "ipopt.log"
-        options: dict[str, Any] = {
-            "print_time": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
-            "ipopt.output_file": str(log),
-            "ipopt.file_print_level": 5,
-        }
-        ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)(x0=1.0)
-        found = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")
-    return found.group(1) if found else "unknown"
 
 
 def _counts(stats: Mapping[str, int]) -> Evaluations:

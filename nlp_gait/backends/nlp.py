@@ -9,6 +9,7 @@ with x = default lower bound + z * default range. Samples are mapped, never unro
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -39,7 +40,7 @@ class NlpModel:
         row_bounds: function p -> (lower, upper) of the problem's rows.
         lift_start: function (z, p, width) -> s at the exact values.
         lifted: number of lifted variables.
-        lift_rows: number of rows that tie them.
+        tie_upper: upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0.
         smoothed: True if a jump was smoothed, so that the width matters.
         build_s: time it took to build [s].
     """
@@ -53,7 +54,7 @@ class NlpModel:
     row_bounds: ca.Function
     lift_start: ca.Function
     lifted: int
-    lift_rows: int
+    tie_upper: Array
     smoothed: bool
     build_s: float
 
@@ -83,7 +84,7 @@ def _build(problem: GaitProblem) -> NlpModel:
     bounds = ca.Function("row_bounds", [p], [lower, upper])
     cost = problem.objective.sign * assembly.objective
     row_names = tuple(name for constraint in assembly.constraints for name in constraint.row_names)
-    if ops.lifts:
+    if any(not lift.tight for lift in ops.lifts):
         _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds, row_names)
     lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
@@ -97,10 +98,15 @@ def _build(problem: GaitProblem) -> NlpModel:
         row_bounds=bounds,
         lift_start=_lift_start(ops.lifts, [z, p, width]),
         lifted=lifted.shape[0],
-        lift_rows=ties.shape[0],
+        tie_upper=_per_row(ops.lifts, lambda lift: 0.0 if lift.tight else np.inf),
         smoothed=ops.smoothed,
         build_s=time.perf_counter() - started,
     )
+
+
+def _per_row(lifts: list[Lift], value: Callable[[Lift], float]) -> Array:
+    """A number for each row of all lifts."""
+    return np.concatenate([np.zeros(0), *(np.full(lift.rows.shape[0], value(lift)) for lift in lifts)])
 
 
 def _lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
@@ -124,29 +130,39 @@ def _check_sense(
     """Lifting is exact only if moving a lifted variable away from its exact value never helps.
 
     Checked by the sign of the first derivatives of the cost, of each row and of the rows that define the other lifted
-    variables, at points inside the bounds.
+    variables, at points inside the bounds. A tight lift cannot move.
     """
+    loose = [i for i, lift in enumerate(lifts) if not lift.tight]
     variables = ca.vertcat(*(lift.variable for lift in lifts))
-    ties = ca.vertcat(*(lift.rows for lift in lifts))
-    away = np.concatenate([np.full(lift.variable.shape[0], 1.0 if lift.from_above else -1.0) for lift in lifts])
-    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(ca.vertcat(cost, values, ties), variables)])
+    columns = np.concatenate([np.full(lift.variable.shape[0], i) for i, lift in enumerate(lifts)])
+    away = np.concatenate([np.full(lifts[i].variable.shape[0], 1.0 if lifts[i].from_above else -1.0) for i in loose])
+    column_owner = columns[np.isin(columns, loose)]
+    outputs = ca.vertcat(cost, values, *(lift.rows for lift in lifts))
+    slopes = ca.Function(
+        "slopes", [inputs, variables], [ca.jacobian(outputs, ca.vertcat(*(lifts[i].variable for i in loose)))]
+    )
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
+    tight = _per_row(lifts, lambda lift: lift.tight) > 0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
-    hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), -np.ones(ties.shape[0])])
-    two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), np.zeros(ties.shape[0], dtype=bool)])
+    hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), tight - 1.0])
+    two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])
     # A lifted variable's own rows let it move away, by definition: they do not count.
-    row_owner = np.repeat(np.arange(len(lifts) + 1), [1 + len(lower), *(lift.rows.shape[0] for lift in lifts)])
-    column_owner = np.repeat(np.arange(len(lifts)) + 1, [lift.variable.shape[0] for lift in lifts])
-    foreign = row_owner[:, None] != column_owner
+    row_owner = np.repeat(np.arange(-1, len(lifts)), [1 + len(lower), *(lift.rows.shape[0] for lift in lifts)])
+    row, column = (np.array(part) for part in slopes.sparsity_out(0).get_triplet())
+    foreign = row_owner[row] != column_owner[column]
     for share in SENSE_POINTS:
         at = np.concatenate([np.full(len(problem.variables), share), problem.p, [1e-3]])
-        slope = foreign * np.array(slopes(at, np.zeros(len(away))))
-        helps = slope * away * hurts[:, None] < -SENSE_TOLERANCE
-        helps |= two_sided[:, None] & (np.abs(slope) > SENSE_TOLERANCE)
+        slope = foreign * np.array(slopes(at, np.zeros(len(columns))).nonzeros())
+        helps = slope * away[column] * hurts[row] < -SENSE_TOLERANCE
+        helps |= two_sided[row] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():
-            row = int(np.argwhere(helps)[0][0])
+            first = int(row[helps].min())
             where = (
-                "the objective" if row == 0 else "another abs or min" if row_owner[row] else f"row {row_names[row - 1]}"
+                "the objective"
+                if first == 0
+                else "another abs or min"
+                if row_owner[first] >= 0
+                else f"row {row_names[first - 1]}"
             )
             raise LiftedSenseError(
                 f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "

@@ -143,12 +143,12 @@ def _make(name: str, model: NlpModel) -> ca.Function:
 
 def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:
     lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    free, ties = np.full(model.lifted, np.inf), np.zeros(model.lift_rows)
+    free = np.full(model.lifted, np.inf)
     return {
         "lbx": np.concatenate([(problem.lower - model.offset) / model.scale, -free]),
         "ubx": np.concatenate([(problem.upper - model.offset) / model.scale, free]),
-        "lbg": np.concatenate([lower, ties]),
-        "ubg": np.concatenate([upper, ties + np.inf]),
+        "lbg": np.concatenate([lower, np.zeros(len(model.tie_upper))]),
+        "ubg": np.concatenate([upper, model.tie_upper]),
     }
 
 

@@ -38,8 +38,8 @@ def solve(
         progress: called after each start.
 
     Returns:
-        The best start that converged and is feasible for the exact functions; if none did, the least infeasible end point
-        with the rows that stand in the way.
+        The best start that converged and is feasible for the exact functions; if none did, the best feasible end point, and
+        if there is none, the least infeasible one with the rows that stand in the way.
 
     Raises:
         InputError: no start, or x0 or a fixed value that is not allowed.
@@ -86,14 +86,17 @@ def outcome_of(index: int, problem: GaitProblem, x0: Array, end: End) -> StartOu
 def solution_of(
     problem: GaitProblem, ipopt: Ipopt, ends: Sequence[End], outcomes: Sequence[StartOutcome], seed: int
 ) -> Solution:
-    """Solution from the ends of all starts: the cheapest that succeeded, else the least infeasible."""
-    best = min(ends, key=lambda end: (not end.success, end.cost if end.success else end.violation))
+    """Solution from the ends of all starts: the cheapest that succeeded, else that is feasible, else the least infeasible."""
+    best = min(ends, key=lambda end: end.rank)
     violations = row_violations(problem, best.x)
     status = best.status
     if not best.success:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
-        status = f"no start converged to a feasible point; the least infeasible one {best.status}"
+        status = f"no start converged; the best feasible one {best.status}"
+        if not best.feasible:
+            status = f"no start converged to a feasible point; the least infeasible one {best.status}"
         status += f"; in the way: {names}; relax these limits or widen the bounds" if names else ""
+        status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
     return Solution(
         problem=problem.name,
         options=dict(problem.options),

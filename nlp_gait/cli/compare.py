@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -60,14 +60,18 @@ def compare(
         str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
     ] = "pso,ga,aco",
     runs: Annotated[int, typer.Option(min=1, help="Runs of each search algorithm.")] = 11,
-    starts: Annotated[int, typer.Option(min=0, help="Starts of IPOPT and other gradient methods; each is one run.")] = 20,
+    starts: Annotated[
+        int, typer.Option(min=0, help="Starts of IPOPT and other gradient methods; each is one run.")
+    ] = 20,
     evaluations: Annotated[int, typer.Option(min=1, help="Budget of one search run.")] = 10_000,
     handling: Handle = "deb",
     penalty_weight: PenaltyWeight = None,
     target: Target = None,
     stagnation: Stagnation = None,
     time_limit: TimeLimit = None,
-    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each search's result, as solvers of their own.")] = False,
+    polish: Annotated[
+        bool, typer.Option("--polish", help="IPOPT from each search's result, as solvers of their own.")
+    ] = False,
     seed: Seed = 0,
     robot: Robot = None,
     intervals: Intervals = None,
@@ -95,7 +99,7 @@ def compare(
     from compare.report import write_report
     from compare.settings import read_settings
     from compare.storage import writable_folder
-    from compare.study import Study, default_jobs, run_study
+    from compare.study import Study, check_study, default_jobs, run_study
 
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
@@ -119,13 +123,14 @@ def compare(
             seed=seed,
         )
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
+    check_study(study)
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
         records = run_study(
             study,
             progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
-            kept=lambda count: [advance("kept from before") for _ in range(count)],
+            kept=lambda count: _advance_by(advance, count),
         )
     written = write_report(out, records, read_manifest(out))
     if as_json:
@@ -134,6 +139,11 @@ def compare(
     print_summaries(records)
     for path in written:
         stdout.print(f"wrote {path}", soft_wrap=True)
+
+
+def _advance_by(advance: Callable[[str], None], count: int) -> None:
+    for _ in range(count):
+        advance("kept from before")
 
 
 def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
@@ -154,9 +164,7 @@ def print_summaries(records: Sequence[RunRecord]) -> None:
         print_table(f"{comparison.problem}: judged by the exact functions", HEADER, rows)
 
 
-def _settings(
-    algorithms: str, problems: Sequence[ProblemSpec], runs: int, starts: int, polish: bool
-) -> StudySettings:
+def _settings(algorithms: str, problems: Sequence[ProblemSpec], runs: int, starts: int, polish: bool) -> StudySettings:
     """Study of IPOPT, unless it has no starts, and the named solvers."""
     from compare.settings import SolverSpec, StudySettings
     from compare.task import GRADIENT_SOLVERS, IPOPT

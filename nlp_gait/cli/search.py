@@ -106,7 +106,14 @@ def search(
     else:
         unit = loaded.objective.unit
         rows = [
-            (r.algorithm, str(r.run), str(r.seed), quantity(r.verdict.objective, unit), f"{r.verdict.violation:.3g}", r.status)
+            (
+                r.algorithm,
+                str(r.run),
+                str(r.seed),
+                quantity(r.verdict.objective, unit),
+                f"{r.verdict.violation:.3g}",
+                r.status,
+            )
             for r in records
         ]
         header = ("solver", "run", "seed", loaded.objective.name, "violation", "why it ended")

@@ -54,7 +54,7 @@ def simulate(
     from nlp_gait.simulation.playback import play
     from nlp_gait.simulation.robustness import robustness as sweep
 
-    mujoco()
+    mujoco(pictures=video is not None)
     if viewer and video is not None:
         fail("--viewer and --video exclude each other; film it in a second run")
     target = None if video is None else output_file(check_video_path(video))

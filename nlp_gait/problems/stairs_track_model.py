@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -35,8 +35,10 @@ EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
 CONTACTS = ("T", "S", "A", "S'", "T'")
 N = len(LINKS)
-# Constants of a rollout, with their sizes: gains, stair, ground, share of gravity, disturbance.
-CONSTANTS = {"kp": N, "kd": N, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
+# What a quantum is given beside the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated by it.
+GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
+TORSO = LINKS.index("UH")
 
 
 class Rollout(NamedTuple):
@@ -62,39 +64,46 @@ class ClosedLoop:
     Attributes:
         quanta: number of steps of the rollout.
         scheme: of the quantised dynamics.
+        gains: number of different K_p, and of different K_d: 1 or one for each link.
     """
 
     quanta: int
     scheme: Scheme
+    gains: int
 
-    def rollout(self, point: Point, kp: MX, kd: MX, ops: Nonsmooth) -> Rollout:
-        """States, torques and ZMP from gains kp, kd (9,) and the problem's parameters."""
+    def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
+        """States, torques and ZMP.
+
+        Args:
+            point: for the problem's parameters.
+            tuned: K_p (gains,), K_d (gains,) and the desired torso pitch.
+            ops: interpretation of what is not smooth.
+        """
         stair = stair_of(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
         desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
         constants = ca.vertcat(
-            kp,
-            kd,
             size,
             *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
             point["gravity_compensation"],
             point["disturbance_Nm"],
         )
         aims = desired[:, 1:] if self.scheme == "implicit" else desired[:, :-1]
-        inputs = ca.vertcat(aims, DM(times[None, :-1]), ca.repmat(constants, 1, self.quanta))
+        given = ca.vertcat(aims, DM(times[None, :-1]), ca.repmat(constants, 1, self.quanta))
+        inputs = given, ca.repmat(tuned, 1, self.quanta)
         initial = desired[:, 0]
-        states = ops.rollout(self.step, initial, inputs)
+        states = ops.rollout(self.step, initial, *inputs)
         before = ca.horzcat(initial, states[:, :-1])
         slope = ca.repmat(stair.rise / stair.tread, 1, self.quanta) * (DM(times[None, 1:]) < point["t2_s"])
-        torque, zmp = self._outcome.map(self.quanta)(before, states, inputs, slope)
+        torque, zmp = self._outcome.map(self.quanta)(before, states, *inputs, slope)
         return Rollout(desired[:, 1:], states, torque, zmp)
 
     @cached_property
     def step(self) -> ca.Function:
-        """(state (18,), input) to the state one quantum later; an input is aim (18,), time and constants."""
-        state, given, parts = _symbols()
+        """(state (18,), given, tuned) to the state one quantum later."""
+        state, inputs, parts = self._symbols()
         q, v = state
         found = points(load_biped().rods, q, SX(2, 1))
         motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, q)
@@ -107,25 +116,27 @@ class ClosedLoop:
             )
             for name in CONTACTS
         ]
-        control, aim, ground = _control(parts), State(parts["aim"][:N], parts["aim"][N:]), Ground(*ca.vertsplit(parts["ground"]))
+        control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
         if self.scheme == "implicit":
             acceleration = implicit_acceleration(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
         else:
             acceleration = explicit_acceleration(motion, state, control, aim, contacts, ground, disturbance)
         following = after(state, acceleration, QUANTUM)
-        return ca.Function("step", [ca.vertcat(*state), given], [ca.cse(ca.vertcat(*following))])
+        return ca.Function(
+            "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
+        )
 
     @cached_property
     def _outcome(self) -> ca.Function:
-        """(state, next state, input, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
-        state, given, parts = _symbols()
+        """(state, next state, given, tuned, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
+        state, inputs, parts = self._symbols()
         following = State(SX.sym("q_next", N), SX.sym("v_next", N))
         slope = SX.sym("slope")
         rods = load_biped().rods
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
         acted = following if self.scheme == "implicit" else state
-        torque = controller_torque(_control(parts), State(parts["aim"][:N], parts["aim"][N:]), acted, G)
+        torque = controller_torque(parts["control"], parts["desired"], acted, G)
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
@@ -139,21 +150,24 @@ class ClosedLoop:
             moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
         least = LEAST_LOAD * load_biped().mass_kg * GRAVITY
         zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
-        inputs = [ca.vertcat(*state), ca.vertcat(*following), given, slope]
-        return ca.Function("outcome", inputs, ca.cse([torque, zmp]))
+        return ca.Function(
+            "outcome",
+            [ca.vertcat(*state), ca.vertcat(*following), *inputs, slope],
+            ca.cse([torque, zmp]),
+            {"is_diff_in": [True, True, False, True, False]},
+        )
 
-
-def _symbols() -> tuple[State, SX, dict[str, SX]]:
-    """State, input, and the input's parts by name."""
-    sizes = {"aim": 2 * N, "time": 1, **CONSTANTS}
-    given = SX.sym("given", sum(sizes.values()))
-    ends = np.cumsum([0, *sizes.values()])
-    parts = {name: given[int(ends[i]) : int(ends[i + 1])] for i, name in enumerate(sizes)}
-    return State(SX.sym("q", N), SX.sym("v", N)), given, parts
-
-
-def _control(parts: dict[str, SX]) -> Controller:
-    return Controller(parts["kp"], parts["kd"], parts["gravity_share"])
+    def _symbols(self) -> tuple[State, list[SX], dict[str, Any]]:
+        """State, the inputs given and tuned, and what they hold by name, with controller and desired state."""
+        given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
+        ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
+        parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
+        kp, kd, torso = ca.vertsplit(tuned, [0, self.gains, 2 * self.gains, 2 * self.gains + 1])
+        each = N // self.gains
+        aim = parts.pop("aim")
+        parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), parts.pop("gravity_share"))
+        parts["desired"] = State(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
+        return State(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
 def _desired(ops: Nonsmooth) -> ca.Function:
@@ -170,5 +184,5 @@ def _desired(ops: Nonsmooth) -> ca.Function:
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
     passed = (time - starts) / plan.durations
     shares = ca.fmin(ca.fmax(passed, 0), 1)
-    now = (passed >= 0) * (passed < 1)
+    now = (passed >= 0) * ca.vertcat(passed[:3] < 1, 1)
     return ca.Function("desired", [time, given], [ca.cse(ca.vertcat(*pose(shares, now, given)))])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,3 +71,21 @@ def calibrate(
             measure(plan, play(plan, drive=each), each) for each in (drive, replace(drive, period_s=TIME_STEP))
         )
         yield Case(duration_s=value, result=result, measurements=coarse, smooth=smooth)
+
+
+def shortest_true_s(runs: Iterable[tuple[float, Measurements]], tolerance: float) -> float | None:
+    """Duration down to which the model holds: no gait that is as slow or slower falls or misses the power by more.
+
+    Args:
+        runs: duration [s] and measurements of every gait.
+        tolerance: largest relative error of the total power.
+
+    Returns:
+        The shortest such duration [s]; None if even the slowest gait does not hold.
+    """
+    shortest = None
+    for duration, m in sorted(runs, key=lambda run: -run[0]):
+        if m.fallen or abs(m.power_error) > tolerance:
+            break
+        shortest = duration
+    return shortest

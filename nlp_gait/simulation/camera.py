@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from typing import Any
 
 from nlp_gait.errors import OutputError
@@ -26,7 +27,7 @@ def filmed(
     Raises:
         OutputError: this machine has no way to draw off the screen.
     """
-    engine = mujoco()
+    engine = mujoco(pictures=True)
     steps_per_frame = max(1, round(1.0 / (frames_per_s * TIME_STEP)))
     frames: list[Frame] = []
     camera = _aimed(engine.MjvCamera())
@@ -57,27 +58,37 @@ def shown(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> Trace:
         OutputError: there is no display.
     """
     mujoco()
-    import mujoco.viewer as viewer
+    _require_display()
+    from mujoco import viewer
 
     window: Any = None
-    began = time.monotonic()
+    began = 0.0
 
     def follow(model: Any, data: Any) -> None:
-        nonlocal window
+        nonlocal window, began
         if window is None:
-            try:
-                window = viewer.launch_passive(model, data)
-            except Exception as error:  # whatever the window system raises
-                raise OutputError(f"no window can be opened ({error}); use --video FILE.gif instead") from error
+            window, began = viewer.launch_passive(model, data), time.monotonic()
             _aimed(window.cam)
-        window.sync()
-        time.sleep(max(0.0, data.time - (time.monotonic() - began)))
+        if window.is_running():  # closed by the user, the simulation goes on without it
+            window.sync()
+            time.sleep(max(0.0, data.time - (time.monotonic() - began)))
 
     try:
         return play(plan, conditions, drive, sole=sole, observe=follow)
     finally:
         if window is not None:
             window.close()
+
+
+def _require_display() -> None:
+    """Raise OutputError where no window can be opened: MuJoCo's viewer would end the whole process."""
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        ready = glfw.init()
+    if not ready:
+        raise OutputError("no window can be opened, for there is no display; use --video FILE.gif instead of --viewer")
 
 
 def _aimed(camera: Any) -> Any:
@@ -88,8 +99,11 @@ def _aimed(camera: Any) -> Any:
 
 def _renderer(engine: Any, model: Any) -> Any:
     try:
-        return engine.Renderer(model, HEIGHT, WIDTH)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the failure itself says enough
+            return engine.Renderer(model, HEIGHT, WIDTH)
     except Exception as error:  # whatever the graphics driver raises
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise OutputError(
-            f"pictures cannot be drawn off the screen ({error}); set MUJOCO_GL=egl or MUJOCO_GL=osmesa, whichever is installed"
+            f"pictures cannot be drawn off the screen ({reason}); set MUJOCO_GL=egl or MUJOCO_GL=osmesa, if installed"
         ) from error

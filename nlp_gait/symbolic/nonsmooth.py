@@ -45,13 +45,13 @@ class Nonsmooth(Protocol):
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Elementwise: ``below`` where switch < 0, else ``above``."""
 
-    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
-        """States (n, N) after each of N steps, ``step`` from (state (n, 1), input (m, 1)) to the next state.
+    def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
+        """States (n, N) after each of N steps.
 
         Args:
-            step: one step.
-            initial: (n, 1) state before the first.
-            inputs: (m, N), a column for each step.
+            step: from a state (n, 1) and a column of each input to the next state.
+            initial: (n, 1) state before the first step.
+            inputs: (m, N) each, a column for every step.
         """
 
 
@@ -86,9 +86,9 @@ class Exact:
         """A true jump, written without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
 
-    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
+    def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """One step after the other, in a loop at run time."""
-        return step.mapaccum(inputs.shape[1])(initial, inputs)
+        return step.mapaccum(inputs[0].shape[1])(initial, *inputs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,12 +155,12 @@ class Lifted:
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
 
-    def rollout(self, step: ca.Function, initial: MX, inputs: MX) -> MX:
+    def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """Multiple shooting: all states are variables, tied by one equation for each step."""
-        n, steps = initial.shape[0], inputs.shape[1]
+        n, steps = initial.shape[0], inputs[0].shape[1]
         states = MX.sym(f"states_{len(self.lifts)}", n * steps)
         path = ca.reshape(states, n, steps)
-        reached = step.map(steps)(ca.horzcat(initial, path[:, :-1]), inputs)
-        exact = step.mapaccum(steps)(initial, inputs)
+        reached = step.map(steps)(ca.horzcat(initial, path[:, :-1]), *inputs)
+        exact = step.mapaccum(steps)(initial, *inputs)
         self.lifts.append(Lift(variable=states, value=ca.vec(exact), rows=ca.vec(path - reached), tight=True))
         return path

@@ -166,12 +166,45 @@ def test_result_survives_pickling(algorithm: Algorithm) -> None:
 
 # At least three times the worst of 31 seeds after 5,000 evaluations. The grid has steps of a hundredth of the range,
 # and the operators of 2008 only recombine and mirror coordinates of the starting points: they are coarse by nature.
-SPHERE = {"pso": 1e-10, "ga": 1e-4, "aco": 1e-20, "aco-grid": 0.05, "ga-generational": 1e-3, "ga-goswami": 9.0,
-    "cma": 1e-10, "de": 1e-8, "pymoo:GA": 1e-3, "pymoo:PSO": 1e-6, "pymoo:NSGA2": 1e-3}
-ROSENBROCK = {"pso": 1e-5, "ga": 0.01, "aco": 1e-5, "aco-grid": 2.0, "ga-generational": 0.01, "ga-goswami": 3.0,
-    "cma": 1e-10, "de": 1e-8, "pymoo:GA": 0.03, "pymoo:PSO": 1e-3, "pymoo:NSGA2": 0.03}
-DISC = {"pso": 1e-3, "ga": 0.01, "aco": 1e-3, "aco-grid": 0.5, "ga-generational": 0.01, "ga-goswami": 0.7,
-    "cma": 1e-6, "de": 1e-6, "pymoo:GA": 0.01, "pymoo:PSO": 1e-3, "pymoo:NSGA2": 0.01}
+SPHERE = {
+    "pso": 1e-10,
+    "ga": 1e-4,
+    "aco": 1e-20,
+    "aco-grid": 0.05,
+    "ga-generational": 1e-3,
+    "ga-goswami": 9.0,
+    "cma": 1e-10,
+    "de": 1e-8,
+    "pymoo:GA": 1e-3,
+    "pymoo:PSO": 1e-6,
+    "pymoo:NSGA2": 1e-3,
+}
+ROSENBROCK = {
+    "pso": 1e-5,
+    "ga": 0.01,
+    "aco": 1e-5,
+    "aco-grid": 2.0,
+    "ga-generational": 0.01,
+    "ga-goswami": 3.0,
+    "cma": 1e-10,
+    "de": 1e-8,
+    "pymoo:GA": 0.03,
+    "pymoo:PSO": 1e-3,
+    "pymoo:NSGA2": 0.03,
+}
+DISC = {
+    "pso": 1e-3,
+    "ga": 0.01,
+    "aco": 1e-3,
+    "aco-grid": 0.5,
+    "ga-generational": 0.01,
+    "ga-goswami": 0.7,
+    "cma": 1e-6,
+    "de": 1e-6,
+    "pymoo:GA": 0.01,
+    "pymoo:PSO": 1e-3,
+    "pymoo:NSGA2": 0.01,
+}
 
 
 @pytest.mark.parametrize("name", ALL)

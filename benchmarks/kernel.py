@@ -1,0 +1,186 @@
+"""Rows about the kernel: against the virtual machine, CasADi's own C code, NumPy with Pinocchio, and the core's limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from casadi import DM, MX, SX, Function, vertcat
+
+import nlp_gait
+from benchmarks.by_hand import ByHand, pinocchio_model
+from benchmarks.floor import floor_s, operation_counts, operation_times
+from benchmarks.rows import Array, Row, ratio, side_by_side
+from nlp_gait.backends.compiler import find_compiler, native_lanes
+from nlp_gait.backends.derivatives import compiled_functions
+from nlp_gait.backends.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.native_kernel import NativeKernel
+from nlp_gait.problems import GaitProblem
+from nlp_gait.problems.nao import GRAVITY, JOINTS, nao
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.dynamics import newton_euler
+
+BATCH = 1000
+
+
+def candidates(problem: GaitProblem, count: int) -> Array:
+    """Uniform within the bounds, always the same."""
+    return np.random.default_rng(0).uniform(problem.lower, problem.upper, (count, len(problem.names)))
+
+
+def paths(rounds: int) -> list[Row]:
+    """The objective with its violation by every path, one core, batch 1000."""
+    problem = nlp_gait.load("nao-ssp")
+    kernel, X = kernel_of(problem), candidates(problem, BATCH)
+    objective = nlp_gait.compile_objective(problem, require_compiler=True, threads=1)
+    scalar = nlp_gait.compile_objective(problem, require_compiler=True, threads=1, lanes=1)
+    by_hand = ByHand()
+    machine = _with_violation(kernel, problem)
+    share = 20  # the slow paths get a part of the batch
+    few = X[: BATCH // share]
+    columns, parameters = few.T.copy(), np.repeat(problem.p[:, None], len(few), axis=1)
+    interpreted = machine.map(len(few))
+    (generated,) = compiled_functions([machine], optimise=True)
+    compiled = generated.map(len(few))
+    times = side_by_side(
+        {
+            "kernel": lambda: objective(X),
+            "scalar": lambda: scalar(X),
+            "machine": lambda: interpreted(columns, parameters),
+            "external": lambda: compiled(columns, parameters),
+            "by hand": lambda: by_hand(few),
+        },
+        rounds,
+    )
+    lanes = native_lanes()
+    counts, single = operation_counts(kernel.function, 11), operation_times(lanes)
+    measured = float(np.median(times["kernel"])) / BATCH
+    least = floor_s(counts, single, lanes)
+    transcendental = floor_s(counts, single, lanes, ("sin", "cos", "acos", "atan2"))
+    peak = lanes / single["multiply"]
+    return [
+        Row(
+            name="kernel, a candidate", value=measured * 1e6, unit="us", note=f"{lanes} lanes, batch {BATCH}, one core"
+        ),
+        Row(
+            name="against CasADi's virtual machine",
+            value=ratio(times["machine"], times["kernel"], share),
+            unit="x",
+            required=50,
+            ambition=70,
+        ),
+        Row(
+            name="against CasADi's C code, external with map",
+            value=ratio(times["external"], times["kernel"], share),
+            unit="x",
+            note="scalar, -O1, mapped serially",
+        ),
+        Row(name="against the same code with one lane", value=ratio(times["scalar"], times["kernel"]), unit="x"),
+        Row(
+            name="against NumPy and Pinocchio",
+            value=ratio(times["by hand"], times["kernel"], share),
+            unit="x",
+            required=100,
+            ambition=200,
+            note="pin.rnea sample by sample, the rest vectorised over samples",
+        ),
+        Row(
+            name="share of the derived floor",
+            value=least / measured,
+            unit="",
+            required=0.45,
+            ambition=0.7,
+            note=f"floor {least * 1e6:.2f} us: {counts['multiply']} products, {counts['divide'] + counts['sqrt']} quotients and "
+            f"roots, {transcendental * 1e6:.2f} us for {counts['atan2'] + counts['acos']} transcendental functions",
+        ),
+        Row(
+            name="operations a second",
+            value=counts["all"] / measured / 1e9,
+            unit="G/s",
+            note=f"{counts['all']} instructions a candidate; peak of the core {peak / 1e9:.1f} G products/s",
+        ),
+    ]
+
+
+def _with_violation(kernel: Kernel, problem: GaitProblem) -> Function:
+    """Cost and violation as one CasADi function of (x, p), without what does not belong to them."""
+    x, p = MX.sym("x", len(problem.names)), MX.sym("p", len(problem.p))
+    cost, violation, *_ = kernel.model.function.call([x, p], True, False)
+    return Function("with_violation", [x, p], [cost, violation])
+
+
+def torques(rounds: int) -> list[Row]:
+    """Inverse dynamics alone, all 22 joints free, 11 samples a candidate."""
+    robot = nao("nao-v5", True)
+    names = JOINTS
+    state = SX.sym("state", 3 * len(names))
+    q, qd, qdd = (dict(zip(names, state[i * 22 : (i + 1) * 22].elements(), strict=True)) for i in range(3))
+    torque, _ = newton_euler(tree_from(robot, robot.feet["left"].link), q, qd, qdd, GRAVITY)
+    function = Function("kernel", [state, SX.sym("p", 0)], [SX(0), vertcat(*(torque[name] for name in names))])
+    kernel = Kernel(
+        function=function,
+        bounds=Function("bounds", [SX.sym("p", 0)], [DM(), DM()]),
+        weights=np.zeros(22),
+        model=kernel_of(nlp_gait.load("nao-ssp")).model,
+    )
+    native = NativeKernel(kernel, find_compiler(), native_lanes())
+    count = 11 * BATCH
+    states = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 66))
+    f, violation, g, limit = np.empty(count), np.empty(count), np.empty((count, 22)), np.full(22, np.inf)
+    model, places = pinocchio_model(robot)
+    pool = pin.ModelPool(model, 1)
+    ordered = np.empty((3, 22, count))
+    ordered[:, places] = states.reshape(count, 3, 22).transpose(1, 2, 0)
+    arrays = [np.asfortranarray(part) for part in ordered]
+    result = np.empty((22, count), order="F")
+    times = side_by_side(
+        {
+            "kernel": lambda: native(states, np.empty(0), -limit, limit, f, violation, g),
+            "pinocchio": lambda: pin.rneaInParallel(1, pool, *arrays, result),
+        },
+        rounds,
+    )
+    error = np.abs(g - result[places].T).max()
+    return [
+        Row(
+            name="torques alone against pin.rneaInParallel(1)",
+            value=ratio(times["pinocchio"], times["kernel"]),
+            unit="x",
+            required=12,
+            ambition=25,
+            note=f"22 free joints, {np.median(times['kernel']) / count * 1e9:.0f} ns against "
+            f"{np.median(times['pinocchio']) / count * 1e9:.0f} ns a sample; largest difference {error:.0e} Nm",
+        )
+    ]
+
+
+def growth(rounds: int) -> list[Row]:
+    """Cost by samples, batch size and threads."""
+    rows, last = [], {}
+    objectives = {
+        intervals + 1: nlp_gait.compile_objective(nlp_gait.load("nao-ssp", intervals=intervals), threads=1)
+        for intervals in (10, 40, 100, 1000)
+    }
+    X = candidates(objectives[11].problem, 200)
+    times = side_by_side({str(n): (lambda o=o: o(X)) for n, o in objectives.items()}, rounds)
+    for n in (41, 101, 1001):
+        limits = {"required": 9.5, "ambition": 9.2, "at_most": True} if n == 101 else {}
+        rows.append(Row(name=f"{n} samples against 11", value=ratio(times[str(n)], times["11"]), unit="x", **limits))
+    objective = objectives[11]
+    for count in (1, 10, 50, 1000, 10_000, 100_000):
+        X = candidates(objective.problem, count)
+        last = side_by_side({"kernel": lambda X=X: objective(X)}, 3 if count > 1000 else rounds)
+        rows.append(Row(name=f"batch {count}, a candidate", value=np.median(last["kernel"]) / count * 1e6, unit="us"))
+    X = candidates(objective.problem, 10_000)
+    two = nlp_gait.compile_objective(objective.problem, threads=2)
+    times = side_by_side({"one": lambda: objective(X), "two": lambda: two(X)}, max(3, rounds // 2))
+    rows.append(
+        Row(
+            name="two threads, batch 10,000",
+            value=ratio(times["one"], times["two"]),
+            unit="x",
+            required=1.7,
+            ambition=1.9,
+            note="means something on an idle machine only",
+        )
+    )
+    return rows

@@ -1,0 +1,220 @@
+"""Tracking a planned step with a PD controller: gains and torso pitch of least cost (the paper's use of ant colonies)."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX
+
+from nlp_gait.errors import InputError
+from nlp_gait.problems.gait_problem import (
+    Array,
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+)
+from nlp_gait.problems.stairs import STAIR_PARAMETERS
+from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES
+from nlp_gait.problems.stairs_layout import labels
+from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.problems.stairs_track_model import QUANTUM, ClosedLoop, N, Rollout, Scheme
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.planar_biped import LINKS
+
+Gains = Literal["scalar", "per-link"]
+
+# Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
+PLAN = {
+    "hip_height_m": 0.6925,
+    "hip_start_m": 0.0921,
+    "zmp_start_m": 0.2437,
+    "zmp_end_m": 0.0925,
+    "end_rate_rad_s": 0.7075,
+    "t1_s": 0.5751,
+    "t2_s": 0.7767,
+    "t_bc_s": 1.3264,
+    "foot_pitch_rad": 0.3106,
+}
+TORSO_PITCH = "torso_pitch_rad"
+LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
+
+PARAMETERS = (
+    *STAIR_PARAMETERS,
+    *(
+        Parameter(name=v.name, unit=v.unit, default=PLAN[v.name], description=v.description)
+        for v in GOVERNING_VARIABLES
+        if v.name != TORSO_PITCH
+    ),
+    *GIVEN_PARAMETERS,
+    Parameter(
+        name="reach_margin",
+        unit="1",
+        default=0.005,
+        description="desired knees keep 1 - cos(knee) above this",
+        minimum=1e-6,
+        maximum=0.5,
+    ),
+    Parameter(
+        name="tracking_tolerance_rad",
+        unit="rad",
+        default=0.1,
+        description="largest error of a link angle at any time",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="zmp_weight",
+        unit="1/m",
+        default=100.0,
+        description="cost of the mean distance of the ZMP from the supporting polygon",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="gravity_compensation",
+        unit="1",
+        default=1.0,
+        description="share of gravity that the controller compensates; 0 as printed",
+        minimum=0.0,
+        maximum=1.0,
+    ),
+    Parameter(
+        name="disturbance_Nm",
+        unit="N m",
+        default=1 / 70,
+        description="amplitude of the disturbance sin(2 t) on every link",
+    ),
+    Parameter(name="ground_stiffness_N_m", unit="N/m", default=5e4, description="k_s of a contact", minimum=0.0),
+    Parameter(name="ground_damping_N_s_m", unit="N s/m", default=500.0, description="k_d of a contact", minimum=0.0),
+    Parameter(name="friction", unit="1", default=0.6, description="mu of a contact", minimum=0.0),
+)
+
+
+def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", duration_s: float = 3.5) -> GaitProblem:
+    """Closed loop over one planned step.
+
+    The plan is given by parameters; its torso pitch is a variable. The stance ankle is the base.
+
+    Args:
+        gains: one K_p and K_d for all links as in the paper, or one for each link.
+        scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
+        duration_s: of the rollout, in whole quanta of 0.01 s.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Bhardwaj et al., sections VII to X.
+    """
+    for option, value, allowed in (("gains", gains, get_args(Gains)), ("scheme", scheme, get_args(Scheme))):
+        if value not in allowed:
+            raise InputError(f"{option} must be one of {', '.join(allowed)}, got {value!r}")
+    if not QUANTUM <= duration_s <= 60.0:
+        raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
+    suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
+    loop = ClosedLoop(quanta=round(duration_s / QUANTUM), scheme=scheme, gains=len(suffixes))
+    variables = (
+        *_gain_variables("kp", "N m/rad", "K_p", suffixes),
+        *_gain_variables("kd", "N m s/rad", "K_d", suffixes),
+        *(v for v in GOVERNING_VARIABLES if v.name == TORSO_PITCH),
+    )
+
+    def signals(x: Array, p: Array) -> Signals:
+        point = problem.symbols()
+        outputs = list(loop.rollout(point, point.x, Exact()))
+        desired, state, torque, zmp = (
+            np.array(part).T for part in ca.Function("rollout", [point.x, point.p], outputs)(x, p)
+        )
+        return Signals(
+            joints=LINKS,
+            arrays={
+                "t": np.arange(1, loop.quanta + 1) * QUANTUM,
+                "q": state[:, :N],
+                "qd": state[:, N:],
+                "q_desired": desired[:, :N],
+                "qd_desired": desired[:, N:],
+                "tau": torque,
+                "zmp": zmp[:, 0],
+            },
+        )
+
+    problem = GaitProblem(
+        name="stairs-track",
+        title="Stairs, tracked step: PD gains and torso pitch of least cost",
+        options={"gains": gains, "scheme": scheme, "duration_s": duration_s},
+        variables=variables,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="cost", unit="1"),
+        assemble=lambda point, ops: _assemble(point, loop.rollout(point, point.x, ops), ops),
+        signals=signals,
+    )
+    return problem
+
+
+def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            name=f"{name}{suffix}",
+            unit=unit,
+            lower=0.0,
+            upper=100.0,
+            description=f"{symbol} of {suffix.removeprefix('_') or 'all links'}",
+        )
+        for suffix in suffixes
+    )
+
+
+def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
+    """Mean of (53) over all quanta, and how far the ZMP leaves the supporting polygon."""
+    quanta = loop.state.shape[1]
+    errors = loop.state - loop.desired
+    power = loop.torque * loop.state[N:, :]
+    below, above = _beyond(point, loop.zmp)
+    tolerance = point["tracking_tolerance_rad"]
+    exact = Exact()
+    tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
+    outside = ca.sum1(_positive(below, ops) + _positive(above, ops)) / quanta
+    finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
+    return Assembly(
+        objective=tracking + effort + point["zmp_weight"] * outside,
+        constraints=(
+            Constraint(
+                name="tracking",
+                labels=labels(LINKS, range(1, quanta + 1)),
+                unit="rad",
+                scale=0.1,
+                value=ca.vec(errors[:N, :]),
+                lower=-tolerance,
+                upper=tolerance,
+            ),
+        ),
+        indexes={
+            "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
+            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
+            "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
+            "peak_torque_Nm": exact.largest(ca.vec(loop.torque)),
+            "zmp_margin_min_m": -ca.mmax(ca.fmax(below, above)),
+            "quanta_before_divergence": ca.sum2(finite),
+        },
+    )
+
+
+def _beyond(point: Point, zmp: MX) -> tuple[MX, MX]:
+    """Distance by which the ZMP lies behind and ahead of the supporting polygon, (m, 1) each [m]; negative inside.
+
+    It reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
+    """
+    foot = load_biped().foot_m
+    times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)
+    rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
+    return rear - zmp.T, zmp.T - foot
+
+
+def _positive(v: MX, ops: Nonsmooth) -> MX:
+    """Elementwise max(v, 0)."""
+    return (v + ops.abs(v)) / 2
