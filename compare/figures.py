@@ -87,15 +87,18 @@ def legend_below(figure: Figure) -> None:
 
 
 def logarithmic(axes: Axes, both: bool = False) -> None:
-    """Make the x axis logarithmic, or both, with powers of ten as plain text: parsing mathematics takes most of the time."""
+    """Make the x axis logarithmic, or both, once something positive is drawn.
+
+    Powers of ten are plain text: parsing mathematics takes most of a figure's time.
+    """
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    axes.set_xscale("log")
-    if both:
-        axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis) if both else (axes.xaxis,):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        axis.set_minor_formatter(NullFormatter())
+    smallest = axes.dataLim.minpos  # infinite where nothing positive was drawn
+    for axis, positive in ((axes.xaxis, smallest[0]), (axes.yaxis, smallest[1] if both else math.inf)):
+        if math.isfinite(positive):
+            axes.set(**{"xscale" if axis is axes.xaxis else "yscale": "log"})
+            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_minor_formatter(NullFormatter())
 
 
 def power_of_ten(value: float) -> str:

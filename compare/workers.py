@@ -13,6 +13,7 @@ from nlp_gait.errors import InputError, WorkerError
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
+CONNECT_TIMEOUT = "10s"
 
 Job = tuple[Task, RunRecord | None]
 """A task, and the run that it polishes if it does."""
@@ -82,7 +83,7 @@ def _dask(address: str) -> AbstractContextManager[object]:
 
     stack = ExitStack()
     try:
-        stack.enter_context(Client(address, timeout="10s", set_as_default=True))
+        stack.enter_context(Client(address, timeout=CONNECT_TIMEOUT, set_as_default=True))
     except (OSError, ValueError) as error:
         raise InputError(
             f"no Dask scheduler answers at {address!r}: {error}; start one with `dask scheduler`"

@@ -26,12 +26,12 @@ def problem_section(comparison: Comparison) -> Section:
     figures = (
         Figure(
             name=f"{stem}-convergence",
-            caption="Best so far: bands from the best to the worst run, lines are medians; a gradient run is a point at its end.",
+            caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end.",
             drawing=convergence_figure(comparison),
         ),
         Figure(
             name=f"{stem}-runtime",
-            caption="Share of all pairs of run and target solved within a cost; 31 targets from 100 % to 1e-4 % above the best known.",
+            caption="Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
             drawing=ecdf_figure(comparison),
         ),
         Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),

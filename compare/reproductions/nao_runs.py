@@ -84,13 +84,13 @@ def sweep(problem: str, variable: str, values: Sequence[float], starts: int) -> 
 
 
 def judged(problem: GaitProblem, x: Sequence[float] | Array) -> Run:
-    """A point as the judge finds it."""
+    """A point as the judge finds it, with the worst violation between the samples if there is one."""
     verdict = evaluate(problem, x)
     return {
         "x": list(verdict.x.values()),
         "power_W": verdict.objective["value"],
         "feasible": verdict.feasible,
-        "violated": [f"{row.name} by {row.violation:.2g} {row.unit}" for row in verdict.violations],
+        "dense_violated": [f"{row.name} by {row.violation:.2g} {row.unit}" for row in verdict.dense_violations[:1]],
         "indexes": dict(verdict.indexes),
     }
 

@@ -15,7 +15,8 @@ from nlp_gait.problems.gait_problem import Array
 def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
     """Two-sided p-value of Wilcoxon's rank-sum test (Mann and Whitney's U): neither sample tends to be smaller.
 
-    Exact if one sample has 8 values or fewer and there are no ties, else normal with tie and continuity correction; 1 if all values are equal.
+    Exact if one sample has 8 values or fewer and there are no ties, else normal with tie and continuity correction; 1 if
+    all values are equal.
 
     Source:
         Mann, Whitney (1947), On a test of whether one of two random variables is stochastically larger than the other, as

@@ -154,6 +154,7 @@ def compile_objective(
             raise
         LOG.warning("the objective is interpreted, many times slower: %s", error)
         evaluator = problem.built("interpreted kernel", lambda: InterpretedKernel(kernel))
+        threads = 1  # the virtual machine does not let go of Python's lock
     return CompiledObjective(problem, evaluator, threads or _available_cores())
 
 

@@ -13,7 +13,7 @@ BLOCK = 64
 
 
 class InterpretedKernel:
-    """Evaluates a kernel candidate by candidate, without the global interpreter lock of Python in between.
+    """Evaluates a kernel in blocks of candidates, one thread at a time.
 
     Attributes:
         description: for people.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Mapping
@@ -11,12 +12,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from nlp_gait.backends.derivatives import WORTHWHILE_STARTS, compiled_nlp
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.ipopt_installation import QUIET, linear_solver
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solution import Evaluations
-from nlp_gait.errors import InputError
+from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem
+
+LOG = logging.getLogger("nlp_gait")
 
 # Sigmoid widths of the stages, in units of the switch (metres for a balance margin); each stage starts from the last one.
 # The narrower ones are tried only if the exact functions find the point infeasible.
@@ -50,12 +54,15 @@ class IpoptSettings:
         iterations: limit of iterations for each stage.
         time_limit_s: limit of wall time for each stage [s].
         hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
+        compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
+            is a compiler.
     """
 
     tolerance: float = 1e-8
     iterations: int = 300
     time_limit_s: float = 60.0
     hessian: str | None = None
+    compiled: bool | None = None
 
     def __post_init__(self) -> None:
         """Refuse what IPOPT would refuse late."""
@@ -137,7 +144,8 @@ class Ipopt:
     Attributes:
         model: the NLP.
         linear_solver: the one that IPOPT really uses.
-        create_s: time to generate derivatives and solvers [s].
+        compiled: whether it calls compiled functions.
+        create_s: time to generate derivatives and solvers, and to compile them [s].
     """
 
     def __init__(self, model: NlpModel, settings: IpoptSettings) -> None:
@@ -152,7 +160,12 @@ class Ipopt:
             "ipopt.hessian_approximation": settings.hessian,
         }
         self.model = model
-        self._cold = ca.nlpsol("cold", "ipopt", model.nlp, options)
+        self.compiled = bool(settings.compiled)
+        nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
+        if self.compiled:
+            nlp, ready = compiled_nlp(self._cold, model.nlp)
+            options |= ready
+            self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
         derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
         if settings.hessian == "exact":
             derivatives["hess_lag"] = "nlp_hess_l"
@@ -166,7 +179,7 @@ class Ipopt:
             "ipopt.warm_start_slack_bound_push": 1e-6,
             "ipopt.warm_start_mult_bound_push": 1e-6,
         }
-        self._warm = ca.nlpsol("warm", "ipopt", model.nlp, warm_options)
+        self._warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
         self.linear_solver = linear_solver()
         self.create_s = time.perf_counter() - started
 
@@ -226,10 +239,26 @@ class Ipopt:
         }
 
 
-def ipopt_for(problem: GaitProblem, settings: IpoptSettings) -> Ipopt:
-    """IPOPT for a problem, made once for all its copies."""
-    settings = replace(settings, hessian=settings.hessian or problem.hessian)
-    return problem.built(f"ipopt {settings}", lambda: Ipopt(nlp_model(problem), settings))
+def ipopt_for(problem: GaitProblem, settings: IpoptSettings, solves: int = 1) -> Ipopt:
+    """IPOPT for a problem, made once for all its copies.
+
+    Args:
+        problem: any copy.
+        settings: where the problem has a say, None.
+        solves: how many are planned, which decides whether compiling pays if the settings leave it open.
+
+    Raises:
+        CompilerError: compiled functions are demanded, and there is no compiler or it fails.
+    """
+    compiled = solves >= WORTHWHILE_STARTS if settings.compiled is None else settings.compiled
+    chosen = replace(settings, hessian=settings.hessian or problem.hessian, compiled=compiled)
+    try:
+        return problem.built(f"ipopt {chosen}", lambda: Ipopt(nlp_model(problem), chosen))
+    except CompilerError as error:
+        if settings.compiled:
+            raise
+        LOG.warning("IPOPT's functions are interpreted: %s", error)
+        return ipopt_for(problem, replace(settings, compiled=False))
 
 
 def _counts(stats: Mapping[str, int]) -> Evaluations:

@@ -108,6 +108,7 @@ class Solution:
         evaluations: over all starts.
         time_s: over all starts.
         solver: for example ``"ipopt"``, with the linear solver that it really used.
+        functions: ``"compiled"`` or ``"interpreted"``.
         active_constraints: bounds with a price, dearest first.
         starts: outcome of every start.
         seed: of the start points.
@@ -129,6 +130,7 @@ class Solution:
     time_s: SolveTime
     solver: str
     linear_solver: str
+    functions: str
     active_constraints: tuple[ActiveConstraint, ...]
     starts: tuple[StartOutcome, ...]
     seed: int

@@ -49,7 +49,7 @@ def solve(
     problem = problem.fix(**(fix or {}))
     settings = settings or IpoptSettings()
     points = _start_points(problem, starts, seed, x0)
-    ipopt = ipopt_for(problem, settings)
+    ipopt = ipopt_for(problem, settings, starts)
     ends: list[End] = []
     outcomes: list[StartOutcome] = []
     for index, point in enumerate(points):
@@ -114,6 +114,7 @@ def solution_of(
         time_s=SolveTime(build=ipopt.model.build_s, compile=ipopt.create_s, solve=sum(end.time_s for end in ends)),
         solver="ipopt",
         linear_solver=ipopt.linear_solver,
+        functions="compiled" if ipopt.compiled else "interpreted",
         active_constraints=_active(problem, ipopt, best) if best.success else (),
         starts=tuple(outcomes),
         seed=seed,

@@ -1,4 +1,7 @@
-"""Command line: ``nlp-gait list | evaluate | solve | search | compare | report | sweep | reproduce | simulate | export | animate``.
+"""Command line: ``nlp-gait COMMAND``.
+
+From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce``. From a result
+to a robot: ``simulate | export | animate``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.

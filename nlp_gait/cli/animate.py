@@ -7,16 +7,14 @@ from typing import Annotated
 
 import typer
 
-from nlp_gait.cli.common import command, output_file, stdout
+from nlp_gait.cli.common import ResultFile, command, output_file, stdout
 
 SHEET = ".png"
 
 
 @command
 def animate(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
-    ],
+    result: ResultFile,
     out: Annotated[
         Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
     ] = None,

@@ -41,6 +41,9 @@ Set = Annotated[
 Fix = Annotated[
     list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a variable at a value; repeatable.")
 ]
+ResultFile = Annotated[
+    Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
+]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Worker processes (default: all processors).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -134,8 +137,8 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 @contextmanager
-def progress_bar(description: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Progress on stderr; the function inside advances it by one and shows a note."""
+def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
+    """Progress on stderr, of unknown length if total is None; the function inside advances it by one and shows a note."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -7,16 +7,14 @@ from typing import Annotated
 
 import typer
 
-from nlp_gait.cli.common import command, output_file, stdout
+from nlp_gait.cli.common import ResultFile, command, output_file, stdout
 from nlp_gait.errors import unknown
 from nlp_gait.export.setpoints import PERIOD_MS
 
 
 @command
 def export(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
-    ],
+    result: ResultFile,
     format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
     out: Annotated[
         Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")

@@ -11,11 +11,10 @@ import typer
 from nlp_gait.cli.common import command, progress_bar, stdout
 from nlp_gait.errors import unknown
 
-# Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress.
+# Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
 REPRODUCTIONS = {
     "nao": "compare.reproductions.nao",
     "walk12": "compare.reproductions.walk12",
-    "stairs": "compare.reproductions.stairs",
 }
 
 
@@ -31,6 +30,6 @@ def reproduce(
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
     module = import_module(REPRODUCTIONS[paper])
-    with progress_bar(paper, module.STEPS) as advance:
+    with progress_bar(paper, getattr(module, "STEPS", None)) as advance:
         module.reproduce(out, progress=advance)
     stdout.print(f"wrote {out / 'report.md'}", soft_wrap=True)

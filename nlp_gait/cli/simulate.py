@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nlp_gait.cli.common import AsJson, command, fail, output_file, print_json, print_table, stdout
+from nlp_gait.cli.common import AsJson, ResultFile, command, fail, output_file, print_json, print_table, stdout
 from nlp_gait.simulation.mjcf import FRICTION
 
 if TYPE_CHECKING:
@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.robustness import Robustness
 
 FRAMES_PER_S = 25.0
-
-ResultFile = Annotated[
-    Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
-]
 
 
 @command
@@ -31,7 +27,7 @@ def simulate(
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
     robustness: Annotated[
-        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (a minute or more).")
+        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -43,6 +39,7 @@ def simulate(
     from compare.storage import writable_folder, write_json
     from nlp_gait.export.files import write_text
     from nlp_gait.export.result import load_result
+    from nlp_gait.export.signals import write_npz
     from nlp_gait.export.video import check_video_path, write_video
     from nlp_gait.simulation.camera import filmed, shown
     from nlp_gait.simulation.conditions import Conditions
@@ -72,6 +69,7 @@ def simulate(
     if folder is not None:
         write_json(folder / "report.json", data)
         write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        write_npz(folder / "playback.npz", trace.signals(plan.joints))
         plot_playback(plan, trace, drive, folder / "playback")
     if as_json:
         print_json(data)

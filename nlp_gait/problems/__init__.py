@@ -11,6 +11,7 @@ from nlp_gait.problems.nao_dsp import nao_dsp
 from nlp_gait.problems.nao_ssp import nao_ssp
 from nlp_gait.problems.stairs_ideal import stairs_ideal
 from nlp_gait.problems.stairs_plan import stairs_plan
+from nlp_gait.problems.stairs_track import stairs_track
 from nlp_gait.problems.walk12 import walk12
 
 PROBLEMS: dict[str, Callable[..., GaitProblem]] = {
@@ -18,6 +19,7 @@ PROBLEMS: dict[str, Callable[..., GaitProblem]] = {
     "nao-dsp": nao_dsp,
     "walk12": walk12,
     "stairs-plan": stairs_plan,
+    "stairs-track": stairs_track,
     "stairs-ideal": stairs_ideal,
 }
 

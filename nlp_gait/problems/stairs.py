@@ -46,7 +46,7 @@ STAIR_PARAMETERS = (
 )
 
 
-def stair_of(point: Point) -> Stair:
+def stair_of(point: Point) -> Stair[MX]:
     """Tread and rise of one step from the problem's parameters."""
     tread: MX = point["stair_length_m"] / 2
     return Stair(tread, point["rise_run_ratio"] * tread)

@@ -11,16 +11,24 @@ from nlp_gait.problems.gait_problem import Parameter, Point, Variable
 from nlp_gait.symbolic.stair_gait import StairPlan
 
 GOVERNING_VARIABLES = (
-    Variable(name="hip_height_m", unit="m", lower=0.5, upper=0.8, description="z_Ci, above the rear ankle at the start"),
-    Variable(name="hip_start_m", unit="m", lower=-0.1, upper=0.25, description="hip ahead of the rear ankle at the start"),
+    Variable(
+        name="hip_height_m", unit="m", lower=0.5, upper=0.8, description="z_Ci, above the rear ankle at the start"
+    ),
+    Variable(
+        name="hip_start_m", unit="m", lower=-0.1, upper=0.25, description="hip ahead of the rear ankle at the start"
+    ),
     Variable(name="zmp_start_m", unit="m", lower=-0.1, upper=0.4, description="planned ZMP ahead of the rear ankle"),
     Variable(name="zmp_end_m", unit="m", lower=-0.3, upper=0.4, description="planned ZMP ahead of the stance ankle"),
-    Variable(name="end_rate_rad_s", unit="rad/s", lower=0.0, upper=3.0, description="rate of the cycloid's angle at t3"),
+    Variable(
+        name="end_rate_rad_s", unit="rad/s", lower=0.0, upper=3.0, description="rate of the cycloid's angle at t3"
+    ),
     Variable(name="torso_pitch_rad", unit="rad", lower=0.8, upper=1.75, description="q5, from the forward axis"),
     Variable(name="t1_s", unit="s", lower=0.2, upper=1.0, description="t1, end of the heel's rise"),
     Variable(name="t2_s", unit="s", lower=0.6, upper=2.0, description="t2, end of the double support"),
     Variable(name="t_bc_s", unit="s", lower=1.0, upper=3.2, description="t_bc, the cycloid is caught"),
-    Variable(name="foot_pitch_rad", unit="rad", lower=0.0, upper=0.6, description="upward pitch of the foot in the air"),
+    Variable(
+        name="foot_pitch_rad", unit="rad", lower=0.0, upper=0.6, description="upward pitch of the foot in the air"
+    ),
 )
 GIVEN_PARAMETERS = (  # Table III
     Parameter(name="t3_s", unit="s", default=3.5, description="t3, end of the step", minimum=0.5),

@@ -17,7 +17,7 @@ from nlp_gait.problems.stairs_layout import Layout, labels
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.planar_biped import points
-from nlp_gait.symbolic.stair_loads import JOINTS, MOVING, Loads, link_angles, loads
+from nlp_gait.symbolic.stair_loads import MOVING, Loads, link_angles, loads
 from nlp_gait.symbolic.stair_profile import Stair, stair_height
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
@@ -69,16 +69,14 @@ class IdealModel:
             indexes={"peak_torque_Nm": peak, "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0]},
         )
 
-    def loads_at(self, values: Mapping[str, Array]) -> Loads:
+    def loads_at(self, values: Mapping[str, Array]) -> Loads[Array]:
         """Torques, stance force and its centre of pressure in every interval, from numbers: columns are intervals."""
         symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
         return Loads(*(np.array(ca.evalf(part)) for part in symbolic))
 
-    def _loads(self, x: Mapping[str, MX]) -> Loads:
+    def _loads(self, x: Mapping[str, MX]) -> Loads[MX]:
         n = self.intervals
-        toe, sole = (
-            ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force")
-        )
+        toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
         return Loads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
     @cached_property
@@ -173,16 +171,16 @@ class IdealModel:
         )
 
 
-def _equal(name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float) -> Constraint:
+def _equal(
+    name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
+) -> Constraint:
     """Rows value == 0."""
     return Constraint(
         name=name, labels=labels(rows, columns), unit=unit, scale=scale, value=ca.vec(value), lower=MX(0), upper=MX(0)
     )
 
 
-def _limits(
-    name: str, value: MX, rows: tuple[str, ...], columns: range, limits: tuple[float, float]
-) -> Constraint:
+def _limits(name: str, value: MX, rows: tuple[str, ...], columns: range, limits: tuple[float, float]) -> Constraint:
     return Constraint(
         name=name,
         labels=labels(rows, columns),

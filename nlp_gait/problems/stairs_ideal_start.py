@@ -57,7 +57,5 @@ def _angles() -> ca.Function:
         toe_angle=SX(np.pi / 6),
         catch_angle=SX(0.01),
     )
-    found = posture(
-        load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
-    )
+    found = posture(load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact())
     return ca.Function("angles", [size, s], [found.q.position])

@@ -152,7 +152,7 @@ def clearance_function(ops: Nonsmooth) -> ca.Function:
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
-def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair, Posture]:
+def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = plan_of(values), Stair(size[0], size[1])

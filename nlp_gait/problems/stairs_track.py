@@ -133,7 +133,7 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
         return Signals(
             joints=LINKS,
             arrays={
-                "t": np.arange(1, loop.quanta + 1) * QUANTUM,
+                "t": np.linspace(QUANTUM, loop.quanta * QUANTUM, loop.quanta),
                 "q": state[:, :N],
                 "qd": state[:, N:],
                 "q_desired": desired[:, :N],

@@ -175,9 +175,7 @@ def _desired(ops: Nonsmooth) -> ca.Function:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = plan_of(values)
-    step = posture(
-        load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
-    )
+    step = posture(load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops)
     given = ca.vertcat(values, size, margin)
     pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
     time = SX.sym("time")

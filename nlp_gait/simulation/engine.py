@@ -34,4 +34,9 @@ def mujoco(*, pictures: bool = False) -> ModuleType:
         raise OutputError(
             f"MuJoCo does not load with {DRIVER}={os.environ.get(DRIVER)!r} ({error}); unset it or name another driver"
         ) from error
+    module.set_mju_user_warning(_ignore)
     return module
+
+
+def _ignore(message: str) -> None:
+    """Take the engine's warnings, which would else go to a log file in the user's folder; a divergence shows as a fall."""

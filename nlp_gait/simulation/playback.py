@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.problems.gait_problem import Array
+from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
@@ -55,6 +55,11 @@ class Trace:
     pressure: Array
     fell_at_s: float | None
 
+    def signals(self, joints: tuple[str, ...]) -> Signals:
+        """The time histories, for an archive."""
+        names = ("t", "q", "qd", "torque", "set_points", "torso", "tilt", "feet", "loads", "pressure")
+        return Signals(joints=joints, arrays={name: getattr(self, name) for name in names})
+
 
 def play(
     plan: Plan,
@@ -92,7 +97,8 @@ def play(
         torso, upright = data.xpos[at.torso].copy(), float(data.xmat[at.torso, 8])
         feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
         rows.append((q, qd, torque, torso, upright, feet, *_pressure(data, at)))
-        if upright < math.cos(FALLEN_TILT) or torso[2] < least_height or not math.isfinite(torso[2]):
+        diverged = not np.isfinite(data.qvel).all()  # no such row is kept
+        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
             break
     columns = [np.array(column, dtype=float) for column in zip(*rows, strict=True)]

@@ -73,9 +73,7 @@ def implicit_acceleration(
     coasting = after(state, SX(state.q.shape[0], 1), quantum)
     stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
     force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
-    return implicit_response(
-        motion.M + ca.diag(stiffness), force, state.v, contacts, ground, quantum
-    ).acceleration
+    return implicit_response(motion.M + ca.diag(stiffness), force, state.v, contacts, ground, quantum).acceleration
 
 
 def explicit_acceleration(

@@ -101,24 +101,23 @@ def ankle_on_toe(foot: Foot, sole: SX, toe: SX) -> SX:
     )
 
 
-def landed_ankle(plan: StairPlan, foot: Foot, s: SX) -> SX:
-    """(2,) ankle of the foot that landed last, from where it will stand flat [m], during the next step's double support.
+def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
+    """Angles of sole and toe of the foot that landed last [rad], during the next step's double support.
 
-    It follows the rear ankle's way backwards in time: about the toe, then about the sole.
+    They go the rear foot's way backwards in time: about the tip of the toe, then about the sole; ``ankle_on_toe`` has the
+    ankle.
 
     Args:
         plan: of the next step.
-        foot: its lengths.
         s: (4,) fractions of the next step's phases.
     """
-    t1, t2 = plan.durations[0], plan.durations[1]
-    remaining = t2 + t1 - ca.dot(plan.durations[:2], s[:2])
-    first = ca.fmin(remaining / t1, 1)
-    second = ca.fmax((remaining - t1) / t2, 0)
-    return ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(first, second, 0, 0)))
+    first, second = ca.vertsplit(plan.durations[:2])
+    remaining = first * (1 - s[0]) + second * (1 - s[1])
+    back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
+    return foot_angles(plan, back)
 
 
-def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
+def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
     Source:
@@ -152,7 +151,7 @@ def ankle(plan: StairPlan, stair: Stair, foot: Foot, s: SX) -> SX:
     return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
-def hip(plan: StairPlan, stair: Stair, gravity: float, s: SX) -> SX:
+def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX) -> SX:
     """(2,) position of the hip [m], from the fractions s (4,) of the phases.
 
     Source:

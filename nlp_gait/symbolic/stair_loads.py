@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -31,7 +31,10 @@ JOINT_RATES = np.array(
 LEAST_LOAD = 1e-3
 
 
-class Loads(NamedTuple):
+E = TypeVar("E")
+
+
+class Loads(NamedTuple, Generic[E]):
     """What joints and ground must give.
 
     Attributes:
@@ -40,9 +43,9 @@ class Loads(NamedTuple):
         stance_pressure: its centre of pressure, ahead of the stance ankle [m].
     """
 
-    torque: SX
-    stance_force: SX
-    stance_pressure: SX
+    torque: E
+    stance_force: E
+    stance_pressure: E
 
 
 def link_angles(q: SX) -> SX:
@@ -50,7 +53,7 @@ def link_angles(q: SX) -> SX:
     return ca.vertcat(q, 0, 0)
 
 
-def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> Loads:
+def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> Loads[SX]:
     """Inverse dynamics with given forces below the rear foot.
 
     Args:

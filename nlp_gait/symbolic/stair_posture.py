@@ -33,7 +33,14 @@ class Posture(NamedTuple):
 
 
 def posture(
-    rods: Mapping[str, Rod], plan: StairPlan, stair: Stair, gravity: float, s: SX, rates: SX, margin: SX, ops: Nonsmooth
+    rods: Mapping[str, Rod],
+    plan: StairPlan,
+    stair: Stair[SX],
+    gravity: float,
+    s: SX,
+    rates: SX,
+    margin: SX,
+    ops: Nonsmooth,
 ) -> Posture:
     """Posture at the fractions s (4,) of the phases, which pass at ``rates`` (4,) [1/s]; symbols s.
 
@@ -55,9 +62,7 @@ def posture(
     support, support_reach = _leg(rods, at_hip, Motion(SX(2, 1), SX(2, 1), SX(2, 1)), margin, ops)
     feet = in_time(ca.vertcat(*foot_angles(plan, s)), s, rates)
     torso = constant(0.0)._replace(position=plan.torso_pitch)
-    return Posture(
-        stack(swing, support, torso, feet), ca.vertcat(swing_reach, support_reach), at_hip, at_ankle
-    )
+    return Posture(stack(swing, support, torso, feet), ca.vertcat(swing_reach, support_reach), at_hip, at_ankle)
 
 
 def _leg(rods: Mapping[str, Rod], at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:

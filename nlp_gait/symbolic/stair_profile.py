@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 from casadi import SX
 
+E = TypeVar("E")
 
-class Stair(NamedTuple):
+
+class Stair(NamedTuple, Generic[E]):
     """Two equal steps; the stance ankle stands at the origin, the rear ankle one tread back and one rise down.
 
     Attributes:
@@ -16,11 +18,11 @@ class Stair(NamedTuple):
         rise: Z, of one step [m].
     """
 
-    tread: SX
-    rise: SX
+    tread: E
+    rise: E
 
 
-def stair_height(x: SX, stair: Stair, setback: float, width: float) -> SX:
+def stair_height(x: SX, stair: Stair[SX], setback: float, width: float) -> SX:
     """Height of the ground under a point, relative to the stance ankle [m].
 
     Args:

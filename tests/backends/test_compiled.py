@@ -199,3 +199,19 @@ def test_interpreted_gives_the_same(monkeypatch: pytest.MonkeyPatch, caplog: pyt
     assert (np.abs(interpreted.constraints(X)[others] - rows) <= ROW_TOLERANCE * np.abs(rows).max(axis=0)).all()
     with pytest.raises(nlp_gait.GaitError, match="no C\\+\\+ compiler"):
         compile_objective(problem, require_compiler=True)
+
+
+def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Undefined behaviour, misaligned access included, ends the process; the address sanitizer needs a run by hand."""
+    flags = ("-std=c++17", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-fvisibility=hidden", "-w")
+    monkeypatch.setattr("nlp_gait.backends.native_kernel.BASE_FLAGS", flags)
+    try:
+        objective = compile_objective(toy(corner), require_compiler=True)
+    except nlp_gait.GaitError:
+        pytest.skip("this compiler has no sanitizer")
+    raw = np.ones(2 * 8 * 21 + 1, dtype=np.uint8)
+    misaligned = raw[1:].view(np.float64).reshape(21, 2)
+    misaligned[:] = 1.0
+    for count in (1, 8, 21):
+        f, violation = objective(misaligned[:count])
+        assert (f == 0.0).all() and (violation == 0.0).all()

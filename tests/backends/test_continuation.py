@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from casadi import MX
-from toys import corner, row, toy
 
 from nlp_gait.backends import ipopt
 from nlp_gait.backends.continuation import Continuation, solve_both_ways
 from nlp_gait.problems.gait_problem import Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, row, toy
 
 TOLERANCE = 1e-6  # IPOPT's own is 1e-8
 

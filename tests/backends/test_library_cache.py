@@ -66,7 +66,7 @@ def test_a_broken_library_is_built_again(cache: Path, compiler: Compiler, damage
     path.unlink()
     path.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
     assert answer(compiler)[0] == 42
-    assert [file.read_bytes() == whole for file in cache.iterdir()] == [True]
+    assert [library_cache._load(file, ("answer",)) is not None for file in cache.iterdir()] == [True]
 
 
 def test_a_library_without_the_function_is_not_trusted(cache: Path, compiler: Compiler) -> None:

@@ -1,8 +1,10 @@
 """``simulate``, ``export`` and ``animate`` as scripts use them."""
 
 import json
+import subprocess
 import sys
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -39,7 +41,10 @@ def test_simulate_reports_and_writes_its_folder(gait, tmp_path):
     report = json.loads(nlp_gait("simulate", gait, "--out", out, "--json").stdout)
     assert report["fallen"] is False and report["measured"]["mechanical_W"] > 0.0
     assert json.loads((out / "report.json").read_text()) == report
-    assert sorted(p.name for p in out.iterdir()) == ["model.xml", "playback.png", "playback.svg", "report.json"]
+    written = sorted(p.name for p in out.iterdir())
+    assert written == ["model.xml", "playback.npz", "playback.png", "playback.svg", "report.json"]
+    with np.load(out / "playback.npz") as arrays:
+        assert arrays["q"].shape == (len(arrays["t"]), 22) == arrays["set_points"].shape
 
 
 def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
@@ -78,3 +83,15 @@ def test_animate_writes_a_video_and_a_sheet(gait, tmp_path):
     assert gait.with_suffix(".gif").stat().st_size > 5_000
     nlp_gait("animate", gait, "--out", tmp_path / "sheet.png", "--poses", "2")
     assert (tmp_path / "sheet.png").stat().st_size > 10_000
+
+
+def test_a_film_is_made_without_a_display(gait, tmp_path):
+    """In a process of its own, for the graphics driver is chosen when the engine is imported."""
+    pytest.importorskip("mujoco")
+    film = tmp_path / "film.gif"
+    command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
+        pytest.skip("no off-screen graphics here")
+    assert done.returncode == 0, done.stderr
+    assert "stays up" in done.stdout and film.stat().st_size > 50_000

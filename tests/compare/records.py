@@ -68,9 +68,7 @@ def record(
         iterations=len(history),
         active_constraints=active,
         history=History(evaluations=tuple(c for c, _ in history), objective=tuple(v for _, v in history)),
-        time_s=Times(
-            build=0.5, compile=1.5, solve=seconds[-1], objective=seconds[-1] / 2, history=seconds
-        ),
+        time_s=Times(build=0.5, compile=1.5, solve=seconds[-1], objective=seconds[-1] / 2, history=seconds),
     )
 
 
@@ -108,7 +106,16 @@ def study() -> list[RunRecord]:
         record("newton", 0, [(5, 10.0)], evaluations=calls, search=False, active=(PRICE,), seconds_per_evaluation=0.1),
         record("newton", 1, [(5, 10.0)], evaluations=calls, search=False, seconds_per_evaluation=0.1),
         record(
-            "newton", 2, [(5, None)], evaluations=calls, search=False, feasible=False, success=True, claim=9.5,
-            seconds_per_evaluation=0.1, status="restoration failed", violated=("balance by 0.1 m",),
+            "newton",
+            2,
+            [(5, None)],
+            evaluations=calls,
+            search=False,
+            feasible=False,
+            success=True,
+            claim=9.5,
+            seconds_per_evaluation=0.1,
+            status="restoration failed",
+            violated=("balance by 0.1 m",),
         ),
     ]

@@ -104,10 +104,30 @@ def test_summaries_by_hand() -> None:
 
 def test_table_of_solvers(tables: Tables) -> None:
     assert tables.row("swarm") == [
-        "swarm", "4", "4/4", "4/4", "10.050000 W", "10.050000 W", "10.550000 W", "12.000000 W", "5.5000 %", "500", "5.000 s",
+        "swarm",
+        "4",
+        "4/4",
+        "4/4",
+        "10.050000 W",
+        "10.050000 W",
+        "10.550000 W",
+        "12.000000 W",
+        "5.5000 %",
+        "500",
+        "5.000 s",
     ]
     assert tables.row("newton") == [
-        "newton", "3", "3/3", "2/3", "9.500000 W", "10.000000 W", "10.000000 W", "10.000000 W", "0.0000 %", "52", "0.500 s",
+        "newton",
+        "3",
+        "3/3",
+        "2/3",
+        "9.500000 W",
+        "10.000000 W",
+        "10.000000 W",
+        "10.000000 W",
+        "0.0000 %",
+        "52",
+        "0.500 s",
     ]
 
 
@@ -180,8 +200,8 @@ def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         r.write(path)
     rebuild_report(tmp_path)
-    page, again = ((f / "report.html").read_text(encoding="utf-8") for f in (folder, tmp_path))
-    assert again.split("<h3>Session 1")[0].split("</svg>")[-1] == page.split("<h3>Session 1")[0].split("</svg>")[-1]
+    first, again = (Tables((f / "report.html").read_text(encoding="utf-8")).rows for f in (folder, tmp_path))
+    assert again == first[: first.index(["what", "value"])]
     rebuild_report(tmp_path, Weighting(gradient=0.0, jacobian=0.0, hessian=0.0))
     assert Tables((tmp_path / "report.html").read_text(encoding="utf-8")).row("newton")[9] == "10"
 
@@ -210,4 +230,3 @@ def test_maximised_objectives_are_ranked_the_other_way() -> None:
     (summary,) = summarise(compare_problems(runs)[0])
     assert (summary.best, summary.median, summary.worst) == (0.4, 0.2, 0.1)
     assert summary.gap == pytest.approx(0.5)
-

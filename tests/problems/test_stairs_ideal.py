@@ -8,9 +8,8 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.problems.gait_problem import Array, GaitProblem
-from nlp_gait.problems.stairs import CASES, GRAVITY
+from nlp_gait.problems.stairs import GRAVITY
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.planar_biped import biped_dynamics
 from nlp_gait.symbolic.stair_loads import link_angles
@@ -45,7 +44,6 @@ def test_replay_by_rk4_reaches_the_planned_end_pose(problem: GaitProblem, soluti
     signals = problem.signals(np.array(list(solution.x.values())), problem.p)
     error = replay(signals.arrays)
     assert np.abs(error).max() < REPLAY_TOLERANCE
-    print(np.abs(error).max())
 
 
 def replay(arrays: dict[str, Array]) -> Array:

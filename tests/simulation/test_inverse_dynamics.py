@@ -11,8 +11,10 @@ from nlp_gait.simulation.inverse_dynamics import engine_torques  # noqa: E402
 AGREEMENT_NM = 1e-9
 
 
-@pytest.mark.parametrize("name", ["ssp optimum", "ssp ga", "dsp optimum", "dsp pso"])
-@pytest.mark.parametrize("options", [{}, {"robot": "nao-v6"}])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("ssp optimum", {}), ("ssp ga", {"robot": "nao-v6"}), ("dsp optimum", {}), ("dsp pso", {"intervals": 20})],
+)
 def test_engine_and_model_need_the_same_torques(gait, name, options):
     result = gait(name, **options)
     signals = result.problem.signals(result.x, result.problem.p)

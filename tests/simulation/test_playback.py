@@ -148,3 +148,21 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
     assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
     assert [value for value, survived in found.friction.items() if not survived] == [0.3, 0.4]
     assert found.mass_factor == {0.9: True, 1.1: False}
+
+
+def test_without_a_display_the_viewer_is_refused_in_one_sentence(played, monkeypatch):
+    glfw = pytest.importorskip("glfw")
+    from nlp_gait.errors import OutputError
+    from nlp_gait.simulation.camera import shown
+
+    monkeypatch.setattr(glfw, "init", lambda: False)
+    with pytest.raises(OutputError, match="no display; use --video"):
+        shown(played("dsp optimum")[0], Conditions(), Drive(), "rectangle")
+
+
+def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(played):
+    plan = played("dsp optimum")[0]
+    drive = Drive(full_error_rad=1e-9, torque_limits="stall")  # stiffer than any time step can follow
+    trace = play(plan, Conditions(mass_factor=1e-6), drive)
+    assert trace.fell_at_s is not None
+    assert np.isfinite(trace.q).all() and np.isfinite(trace.torque).all()

@@ -19,9 +19,7 @@ def flight(mass: float, height: float, speed: float, steps: int) -> np.ndarray:
     position, velocity = state[:2], state[2:]
     contact = Contact(position[1], SX([0, 1]), SX([1, 0]))
     ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
-    a = implicit_response(
-        mass * SX.eye(2), SX([0, -mass * GRAVITY]), velocity, [contact], ground, QUANTUM
-    ).acceleration
+    a = implicit_response(mass * SX.eye(2), SX([0, -mass * GRAVITY]), velocity, [contact], ground, QUANTUM).acceleration
     after = ca.vertcat(position + velocity * QUANTUM + a * QUANTUM**2 / 2, velocity + a * QUANTUM)
     step = ca.Function("step", [state], [after]).mapaccum(steps)
     return np.array(step([0.0, height, speed, 0.0]))

@@ -11,7 +11,7 @@ from nlp_gait.problems.stairs import CASES, GRAVITY
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.planar_biped import points
-from nlp_gait.symbolic.stair_gait import Foot, StairPlan, ankle, hip, in_time, landed_ankle
+from nlp_gait.symbolic.stair_gait import Foot, StairPlan, ankle, ankle_on_toe, hip, in_time, landed_angles
 from nlp_gait.symbolic.stair_loads import link_angles
 from nlp_gait.symbolic.stair_posture import posture
 from nlp_gait.symbolic.stair_profile import Stair, stair_height
@@ -40,7 +40,7 @@ def plan() -> StairPlan:
     return StairPlan(**{name: SX(value) for name, value in PLAN.items()})
 
 
-def step(case: int) -> Stair:
+def step(case: int) -> Stair[SX]:
     length, ratio = CASES[case]
     return Stair(SX(length / 2), SX(ratio * length / 2))
 
@@ -62,7 +62,7 @@ def test_ankle_velocity_is_continuous_at_every_knot(ankle_motion: ca.Function) -
 def test_the_foot_lands_so_that_it_will_stand_two_steps_on(case: int) -> None:
     s = SX.sym("s", 4)
     landing = ca.Function("landing", [s], [ankle(plan(), step(case), FOOT, s)])([1, 1, 1, 1])
-    after = ca.Function("landed", [s], [landed_ankle(plan(), FOOT, s)])
+    after = ca.Function("landed", [s], [ankle_on_toe(FOOT, *landed_angles(plan(), s))])
     length, ratio = CASES[case]
     end = np.array([length, ratio * length])
     assert np.array(landing).ravel() == pytest.approx(end + np.array(after([0, 0, 0, 0])).ravel(), abs=1e-12)
@@ -80,9 +80,7 @@ def test_hip_advances_one_step_and_rises_with_it(case: int) -> None:
 
 def test_forward_kinematics_of_the_posture_meets_hip_and_ankle() -> None:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    found = posture(
-        load_biped().rods, plan(), step(2), GRAVITY, s, passing / plan().durations, SX(0.005), Exact()
-    )
+    found = posture(load_biped().rods, plan(), step(2), GRAVITY, s, passing / plan().durations, SX(0.005), Exact())
     placed = points(load_biped().rods, link_angles(found.q.position), SX(2, 1))
     errors = ca.vertcat(placed["H"] - found.hip.position, placed["A"] - found.ankle.position)
     rate_error = ca.jtimes(found.q.position, s, passing / plan().durations) - found.q.velocity

@@ -1,0 +1,86 @@
+"""Bhardwaj, Mishra, Sukavanam, Balasubramanian, reproduced: Tables III and IV, Figs. 3, 6 to 29, next to IPOPT and searches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from compare.reproductions import stairs_runs
+from compare.reproductions.resume import Steps, fingerprint
+from compare.reproductions.stairs_figures import write_figures
+from compare.reproductions.stairs_paper import TABLE_4
+from compare.reproductions.stairs_report import write_report
+from compare.reproductions.stairs_runs import (
+    ALGORITHMS,
+    IDEAL_STARTS,
+    PLAN_EVALUATIONS,
+    STARTS,
+    TRACK_EVALUATIONS,
+    TRACK_SETTINGS,
+    TRACK_START,
+    loaded,
+    on_stair,
+    plan_problem,
+    track_problem,
+)
+from compare.storage import writable_folder
+
+
+def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
+    """Write tables (Markdown, CSV), figures (PNG, SVG) and ``report.md``.
+
+    Args:
+        out: folder; results of finished steps are kept in ``out/steps`` and used again.
+        progress: told about each step.
+
+    Raises:
+        OutputError: the folder cannot be written to.
+    """
+    folder = writable_folder(out)
+    steps = Steps(folder, progress, code=(stairs_runs,))
+    cases = {case: _case(steps, case) for case in TABLE_4}
+    stairs = [fingerprint(loaded(name)) for name in ("stairs-plan", "stairs-ideal")]
+    other = steps("other-stairs", {"problems": stairs}, stairs_runs.other_stairs)
+    progress("figures, tables and report")
+    write_figures(folder, cases)
+    write_report(folder, cases, other)
+
+
+def _case(steps: Steps, case: int) -> dict[str, Any]:
+    """All runs of one case of Table IV, by name."""
+    ideal, plan, jerk = on_stair(loaded("stairs-ideal"), case), plan_problem(case), plan_problem(case, "jerk")
+    found: dict[str, Any] = {
+        "ideal": steps(
+            f"ideal-{case}", fingerprint(ideal), lambda: stairs_runs.by_ipopt(ideal, IDEAL_STARTS, seed=case)
+        ),
+        "plan": {"ipopt": steps(f"plan-ipopt-{case}", fingerprint(plan), lambda: stairs_runs.by_ipopt(plan, STARTS))},
+        "jerk": steps(f"jerk-ipopt-{case}", fingerprint(jerk), lambda: stairs_runs.by_ipopt(jerk, 5)),
+        "track": {},
+    }
+    best = found["plan"]["ipopt"]["x"]
+    track = track_problem(case, best)
+    for name in ALGORITHMS:
+        found["plan"][name] = steps(
+            f"plan-{name}-{case}",
+            fingerprint(plan),
+            lambda name=name: stairs_runs.by_search(plan, name, PLAN_EVALUATIONS),
+        )
+        found["track"][name] = steps(
+            f"track-{name}-{case}",
+            fingerprint(track),
+            lambda name=name: stairs_runs.by_search(track, name, TRACK_EVALUATIONS),
+        )
+    found["printed"] = steps(
+        f"printed-{case}", fingerprint(track), lambda: stairs_runs.printed_scheme(case, best)
+    )
+    found["network"] = steps(f"network-{case}", fingerprint(track), lambda: stairs_runs.network(case, best))
+    found["differences"] = steps(
+        f"differences-{case}", fingerprint(track), lambda: stairs_runs.jerk_as_printed(case, best)
+    )
+    found["track"]["ipopt"] = steps(
+        f"track-ipopt-{case}",
+        fingerprint(track),
+        lambda: stairs_runs.by_ipopt(track, 1, x0=TRACK_START, settings=TRACK_SETTINGS),
+    )
+    return found

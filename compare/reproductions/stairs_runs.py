@@ -1,0 +1,187 @@
+"""Runs of the stairs reproduction: plain results of one step each, fit to be kept as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.reproductions.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
+from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
+from metaheuristics.interface import Algorithm
+from nlp_gait import IpoptSettings, compile_objective, load, solve
+from nlp_gait.problems.gait_problem import Array, GaitProblem
+from nlp_gait.problems.stairs_network import NetworkSettings, network_angles
+from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.problems.stairs_track import PLAN
+
+STARTS = 20  # of IPOPT on the planner
+IDEAL_STARTS = 3
+SEEDS = (0, 1, 2)
+PLAN_EVALUATIONS = 10_000
+TRACK_EVALUATIONS = ANTS * ITERATIONS
+ALGORITHMS: Mapping[str, Algorithm] = {
+    "aco": AntColony(population=ANTS, spread=EVAPORATION),
+    "aco-grid": AntColonyGrid(population=ANTS, evaporation=EVAPORATION),
+    "pso": ParticleSwarm(),
+    "ga": GeneticAlgorithm(),
+}
+TRACK_START = (60.0, 60.0, 1.4)
+# A rollout has 16,000 variables once lifted: an iteration takes a second or more.
+TRACK_SETTINGS = IpoptSettings(time_limit_s=1200.0)
+# Stairs that the paper did not try: tread and rise of one step [m]; the last one is impossible.
+OTHER_STAIRS = ((0.30, 0.10), (0.30, 0.13), (0.28, 0.17), (0.26, 0.20), (0.254, 0.50))
+IMPOSSIBLE_RISE_M = 0.5
+
+
+@cache
+def loaded(name: str, **options: str) -> GaitProblem:
+    """Problem, built once."""
+    return load(name, **options)
+
+
+def on_stair(problem: GaitProblem, case: int) -> GaitProblem:
+    """A stairs problem on the stair of a case of Table IV."""
+    row = TABLE_4[case]
+    return problem.with_values(stair_length_m=row.stair_length_m, rise_run_ratio=row.rise_run_ratio)
+
+
+def plan_problem(case: int, minimise: str = "energy") -> GaitProblem:
+    """Planner of a case."""
+    return on_stair(loaded("stairs-plan", minimise=minimise), case)
+
+
+def track_problem(case: int, plan: Mapping[str, float], **options: str) -> GaitProblem:
+    """Tracking of a plan, given by the planner's variables, in a case."""
+    values = {name: plan[name] for name in PLAN}
+    return on_stair(loaded("stairs-track", **options), case).with_values(**values)
+
+
+def by_ipopt(problem: GaitProblem, starts: int, seed: int = 0, **more: Any) -> dict[str, Any]:
+    """Best of several starts, and how each ended."""
+    solution = solve(problem, starts=starts, seed=seed, **more)
+    return {
+        **_judged(problem, list(solution.x.values())),
+        "success": solution.success,
+        "status": solution.status,
+        "iterations": solution.iterations,
+        "time_s": solution.time_s.solve,
+        "starts": [
+            {"success": s.success, "objective": s.objective, "iterations": s.iterations, "time_s": s.time_s}
+            for s in solution.starts
+        ],
+        "violations": [{"name": v.name, "by": v.violation, "unit": v.unit} for v in solution.worst_violations],
+    }
+
+
+def by_search(problem: GaitProblem, algorithm: str, evaluations: int) -> dict[str, Any]:
+    """Best of one run for each seed, and all their values."""
+    objective = compile_objective(problem)
+    runs = [minimize(objective, ALGORITHMS[algorithm], evaluations=evaluations, seed=seed) for seed in SEEDS]
+    best = min(runs, key=lambda run: (run.violation, run.objective))
+    return {
+        **_judged(problem, best.x.tolist()),
+        "objectives": [run.objective for run in runs],
+        "violations": [run.violation for run in runs],
+        "time_s": [run.time_s for run in runs],
+    }
+
+
+def _judged(problem: GaitProblem, x: list[float]) -> dict[str, Any]:
+    verdict = evaluate(problem, x)
+    return {
+        "x": dict(verdict.x),
+        "objective": verdict.objective["value"],
+        "indexes": verdict.indexes,
+        "feasible": verdict.feasible,
+        "dense": verdict.dense,
+        "dense_violations": [{"name": row.name, "by": row.violation} for row in verdict.dense_violations[:3]],
+    }
+
+
+def other_stairs() -> list[dict[str, Any]]:
+    """The planner and the ideal on stairs that the paper did not try."""
+    found = []
+    for tread, rise in OTHER_STAIRS:
+        impossible = rise >= IMPOSSIBLE_RISE_M
+        values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
+        settings = IpoptSettings(iterations=100) if impossible else None
+        row: dict[str, Any] = {"tread_m": tread, "rise_m": rise}
+        for name, starts in (("stairs-plan", 3 if impossible else 8), ("stairs-ideal", 1)):
+            run = by_ipopt(loaded(name).with_values(**values), starts, settings=settings)
+            row[name] = {key: run[key] for key in ("success", "status", "objective", "violations")}
+        found.append(row)
+    return found
+
+
+def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
+    """The network on the swing leg's 351 poses of a plan: convergence, time and error against the closed form."""
+    q, hip_to_ankle = desired_leg(case, plan)
+    robot = load_biped()
+    lengths = robot.link("HK").length_m, robot.link("KA").length_m
+    rules = {
+        "adam": NetworkSettings(),
+        "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
+        "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
+        "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
+    }
+    found = {}
+    for name, settings in rules.items():
+        path = network_angles(hip_to_ankle, *lengths, settings)
+        error = np.abs(path.angles - q)
+        found[name] = {
+            "converged": int((path.error_m2 <= settings.tolerance_m2).sum()),
+            "poses": len(q),
+            "iterations": path.iterations.tolist(),
+            "time_s": path.time_s.tolist(),
+            "largest_angle_error_rad": float(error.max()),
+            "mean_angle_error_rad": float(error.mean()),
+        }
+    return found
+
+
+def desired_leg(case: int, plan: Mapping[str, float]) -> tuple[Array, Array]:
+    """Absolute angles (m, 2) of the swing thigh and shank [rad], and the vectors from hip to ankle (m, 2) [m]."""
+    arrays = tracked(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])
+    q = arrays["q_desired"][:, :2]
+    thigh, shank = (load_biped().link(name).length_m for name in ("HK", "KA"))
+    forward = thigh * np.cos(q[:, 0]) + shank * np.cos(q[:, 1])
+    up = -thigh * np.sin(q[:, 0]) - shank * np.sin(q[:, 1])
+    return q, np.column_stack([forward, up])
+
+
+def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
+    """Time histories of the closed loop with given gains and torso pitch."""
+    problem = track_problem(case, plan)
+    return problem.signals(np.array(x), problem.p).arrays  # type: ignore[misc]
+
+
+def printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """Quanta that the paper's gains survive in the explicit scheme, and what the implicit one makes of them."""
+    row = TABLE_4[case]
+    x = [row.kp, row.kd, row.torso_pitch_rad]
+    explicit = track_problem(case, plan, scheme="explicit").with_values(gravity_compensation=0.0)
+    implicit = track_problem(case, plan).with_values(gravity_compensation=0.0)
+    compensated = track_problem(case, plan)
+    return {
+        "explicit_quanta": evaluate_indexes(explicit, x)["quanta_before_divergence"],
+        "implicit_largest_error_rad": evaluate_indexes(implicit, x)["largest_error_rad"],
+        "compensated_largest_error_rad": evaluate_indexes(compensated, x)["largest_error_rad"],
+    }
+
+
+def evaluate_indexes(problem: GaitProblem, x: list[float]) -> dict[str, float]:
+    """Exact indexes, those of a rollout that diverged too."""
+    return {name: float(value) for name, value in evaluate(problem, x).indexes.items()}
+
+
+def jerk_as_printed(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """Largest joint acceleration and jerk by finite differences of the desired angles at 0.01 s, as a paper would."""
+    q = tracked(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
+    angles = np.column_stack([q, q[:, 1] - q[:, 0], q[:, 3] - q[:, 2]])  # links and knees
+    acceleration = np.diff(angles, 2, axis=0) / 0.01**2
+    jerk = np.diff(angles, 3, axis=0) / 0.01**3
+    return {"acceleration": float(np.abs(acceleration).max()), "jerk": float(np.abs(jerk).max())}

@@ -1,0 +1,39 @@
+"""Every example runs as it stands, from another folder, and prints what it promises."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXPECTED = {
+    "solve_and_plot.py": "held back by dbm_y_mean",
+    "evaluate_your_own_x.py": "power 0.866844 W, feasible: True",
+    "your_own_objective.py": "0.0 W/s: 0.845869 W",
+    "your_own_algorithm.py": "| box-0.97 | 5 |",
+    "sweep.py": "15.0 mm: 0.84587 W, converged",
+    "custom_robot.py": "nao-with-a-load: ",
+}
+
+
+def test_no_example_is_forgotten() -> None:
+    assert {path.name for path in (ROOT / "examples").glob("*.py")} == set(EXPECTED)
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_example(name: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(ROOT / "examples" / name)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert EXPECTED[name] in done.stdout
+    assert len(done.stdout.splitlines()) > 1

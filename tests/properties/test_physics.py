@@ -1,0 +1,194 @@
+"""Invariances that any correct model of a walking robot has, whatever its numbers."""
+
+from __future__ import annotations
+
+import copy
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.problems import GaitProblem, load
+from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.problems.nao import GRAVITY, upright_links
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.balance import zmp_of_wrench
+from nlp_gait.symbolic.dynamics import newton_euler
+from tests.properties.mirror import JOINT_SIGNS, mirrored, partner
+from tests.robots.custom import Record, nao
+from tests.robots.files import written
+
+NAMES = ("nao-ssp", "nao-dsp")
+of_both_phases = pytest.mark.parametrize("name", NAMES)
+# Sums of some hundred products in another order, relative to the largest.
+ROUNDING = 1e-10
+# With a phase of 1e5 s accelerations are 1e-10 of those of a second.
+SLOW_S, AT_REST_M = 1e5, 1e-9
+SEEDS = range(5)
+
+
+def candidates(problem: GaitProblem) -> list[Array]:
+    return [np.random.default_rng(seed).uniform(problem.lower, problem.upper) for seed in SEEDS]
+
+
+def signals_of(problem: GaitProblem, x: Array) -> dict[str, Array]:
+    assert problem.signals is not None
+    signals: Signals = problem.signals(x, problem.p)
+    return dict(signals.arrays)
+
+
+def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
+    model = exact_model(problem)
+    return dict(zip(model.index_names, map(float, np.array(model.function(x, problem.p)[5]).ravel()), strict=True))
+
+
+def heavier(factor: float) -> Record:
+    """NAO with all masses and moments of inertia times a factor."""
+    raw = nao()
+    for link in raw["links"].values():
+        link["mass_kg"] *= factor
+        link["inertia_com_kgm2"] = [factor * moment for moment in link["inertia_com_kgm2"]]
+    return raw
+
+
+def larger(factor: float) -> Record:
+    """NAO with all lengths times a factor and the same masses."""
+    raw = nao()
+    for link in raw["links"].values():
+        link["com_m"] = [factor * c for c in link["com_m"]]
+        link["inertia_com_kgm2"] = [factor**2 * moment for moment in link["inertia_com_kgm2"]]
+    for joint in raw["joints"].values():
+        joint["origin_m"] = [factor * c for c in joint["origin_m"]]
+    for foot in raw["feet"].values():
+        foot |= {key: factor * value for key, value in foot.items() if key.endswith("_m") and key != "sole_polygon_m"}
+    return raw
+
+
+@of_both_phases
+@pytest.mark.parametrize("factor", [0.5, 3.0])
+def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str, factor: float) -> None:
+    """Mechanical power grows like the masses, heat like their square: with K / factor all power grows alike."""
+    plain, heavy = load(name), load(name, robot=written(tmp_path, heavier(factor)))
+    cooler = heavy.with_values(heat_loss_W_per_Nm2=plain.value("heat_loss_W_per_Nm2") / factor)
+    for x in candidates(plain):
+        one, other = signals_of(plain, x), signals_of(heavy, x)
+        np.testing.assert_allclose(other["tau"], factor * one["tau"], rtol=0, atol=ROUNDING * np.abs(one["tau"]).max())
+        np.testing.assert_allclose(other["zmp"], one["zmp"], rtol=0, atol=ROUNDING * np.abs(one["zmp"]).max())
+        before, after = indexes(plain, x), indexes(cooler, x)
+        for index in ("power_W", "torque_change_Nm"):
+            assert after[index] == pytest.approx(factor * before[index], rel=ROUNDING)
+        for index in ("dbm_x_min_m", "dbm_y_mean_m"):
+            assert after[index] == pytest.approx(before[index], rel=ROUNDING, abs=ROUNDING)
+
+
+@of_both_phases
+def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> None:
+    """Froude's similarity with a robot twice as large: equal angles, lengths times 2, times and speeds times sqrt(2)."""
+    size, root = 2.0, math.sqrt(2.0)
+    plain = load(name)
+    large = load(name, robot=written(tmp_path, larger(size)), step_length_m=size * 0.06)
+    large = large.with_values(heat_loss_W_per_Nm2=plain.value("heat_loss_W_per_Nm2") / size / root)
+    factors = np.array([{"m": size, "m/s": root, "s": root}[variable.unit] for variable in plain.variables])
+    for x in candidates(plain):
+        one, other = signals_of(plain, x), signals_of(large, factors * x)
+        np.testing.assert_allclose(other["q"], one["q"], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(other["qd"], one["qd"] / root, rtol=0, atol=ROUNDING * np.abs(one["qd"]).max())
+        np.testing.assert_allclose(other["tau"], size * one["tau"], rtol=0, atol=ROUNDING * np.abs(one["tau"]).max())
+        np.testing.assert_allclose(other["zmp"], size * one["zmp"], rtol=0, atol=ROUNDING * np.abs(one["zmp"]).max())
+        np.testing.assert_allclose(other["com"], size * one["com"], rtol=0, atol=ROUNDING)
+        before, after = indexes(plain, x), indexes(large, factors * x)
+        assert after["power_W"] == pytest.approx(size / root * before["power_W"], rel=ROUNDING)
+        assert after["dbm_y_min_m"] == pytest.approx(size * before["dbm_y_min_m"], rel=ROUNDING, abs=ROUNDING)
+
+
+def loads(robot: Robot, foot: str, arrays: dict[str, Array], sample: int) -> tuple[dict[str, float], Array]:
+    """Torques and ZMP relative to the ankle of a robot that stands on one foot, from joint histories by name."""
+    q, qd, qdd = ({name: arrays[f"{key} {name}"][sample] for name in JOINT_SIGNS} for key in ("q", "qd", "qdd"))
+    tree = tree_from(robot, robot.feet[foot].link)
+    torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright_links(robot))
+    zmp = zmp_of_wrench(wrench, robot.feet[foot].ankle_height_m, robot.mass_kg * GRAVITY)
+    return {name: float(torque) for name, torque in torques.items()}, np.array([float(zmp[0]), float(zmp[1])])
+
+
+def test_a_gait_mirrored_left_to_right_needs_mirrored_torques() -> None:
+    """Single support on the left foot against the mirrored robot on its right foot."""
+    problem = load("nao-ssp")
+    robot = load_robot("nao-v5")
+    image = mirrored(robot)
+    assert problem.signals is not None
+    for x in candidates(problem):
+        signals = problem.signals(x, problem.p)
+        columns = {name: i for i, name in enumerate(signals.joints)}
+        moving = {
+            f"{key} {partner(name)}": sign * signals.arrays[key][:, columns[name]] if name in columns else np.zeros(11)
+            for key in ("q", "qd", "qdd")
+            for name, sign in JOINT_SIGNS.items()
+        }
+        for sample in (0, 4, 10):
+            torques, zmp = loads(image, "right", moving, sample)
+            for name, column in columns.items():
+                expected = JOINT_SIGNS[name] * signals.arrays["tau"][sample, column]
+                assert torques[partner(name)] == pytest.approx(expected, abs=ROUNDING)
+            expected_zmp = (signals.arrays["zmp"][sample] - (0.06, 0.05)) * (1, -1)
+            np.testing.assert_allclose(zmp, expected_zmp, rtol=0, atol=ROUNDING)
+
+
+def test_the_mirror_image_of_the_mirror_image_is_the_robot() -> None:
+    robot = load_robot("nao-v5")
+    twice = mirrored(mirrored(robot))
+    assert (twice.links, twice.joints, twice.feet) == (robot.links, robot.joints, robot.feet)
+    assert mirrored(robot).links["LThigh"] != robot.links["LThigh"]  # its maker's data are not symmetric
+
+
+@pytest.mark.parametrize(("name", "options"), [("nao-ssp", {}), ("nao-dsp", {}), ("nao-dsp", {"torso_share": "lever"})])
+def test_at_rest_the_zmp_lies_under_the_centre_of_mass(name: str, options: dict[str, str]) -> None:
+    problem = load(name, **options)
+    for x in candidates(problem):
+        slow = x.copy()
+        slow[1:7], slow[-1] = 0.0, SLOW_S
+        arrays = signals_of(problem, slow)
+        np.testing.assert_allclose(arrays["zmp"], arrays["com"][:, :2], rtol=0, atol=AT_REST_M)
+        fast = signals_of(problem, x)
+        assert np.abs(fast["zmp"] - fast["com"][:, :2]).max() > 1e-3  # what is equal above differs in motion
+
+
+def test_at_rest_the_zmp_of_the_point_mass_biped_lies_under_its_centre_of_mass() -> None:
+    problem = load("walk12").with_values(step_time_s=SLOW_S)
+    for x in candidates(problem):
+        arrays = signals_of(problem, x)
+        np.testing.assert_allclose(arrays["zmp"], arrays["com"][:, :2], rtol=0, atol=AT_REST_M)
+
+
+@cache
+def phase(name: str) -> GaitProblem:
+    return load(name)
+
+
+@of_both_phases
+@settings(max_examples=50)
+@given(data=st.data(), heat=st.sampled_from([0.0, 0.025]))
+def test_power_is_never_negative(name: str, data: st.DataObject, heat: float) -> None:
+    """Motors do not give back what they brake."""
+    problem = phase(name).with_values(heat_loss_W_per_Nm2=heat)
+    n = len(problem.names)
+    x = np.array(data.draw(st.lists(st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0), min_size=n, max_size=n)))
+    assert indexes(problem, x)["power_W"] >= 0.0
+
+
+@of_both_phases
+def test_power_without_heat_is_that_of_the_moving_joints_alone(name: str) -> None:
+    problem = load(name)
+    cold = problem.with_values(heat_loss_W_per_Nm2=0.0)
+    for x in candidates(problem):
+        slow = copy.copy(x)
+        slow[1:7], slow[-1] = 0.0, SLOW_S
+        assert 0.0 < indexes(cold, x)["power_W"] < indexes(problem, x)["power_W"]
+        assert (
+            indexes(cold, slow)["power_W"] < 1e-3 < indexes(problem, slow)["power_W"]
+        )  # standing still costs heat only
