@@ -93,8 +93,8 @@ def logarithmic(axes: Axes, both: bool = False) -> None:
     """
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    smallest = axes.dataLim.minpos  # infinite where nothing positive was drawn
-    for axis, positive in ((axes.xaxis, smallest[0]), (axes.yaxis, smallest[1] if both else math.inf)):
+    drawn = axes.dataLim  # its least positive values are infinite where nothing positive was drawn
+    for axis, positive in ((axes.xaxis, drawn.minposx), (axes.yaxis, drawn.minposy if both else math.inf)):
         if math.isfinite(positive):
             axes.set(**{"xscale" if axis is axes.xaxis else "yscale": "log"})
             axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import nlp_gait
 from nlp_gait.robots import load_robot
 
-torso = load_robot("nao-v5").link("torso")
+torso = load_robot("nao-v5").links["torso"]
 heavy = {
     "schema": 1,
     "name": "nao-with-a-load",

@@ -1,6 +1,6 @@
 """Solve a gait problem and plot its joint torques.
 
-    python examples/solve_and_plot.py [FOLDER]
+python examples/solve_and_plot.py [FOLDER]
 """
 
 import sys

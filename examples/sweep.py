@@ -1,6 +1,6 @@
 """The true price of lifting the foot higher: IPOPT follows the optimum over the swing height.
 
-    python examples/sweep.py [FOLDER]
+python examples/sweep.py [FOLDER]
 """
 
 import sys

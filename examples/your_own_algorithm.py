@@ -46,7 +46,12 @@ class ShrinkingBoxSearch:
 problem = ProblemSpec(name="nao-ssp")
 solvers = [(ShrinkingBox(), 5), (ShrinkingBox(shrink=0.98), 5), ("pso", 5), ("ipopt", 2)]
 tasks = tuple(
-    Task(problem=problem, algorithm=algorithm, run=run, label=f"box-{algorithm.shrink}" if hasattr(algorithm, "shrink") else "")
+    Task(
+        problem=problem,
+        algorithm=algorithm,
+        run=run,
+        label=f"box-{algorithm.shrink}" if hasattr(algorithm, "shrink") else "",
+    )
     for algorithm, runs in solvers
     for run in range(runs)
 )

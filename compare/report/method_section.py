@@ -32,7 +32,7 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
             "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1, a "
             "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints on their own: what finite differences"
             " would cost, so gradient methods are never flattered. A gradient run is taken to reach its targets at its end. A "
-            "polished run carries the whole cost of the search before it. Times are wall times of the solve, without building and "
+            "polished run carries the whole cost of the search before it. Times are wall times of the solve, without building or "
             "compiling.",
             "Search algorithms of equal seed begin from the same points; run k has the study's seed plus k. Parameters of all "
             "algorithms are their sources' defaults; none was tuned on these problems.",

@@ -1,4 +1,7 @@
-"""Computations behind the reproduction of the NAO paper; results are plain data that can be kept as JSON."""
+"""Computations behind the reproduction of the NAO paper; results are plain data that can be kept as JSON.
+
+Each process builds a problem once, whatever it computes of it.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ import numpy as np
 import metaheuristics
 import nlp_gait
 from compare.judge import evaluate
+from compare.task import ProblemSpec
 from nlp_gait.backends.continuation import solve_both_ways
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 from nlp_gait.problems.nao import PLANNED_JOINTS
@@ -29,7 +33,7 @@ def search(problem: str, algorithm: str, seed: int, evaluations: int, points: Pa
         evaluations: budget.
         points: NumPy archive to write, with x (m, n) and power_W (m,).
     """
-    model = nlp_gait.load(problem)
+    model = ProblemSpec(name=problem).load()
     feasible: list[tuple[Array, Array]] = []
 
     def keep(X: Array, f: Array, violation: Array) -> None:
@@ -54,7 +58,7 @@ def search(problem: str, algorithm: str, seed: int, evaluations: int, points: Pa
 
 def solve(problem: str, seed: int, options: dict[str, str] | None = None) -> Run:
     """One start of IPOPT, from a random point."""
-    model = nlp_gait.load(problem, **(options or {}))
+    model = ProblemSpec(name=problem, options=options or {}).load()
     solution = nlp_gait.solve(model, starts=1, seed=seed)
     return {
         **judged(model, list(solution.x.values())),
@@ -68,7 +72,7 @@ def solve(problem: str, seed: int, options: dict[str, str] | None = None) -> Run
 
 def sweep(problem: str, variable: str, values: Sequence[float], starts: int) -> list[Run]:
     """Optimum with a variable held at each of some values, ascending; infeasible points are kept."""
-    model = nlp_gait.load(problem)
+    model = ProblemSpec(name=problem).load()
     path = [model.fix(**{variable: value}) for value in values]
     solutions = solve_both_ways(path, starts=starts)
     return [

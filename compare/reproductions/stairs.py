@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,12 @@ def _case(steps: Steps, case: int) -> dict[str, Any]:
         found["plan"][name] = steps(
             f"plan-{name}-{case}",
             fingerprint(plan),
-            lambda name=name: stairs_runs.by_search(plan, name, PLAN_EVALUATIONS),
+            partial(stairs_runs.by_search, plan, name, PLAN_EVALUATIONS),
         )
         found["track"][name] = steps(
             f"track-{name}-{case}",
             fingerprint(track),
-            lambda name=name: stairs_runs.by_search(track, name, TRACK_EVALUATIONS),
+            partial(stairs_runs.by_search, track, name, TRACK_EVALUATIONS),
         )
     found["printed"] = steps(
         f"printed-{case}", fingerprint(track), lambda: stairs_runs.printed_scheme(case, best)

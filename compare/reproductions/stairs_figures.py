@@ -28,8 +28,7 @@ TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]]) -> None:
     """Write every figure as PNG and SVG."""
-    plans = {case: found["plan"]["ipopt"]["x"] | {"t3_s": 3.5} for case, found in cases.items()}
-    plans = {case: _complete(case, plan) for case, plan in plans.items()}
+    plans = {case: _complete(case, found["plan"]["ipopt"]["x"]) for case, found in cases.items()}
     drawn = {case: _planned(case, plan) for case, plan in plans.items()}
     followed = {case: tracked(case, plans[case], _best_track(found)) for case, found in cases.items()}
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
@@ -210,7 +209,8 @@ def _torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
     figure = new_figure(height_in=2.9)
     for axes, (case, arrays) in zip(figure.subplots(1, len(followed), sharey=True), followed.items(), strict=True):
         for i, link in enumerate(LINKS):
-            axes.plot(arrays["t"], arrays["tau"][:, i], label=link, linewidth=1.0)
+            foot = link.startswith(("A'S", "S'"))
+            axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)
         axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
     figure.axes[0].set_ylabel("torque on the link [N m]")
     legend_below(figure)

@@ -137,9 +137,13 @@ def compile_objective(
         lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
     Raises:
-        InputError: a thread or lane count that cannot be.
+        InputError: a thread or lane count that cannot be, or a problem that is not searchable.
         CompilerError: ``require_compiler``, and there is no compiler or it fails.
     """
+    if not problem.searchable:
+        raise InputError(
+            f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can meet; use solve"
+        )
     if threads is not None and threads < 1:
         raise InputError(f"threads must be at least 1, got {threads}")
     if lanes is not None and lanes not in LANE_COUNTS:

@@ -30,12 +30,16 @@ class Continuation:
         starts: number of random starts where there is no neighbour, or where it does not help.
         seed: of the random starts.
         settings: of IPOPT.
+        solves: how many are planned, which decides whether compiling pays if the settings leave it open.
     """
 
-    def __init__(self, *, starts: int = 5, seed: int = 0, settings: IpoptSettings | None = None) -> None:
+    def __init__(
+        self, *, starts: int = 5, seed: int = 0, settings: IpoptSettings | None = None, solves: int = 1
+    ) -> None:
         self._starts = starts
         self._seed = seed
         self._settings = settings or IpoptSettings()
+        self._solves = solves
         self._neighbour: End | None = None
 
     def solve(self, problem: GaitProblem) -> Solution:
@@ -49,7 +53,7 @@ class Continuation:
             problem: a copy of the first one with other parameter values.
             earlier: attempts at the same problem from elsewhere. Random starts are not repeated where they were in vain.
         """
-        ipopt = ipopt_for(problem, self._settings)
+        ipopt = ipopt_for(problem, self._settings, self._solves)
         attempts: list[Attempt] = []
         if self._neighbour is not None:
             x0 = np.clip(self._neighbour.x, problem.lower, problem.upper)
@@ -68,7 +72,7 @@ class Continuation:
         """Solution of a problem from all attempts at it."""
         outcomes = [outcome_of(i, problem, x0, end) for i, (x0, end) in enumerate(attempts)]
         ends = [attempt.end for attempt in attempts]
-        return solution_of(problem, ipopt_for(problem, self._settings), ends, outcomes, self._seed)
+        return solution_of(problem, ipopt_for(problem, self._settings, self._solves), ends, outcomes, self._seed)
 
 
 def best_end(attempts: Sequence[Attempt]) -> End | None:
@@ -99,7 +103,7 @@ def solve_both_ways(
     order = range(len(problems))
     attempts: list[list[Attempt]] = [[] for _ in problems]
     for path_seed, direction in ((seed, order), (seed + 1, order[::-1])):
-        path = Continuation(starts=starts, seed=path_seed, settings=settings)
+        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=2 * len(problems))
         for k in direction:
             attempts[k] += path.run(problems[k], attempts[k])
             if progress is not None:

@@ -15,6 +15,7 @@ from nlp_gait.errors import unknown
 REPRODUCTIONS = {
     "nao": "compare.reproductions.nao",
     "walk12": "compare.reproductions.walk12",
+    "stairs": "compare.reproductions.stairs",
 }
 
 

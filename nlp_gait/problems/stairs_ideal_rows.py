@@ -17,7 +17,7 @@ from nlp_gait.problems.stairs_layout import Layout, labels
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.planar_biped import points
-from nlp_gait.symbolic.stair_loads import MOVING, Loads, link_angles, loads
+from nlp_gait.symbolic.stair_loads import JOINT_RATES, MOVING, Loads, link_angles, loads
 from nlp_gait.symbolic.stair_profile import Stair, stair_height
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
@@ -57,7 +57,7 @@ class IdealModel:
         torque, stance, pressure = self._loads(x)
         effort = point["torque_weight"] * ca.sumsqr(torque)
         effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
-        peak = ca.norm_inf(ca.vec(torque))
+        rate = DM(JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
         return Assembly(
             objective=step * effort,
             constraints=(
@@ -66,7 +66,11 @@ class IdealModel:
                 *self._ground(x, stance, pressure, point),
                 _limits("knee", knee_angles(x["angle"]), tuple(KNEES), range(self.intervals + 1), KNEE_LIMITS),
             ),
-            indexes={"peak_torque_Nm": peak, "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0]},
+            indexes={
+                "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
+                "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
+                "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0],
+            },
         )
 
     def loads_at(self, values: Mapping[str, Array]) -> Loads[Array]:

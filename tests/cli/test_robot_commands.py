@@ -89,6 +89,7 @@ def test_a_film_is_made_without_a_display(gait, tmp_path):
     """In a process of its own, for the graphics driver is chosen when the engine is imported."""
     pytest.importorskip("mujoco")
     film = tmp_path / "film.gif"
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
     command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:

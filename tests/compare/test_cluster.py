@@ -34,7 +34,9 @@ def dask(*arguments: str) -> subprocess.Popen[bytes]:
     root = Path(__file__).parents[2]
     environment = {**os.environ, "PYTHONPATH": str(root), "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "30s"}
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    return subprocess.Popen([sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], env=environment, **quiet)
+    return subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], env=environment, **quiet
+    )
 
 
 @pytest.fixture

@@ -57,7 +57,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_one_file_a_run(undisturbed: Path) -> None:
-    names = [f"records/nao-ssp/{solver}-000{run}.json" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)]
+    names = [
+        f"records/nao-ssp/{solver}-000{run}.json" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)
+    ]
     assert sorted(contents(undisturbed)) == sorted(names)
 
 

@@ -30,7 +30,7 @@ of_both_phases = pytest.mark.parametrize("name", NAMES)
 ROUNDING = 1e-10
 # With a phase of 1e5 s accelerations are 1e-10 of those of a second.
 SLOW_S, AT_REST_M = 1e5, 1e-9
-SEEDS = range(5)
+SEEDS = range(2)
 
 
 def candidates(problem: GaitProblem) -> list[Array]:
@@ -71,9 +71,9 @@ def larger(factor: float) -> Record:
 
 
 @of_both_phases
-@pytest.mark.parametrize("factor", [0.5, 3.0])
-def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str, factor: float) -> None:
+def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -> None:
     """Mechanical power grows like the masses, heat like their square: with K / factor all power grows alike."""
+    factor = 3.0
     plain, heavy = load(name), load(name, robot=written(tmp_path, heavier(factor)))
     cooler = heavy.with_values(heat_loss_W_per_Nm2=plain.value("heat_loss_W_per_Nm2") / factor)
     for x in candidates(plain):
