@@ -2,7 +2,7 @@
 
     python benchmarks/robustness.py
 
-Several minutes; needs the extra ``sim``. The paper's gaits: Gupta, Pratihar, Deb (2023), Tables 6 and 8.
+A quarter of an hour or more; needs the extra ``sim``. The paper's gaits: Gupta, Pratihar, Deb (2023), Tables 6 and 8.
 """
 
 import nlp_gait

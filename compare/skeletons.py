@@ -19,8 +19,9 @@ from nlp_gait.problems.walk12_robot import load_biped
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
+from nlp_gait.symbolic.planar_biped import LINKS
 from nlp_gait.symbolic.planar_biped import points as planar_points
-from nlp_gait.symbolic.stair_loads import MOVING, link_angles
+from nlp_gait.symbolic.stair_loads import link_angles
 
 ON_GROUND = 1e-6  # [m]; a sole that is higher does not bear load
 LETTER = {LEFT: "L", RIGHT: "R"}
@@ -122,11 +123,12 @@ def _knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) 
 
 def _stairs(result: Result, signals: Signals) -> Skeleton:
     """Planar rods from the flat stance foot; its ankle is the origin."""
-    q = SX.sym("q", len(MOVING))
-    found = planar_points(load_stair_climber().rods, link_angles(q), SX(2, 1))
+    history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
+    q = SX.sym("q", history.shape[1])
+    found = planar_points(load_stair_climber().rods, q if q.numel() == len(LINKS) else link_angles(q), SX(2, 1))
     function = ca.Function("points", [q], list(found.values()))
     samples = len(signals.arrays["t"])
-    values = dict(zip(found, function.map(samples)(signals.arrays["q"].T), strict=True))
+    values = dict(zip(found, function.map(samples)(history.T), strict=True))
     at = {name: np.array(value.full().T) for name, value in values.items()}
     lines = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
     tread = result.problem.value("stair_length_m") / 2

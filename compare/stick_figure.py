@@ -20,6 +20,7 @@ VIEWS = {"front": 1, "side": 0}
 AXIS_NAMES = ("x", "y")
 MARGIN_M = 0.03
 WIDTH_IN = 6.6
+TICKS_M = (0.0, 0.2)  # across; more would run into each other
 
 
 def stick_figure(skeleton: Skeleton, times_s: Sequence[float]) -> Figure:
@@ -33,7 +34,7 @@ def stick_figure(skeleton: Skeleton, times_s: Sequence[float]) -> Figure:
     columns = len(times_s)
     with style():
         row_in = [min(WIDTH_IN / columns * height / width, 2.2) for width in widths.values()]
-        figure = new_figure(WIDTH_IN, sum(row_in) + 1.3)
+        figure = new_figure(WIDTH_IN, sum(row_in) + 1.2)
         figure.set_layout_engine("compressed")  # equal scales leave gaps otherwise
         grid = figure.subplots(len(VIEWS), columns, sharey=True, squeeze=False, height_ratios=row_in)
         for row, (view, across) in zip(grid, VIEWS.items(), strict=True):
@@ -41,6 +42,7 @@ def stick_figure(skeleton: Skeleton, times_s: Sequence[float]) -> Figure:
                 _draw(axes, skeleton, int(np.abs(skeleton.t - time).argmin()), across)
                 axes.set_xlim(low[across] - MARGIN_M, high[across] + MARGIN_M)
                 axes.set_ylim(-MARGIN_M, high[2] + MARGIN_M)
+                axes.set_xticks(TICKS_M)
                 axes.set_aspect("equal")
             row[0].set_ylabel(f"{view}\nz [m]")
             row[columns // 2].set_xlabel(f"{AXIS_NAMES[across]} [m]")
@@ -60,7 +62,7 @@ def _draw(axes: Axes, skeleton: Skeleton, k: int, across: int) -> None:
         axes.plot(line[:, across], line[:, 2], "o-", color=COLOURS[limb.side], markersize=1.8, linewidth=1.1)
     for points, marker in ((skeleton.com, "s"), (skeleton.zmp, "x")):
         if points is not None:
-            axes.plot(points[k, across], points[k, 2], marker, color="black", markersize=3.5)
+            axes.plot(points[k, across], points[k, 2], marker, color="black", markersize=3)
     axes.tick_params(labelsize=7)
 
 

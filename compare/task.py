@@ -74,7 +74,7 @@ class Stop:
         evaluations: budget of a search, and of SLSQP; an NLP solver ends by itself.
         target: a feasible objective at least this good ends a search, in the problem's sense.
         stagnation: so many generations without a better point end a search.
-        time_limit_s: wall time [s].
+        time_limit_s: wall time [s]; NLP solvers other than IPOPT do not heed it.
     """
 
     evaluations: int = 10_000

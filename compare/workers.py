@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 
+from compare.interrupts import remembered_interrupts
 from compare.record import RunRecord
 from compare.runner import attempt
 from compare.task import Task
@@ -38,7 +39,10 @@ def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None
     """
     if scheduler is None and (workers == 1 or len(jobs) <= 1):
         for position, job in enumerate(jobs):
-            yield position, attempt(*job)
+            with remembered_interrupts() as check:
+                record = attempt(*job)
+                check()
+            yield position, record
         return
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 

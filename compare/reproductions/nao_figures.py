@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAPER_COLOUR = "#E69F00"
-POWER_TICKS_W = (0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
+POWER_TICKS_W = (0.5, 0.6, 0.7, 0.85, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 # Points that fall into one cell of a panel look like one; the grid is finer than the print.
 CELLS = 400
 POSES_EVERY_S = {"nao-ssp": 1.0, "nao-dsp": 0.25}  # Fig. 20
@@ -78,6 +78,7 @@ def scatter_figure(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
                 _scatter(axes, phase.points[name], position, name)
                 _envelope(axes, phase, position)
                 axes.set_xlabel(label)
+                axes.locator_params(axis="x", nbins=6)
                 _power_scale(axes)
                 axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=2, handletextpad=0.4)
             row[1].set_ylabel("")
@@ -154,10 +155,10 @@ def poses_figure(phase: PhaseFindings) -> Figure:
 
 def _power_scale(axes: Axes) -> None:
     """Logarithmic axis with plain numbers."""
-    from matplotlib.ticker import FixedLocator, NullFormatter, ScalarFormatter
+    from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(FixedLocator(POWER_TICKS_W))
-    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_ylabel("power [W]")

@@ -15,11 +15,13 @@ from compare.reproductions.stairs_report import write_report
 from compare.reproductions.stairs_runs import (
     ALGORITHMS,
     IDEAL_STARTS,
+    JERK_STARTS,
     PLAN_EVALUATIONS,
     STARTS,
     TRACK_EVALUATIONS,
     TRACK_SETTINGS,
     TRACK_START,
+    complete,
     loaded,
     on_stair,
     plan_problem,
@@ -43,45 +45,48 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     cases = {case: _case(steps, case) for case in TABLE_4}
     stairs = [fingerprint(loaded(name)) for name in ("stairs-plan", "stairs-ideal")]
     other = steps("other-stairs", {"problems": stairs}, stairs_runs.other_stairs)
+    network = steps("network", {"plan": _plan(cases[1])}, partial(stairs_runs.network, 1, complete(1, _plan(cases[1]))))
+    for case, found in cases.items():  # last, as they take minutes each
+        track = track_problem(case, _plan(found))
+        found["track"]["ipopt"] = steps(
+            f"track-ipopt-{case}",
+            fingerprint(track),
+            partial(stairs_runs.by_ipopt, track, 1, x0=TRACK_START, settings=TRACK_SETTINGS),
+        )
     progress("figures, tables and report")
-    write_figures(folder, cases)
-    write_report(folder, cases, other)
+    write_figures(folder, cases, network)
+    write_report(folder, cases, network, other)
+
+
+def _plan(found: dict[str, Any]) -> dict[str, float]:
+    """Plan of least energy that IPOPT found in a case."""
+    return dict(found["plan"]["ipopt"]["x"])
 
 
 def _case(steps: Steps, case: int) -> dict[str, Any]:
-    """All runs of one case of Table IV, by name."""
+    """Runs of one case of Table IV, by name."""
     ideal, plan, jerk = on_stair(loaded("stairs-ideal"), case), plan_problem(case), plan_problem(case, "jerk")
     found: dict[str, Any] = {
         "ideal": steps(
-            f"ideal-{case}", fingerprint(ideal), lambda: stairs_runs.by_ipopt(ideal, IDEAL_STARTS, seed=case)
+            f"ideal-{case}", fingerprint(ideal), partial(stairs_runs.by_ipopt, ideal, IDEAL_STARTS, seed=case)
         ),
-        "plan": {"ipopt": steps(f"plan-ipopt-{case}", fingerprint(plan), lambda: stairs_runs.by_ipopt(plan, STARTS))},
-        "jerk": steps(f"jerk-ipopt-{case}", fingerprint(jerk), lambda: stairs_runs.by_ipopt(jerk, 5)),
+        "plan": {"ipopt": steps(f"plan-ipopt-{case}", fingerprint(plan), partial(stairs_runs.by_ipopt, plan, STARTS))},
+        "jerk": steps(f"jerk-ipopt-{case}", fingerprint(jerk), partial(stairs_runs.by_ipopt, jerk, JERK_STARTS)),
         "track": {},
     }
-    best = found["plan"]["ipopt"]["x"]
+    best = _plan(found)
     track = track_problem(case, best)
     for name in ALGORITHMS:
         found["plan"][name] = steps(
-            f"plan-{name}-{case}",
-            fingerprint(plan),
-            partial(stairs_runs.by_search, plan, name, PLAN_EVALUATIONS),
+            f"plan-{name}-{case}", fingerprint(plan), partial(stairs_runs.by_search, plan, name, PLAN_EVALUATIONS)
         )
         found["track"][name] = steps(
-            f"track-{name}-{case}",
-            fingerprint(track),
-            partial(stairs_runs.by_search, track, name, TRACK_EVALUATIONS),
+            f"track-{name}-{case}", fingerprint(track), partial(stairs_runs.by_search, track, name, TRACK_EVALUATIONS)
         )
-    found["printed"] = steps(
-        f"printed-{case}", fingerprint(track), lambda: stairs_runs.printed_scheme(case, best)
-    )
-    found["network"] = steps(f"network-{case}", fingerprint(track), lambda: stairs_runs.network(case, best))
-    found["differences"] = steps(
-        f"differences-{case}", fingerprint(track), lambda: stairs_runs.jerk_as_printed(case, best)
-    )
-    found["track"]["ipopt"] = steps(
-        f"track-ipopt-{case}",
-        fingerprint(track),
-        lambda: stairs_runs.by_ipopt(track, 1, x0=TRACK_START, settings=TRACK_SETTINGS),
-    )
+    found["printed"] = steps(f"printed-{case}", fingerprint(track), partial(stairs_runs.printed_scheme, case, best))
+    plans = {"energy": best, "jerk": found["jerk"]["x"]}
+    found["differences"] = {
+        name: steps(f"differences-{name}-{case}", {"plan": used}, partial(stairs_runs.differences, case, used))
+        for name, used in plans.items()
+    }
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from compare.figures import legend_below, new_figure, save, style
 from compare.reproductions.stairs_motion import Leg, first_step, two_steps
 from compare.reproductions.stairs_paper import TABLE_4
-from compare.reproductions.stairs_runs import plan_problem, tracked
+from compare.reproductions.stairs_runs import complete, plan_problem, tracked
 from nlp_gait.problems.gait_problem import Array
 from nlp_gait.problems.stairs import SETBACK
 from nlp_gait.problems.stairs_robot import load_biped
@@ -26,9 +26,9 @@ DRAWN_CASE = 2  # where the paper draws one case only
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 
-def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]]) -> None:
+def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]], network: Mapping[str, Any]) -> None:
     """Write every figure as PNG and SVG."""
-    plans = {case: _complete(case, found["plan"]["ipopt"]["x"]) for case, found in cases.items()}
+    plans = {case: complete(case, found["plan"]["ipopt"]["x"]) for case, found in cases.items()}
     drawn = {case: _planned(case, plan) for case, plan in plans.items()}
     followed = {case: tracked(case, plans[case], _best_track(found)) for case, found in cases.items()}
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
@@ -42,18 +42,11 @@ def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]]) -> None:
             save(_sticks(legs, step, start, from_ground=name == "fig06-07"), folder / name)
         save(_ankle(drawn[DRAWN_CASE]), folder / "fig10-11")
         save(_stairs_compared(plans), folder / "fig12")
-        save(_pose_times(cases[1]["network"]), folder / "fig13")
+        save(_pose_times(network), folder / "fig13")
         save(_tracking(followed, "q", "angle [rad]"), folder / "fig14-20")
         save(_tracking(followed, "qd", "rate [rad/s]"), folder / "fig21-27")
         save(_zmp(followed, plans), folder / "fig28")
         save(_torques(followed), folder / "fig29")
-
-
-def _complete(case: int, plan: Mapping[str, float]) -> dict[str, float]:
-    """A plan with the parameters that are not its variables."""
-    problem = plan_problem(case)
-    given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
-    return {**plan, **given}
 
 
 def _planned(case: int, plan: Mapping[str, float]) -> Mapping[str, Array]:

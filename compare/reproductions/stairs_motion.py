@@ -62,6 +62,14 @@ def two_steps(plan: Mapping[str, float], tread: float, rise: float, times: Array
     return swinging, other
 
 
+def swing_leg(plan: Mapping[str, float], tread: float, rise: float, times: Array) -> tuple[Array, Array]:
+    """Absolute angles (m, 2) of the swing thigh and shank [rad], and the vectors from hip to ankle (m, 2) [m]."""
+    found = _motion(plan, tread, rise, times)
+    leg = _leg(found["hip"], found["ankle"], *found["angles"].T)
+    links = np.stack([leg.knee - leg.hip, leg.ankle - leg.knee], axis=1)
+    return np.arctan2(-links[:, :, 1], links[:, :, 0]), leg.ankle - leg.hip
+
+
 def _motion(plan: Mapping[str, float], tread: float, rise: float, times: Array) -> dict[str, Array]:
     ends = np.array([0.0, *(plan[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
     s = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)

@@ -19,7 +19,7 @@ Cases = Mapping[int, Mapping[str, Any]]
 MATCH = 1e-3  # a start that ends within this of the best is counted as having found it (relative)
 
 
-def write_report(folder: Path, cases: Cases, other: Sequence[Mapping[str, Any]]) -> None:
+def write_report(folder: Path, cases: Cases, network: Mapping[str, Any], other: Sequence[Mapping[str, Any]]) -> None:
     """Write all tables and ``report.md``."""
     template = (resources.files("compare.reproductions") / "stairs_report.md").read_text(encoding="utf-8")
     tables = {
@@ -31,7 +31,7 @@ def write_report(folder: Path, cases: Cases, other: Sequence[Mapping[str, Any]])
         "printed": _printed(folder, cases),
         "ideal": _ideal(folder, cases),
         "other": _other(folder, other),
-        "network": _network(folder, cases[1]["network"]),
+        "network": _network(folder, network),
         "differences": _differences(folder, cases),
     }
     values = {name: text.strip() for name, text in tables.items()}
@@ -82,7 +82,11 @@ def _verdict(run: Mapping[str, Any]) -> list[Cell]:
 
 
 def _table_4(folder: Path, cases: Cases) -> str:
-    columns = {"quantity": "", **{f"paper {case}": ".6g" for case in cases}, **{f"ours {case}": ".4f" for case in cases}}
+    columns = {
+        "quantity": "",
+        **{f"paper {case}": ".6g" for case in cases},
+        **{f"ours {case}": ".4f" for case in cases},
+    }
     best = {case: _best(found["track"]) for case, found in cases.items()}
 
     def row(name: str, field: str, ours: Mapping[int, float]) -> list[Cell]:
@@ -105,7 +109,7 @@ def _table_4(folder: Path, cases: Cases) -> str:
 
 
 def _of(cases: Cases, name: str) -> dict[int, float]:
-    return {case: float(found["differences"][name]) for case, found in cases.items()}
+    return {case: float(found["differences"]["energy"][name]) for case, found in cases.items()}
 
 
 def _at(run: Mapping[str, Any], path: Sequence[str]) -> Any:
@@ -239,12 +243,16 @@ def _differences(folder: Path, cases: Cases) -> str:
     columns = {
         "case": "d",
         "acceleration, paper [rad/s^2]": ".2f",
-        "ours [rad/s^2]": ".2f",
+        "plan of least energy [rad/s^2]": ".2f",
+        "plan of least jerk [rad/s^2]": ".2f",
         "jerk, paper [rad/s^3]": ".1f",
-        "ours [rad/s^3]": ".1f",
+        "plan of least energy [rad/s^3]": ".1f",
+        "plan of least jerk [rad/s^3]": ".1f",
     }
     rows: list[list[Cell]] = []
     for case, found in cases.items():
-        ours = found["differences"]
-        rows.append([case, TABLE_4[case].acceleration, ours["acceleration"], TABLE_4[case].jerk, ours["jerk"]])
+        row: list[Cell] = [case]
+        for name in ("acceleration", "jerk"):
+            row += [getattr(TABLE_4[case], name), *(ours[name] for ours in found["differences"].values())]
+        rows.append(row)
     return write_table(folder / "differences", columns, rows)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from compare.judge import evaluate
+from compare.reproductions.stairs_motion import swing_leg
 from compare.reproductions.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
 from metaheuristics.interface import Algorithm
@@ -20,6 +21,7 @@ from nlp_gait.problems.stairs_track import PLAN
 
 STARTS = 20  # of IPOPT on the planner
 IDEAL_STARTS = 3
+JERK_STARTS = 5
 SEEDS = (0, 1, 2)
 PLAN_EVALUATIONS = 10_000
 TRACK_EVALUATIONS = ANTS * ITERATIONS
@@ -58,6 +60,13 @@ def track_problem(case: int, plan: Mapping[str, float], **options: str) -> GaitP
     """Tracking of a plan, given by the planner's variables, in a case."""
     values = {name: plan[name] for name in PLAN}
     return on_stair(loaded("stairs-track", **options), case).with_values(**values)
+
+
+def complete(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """A plan with the parameters that are not its variables."""
+    problem = plan_problem(case)
+    given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
+    return {**plan, **given}
 
 
 def by_ipopt(problem: GaitProblem, starts: int, seed: int = 0, **more: Any) -> dict[str, Any]:
@@ -119,7 +128,9 @@ def other_stairs() -> list[dict[str, Any]]:
 
 def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
     """The network on the swing leg's 351 poses of a plan: convergence, time and error against the closed form."""
-    q, hip_to_ankle = desired_leg(case, plan)
+    tread = TABLE_4[case].stair_length_m / 2
+    times = np.linspace(0.0, plan["t3_s"], 351)
+    q, hip_to_ankle = swing_leg(plan, tread, tread * TABLE_4[case].rise_run_ratio, times)
     robot = load_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
     rules = {
@@ -141,16 +152,6 @@ def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
             "mean_angle_error_rad": float(error.mean()),
         }
     return found
-
-
-def desired_leg(case: int, plan: Mapping[str, float]) -> tuple[Array, Array]:
-    """Absolute angles (m, 2) of the swing thigh and shank [rad], and the vectors from hip to ankle (m, 2) [m]."""
-    arrays = tracked(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])
-    q = arrays["q_desired"][:, :2]
-    thigh, shank = (load_biped().link(name).length_m for name in ("HK", "KA"))
-    forward = thigh * np.cos(q[:, 0]) + shank * np.cos(q[:, 1])
-    up = -thigh * np.sin(q[:, 0]) - shank * np.sin(q[:, 1])
-    return q, np.column_stack([forward, up])
 
 
 def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
@@ -178,8 +179,8 @@ def evaluate_indexes(problem: GaitProblem, x: list[float]) -> dict[str, float]:
     return {name: float(value) for name, value in evaluate(problem, x).indexes.items()}
 
 
-def jerk_as_printed(case: int, plan: Mapping[str, float]) -> dict[str, float]:
-    """Largest joint acceleration and jerk by finite differences of the desired angles at 0.01 s, as a paper would."""
+def differences(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """Largest acceleration and jerk of links and knees by differences of the desired angles at 0.01 s."""
     q = tracked(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
     angles = np.column_stack([q, q[:, 1] - q[:, 0], q[:, 3] - q[:, 2]])  # links and knees
     acceleration = np.diff(angles, 2, axis=0) / 0.01**2

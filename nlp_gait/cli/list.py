@@ -61,7 +61,7 @@ def _details(name: str, as_json: bool) -> None:
         return
     rows = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
     print_table(f"{name}: variables", ("name", "lower", "upper", "unit", "what"), rows)
-    rows = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
-    print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "what"), rows)
+    limits = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
+    print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "what"), limits)
     options = ", ".join(f"{key}={value}" for key, value in problem.options.items())
     stdout.print(f"options: {options}\na variable's bounds are parameters too: --set {problem.names[0]}.lower=...")

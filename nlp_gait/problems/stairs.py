@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import MX
 
 from nlp_gait.problems.gait_problem import Array, Parameter, Point
-from nlp_gait.symbolic.stair_loads import MOVING
+from nlp_gait.symbolic.stair_loads import JOINT_RATES, MOVING
 from nlp_gait.symbolic.stair_profile import Stair
 
 GRAVITY = 9.81  # [m/s^2]
@@ -55,6 +55,16 @@ def stair_of(point: Point) -> Stair[MX]:
 def values_of(own_parameters: Sequence[Parameter], p: Array) -> dict[str, float]:
     """Values of a problem's own parameters by name, from its parameter vector (k,), in which they come first."""
     return {parameter.name: float(value) for parameter, value in zip(own_parameters, p, strict=False)}
+
+
+def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
+    """Histories of joints (columns as JOINTS) from those of links (columns as MOVING, m rows), with the latter beside.
+
+    A joint's angle is the difference of its links' absolute angles, see ``JOINT_RATES``.
+    """
+    links = {"q": q, "qd": qd, "qdd": qdd}
+    joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
+    return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
 def knee_angles(q: MX) -> MX:

@@ -6,11 +6,11 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem, Objective, Parameter, Signals
-from nlp_gait.problems.stairs import ANGLE_LIMITS, STAIR_PARAMETERS, values_of
+from nlp_gait.problems.stairs import ANGLE_LIMITS, STAIR_PARAMETERS, joint_signals, values_of
 from nlp_gait.problems.stairs_ideal_rows import IdealModel
 from nlp_gait.problems.stairs_ideal_start import planned_angles
 from nlp_gait.problems.stairs_layout import Block, Layout
-from nlp_gait.symbolic.stair_loads import MOVING
+from nlp_gait.symbolic.stair_loads import JOINTS, MOVING
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
@@ -94,12 +94,10 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
             return np.concatenate([columns, columns[:, -1:]], axis=1).T
 
         return Signals(
-            joints=MOVING,
+            joints=JOINTS,
             arrays={
                 "t": np.linspace(0.0, step_time, intervals + 1),
-                "q": values["angle"].T,
-                "qd": values["rate"].T,
-                "qdd": held(values["acceleration"]),
+                **joint_signals(values["angle"].T, values["rate"].T, held(values["acceleration"])),
                 "tau": held(loads.torque),
                 "stance_force": held(loads.stance_force),
                 "zmp": held(loads.stance_pressure)[:, 0],

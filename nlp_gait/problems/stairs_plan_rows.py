@@ -15,8 +15,8 @@ from nlp_gait.symbolic.stair_gait import PHASES
 from nlp_gait.symbolic.stair_loads import MOVING
 
 # Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
-# square of the intervals in a phase is kept in reserve [m]; half a millimetre on the usual grid.
-SAMPLING_RESERVE = 0.05
+# square of the intervals in a phase is kept in reserve [m]; a millimetre on the usual grid.
+SAMPLING_RESERVE = 0.1
 
 
 def posture_rows(point: Point, samples: Samples) -> tuple[Constraint, ...]:

@@ -32,15 +32,15 @@ Gains = Literal["scalar", "per-link"]
 
 # Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
 PLAN = {
-    "hip_height_m": 0.6925,
-    "hip_start_m": 0.0921,
-    "zmp_start_m": 0.2437,
-    "zmp_end_m": 0.0925,
-    "end_rate_rad_s": 0.7075,
-    "t1_s": 0.5751,
-    "t2_s": 0.7767,
-    "t_bc_s": 1.3264,
-    "foot_pitch_rad": 0.3106,
+    "hip_height_m": 0.6926,
+    "hip_start_m": 0.0918,
+    "zmp_start_m": 0.2434,
+    "zmp_end_m": 0.0923,
+    "end_rate_rad_s": 0.709,
+    "t1_s": 0.5763,
+    "t2_s": 0.7783,
+    "t_bc_s": 1.3287,
+    "foot_pitch_rad": 0.3169,
 }
 TORSO_PITCH = "torso_pitch_rad"
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
@@ -48,7 +49,7 @@ def _beside_urdf(path: str) -> str:
             f"robot file {path!r}: a URDF says nothing about soles; write {str(partner)!r} with "
             f'{{"schema": {SCHEMA}, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'
         )
-    if _resolved(_read(str(partner)).get("extends"), str(partner)) != path:
+    if _resolved(_read(str(partner)).get("extends"), str(partner)) != os.path.normpath(path):
         raise RobotDataError(
             f"robot file {str(partner)!r}: 'extends' must be {Path(path).name!r}, beside which it lies"
         )
@@ -103,7 +104,8 @@ def _resolved(base: Any, source: str) -> str | None:
     """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
     if not isinstance(base, str):
         return None
-    return str(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
+    # Normalised, so that two files that extend each other by roundabout paths are found out.
+    return os.path.normpath(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
 
 
 def _read(name_or_path: str) -> dict[str, Any]:

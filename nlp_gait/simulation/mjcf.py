@@ -10,7 +10,8 @@ from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.shapes import Prism, Shape
 
-# At 0.5 ms the powers of the support phases are within a few per cent of those at 0.1 ms; at 1 ms the light feet chatter.
+# Against 0.1 ms, power is 1 % high in single support; in double support 12 % with set-points held for 40 ms, equal with smooth
+# ones. At 1 ms the light feet chatter.
 TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor

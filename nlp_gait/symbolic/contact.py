@@ -10,6 +10,9 @@ from casadi import SX
 
 # A contact fades in over this height [m], and out again as its force falls through this one [N]: no branch, no jump.
 FADE_HEIGHT, FADE_FORCE = 2e-4, 1.0
+# Springs yield beyond this depth [m]: a point far below the ground has come in through the riser of a step, and must not be
+# shot out upwards.
+YIELD_DEPTH = 0.02
 # Slower than this a contact sticks: it creeps at the share of this speed that its load has of the friction limit [m/s].
 CREEP_SPEED = 5e-3
 
@@ -60,7 +63,7 @@ def implicit_response(
     that would pull.
 
     Args:
-        mass: (n, n) symmetric: the inertia, with what other implicit forces add to it.
+        mass: (n, n): the inertia, with what other implicit forces add to it; its symmetric part is positive definite.
         force: (n,) all forces but those of the contacts.
         velocity: (n,) now.
         contacts: points that may touch.
@@ -76,7 +79,8 @@ def implicit_response(
     rates = [ca.dot(contact.normal, velocity) for contact in contacts]
     slips = [ca.dot(contact.tangent, velocity) for contact in contacts]
     ahead = [contact.height + quantum * rate for contact, rate in zip(contacts, rates, strict=True)]
-    free = [-k * height - c * rate for height, rate in zip(ahead, rates, strict=True)]  # (eq. 33)
+    depths = [YIELD_DEPTH * ca.tanh(-height / YIELD_DEPTH) for height in ahead]
+    free = [k * depth - c * rate for depth, rate in zip(depths, rates, strict=True)]  # (eq. 33)
     touching = [(1 - ca.tanh(height / FADE_HEIGHT)) / 2 for height in ahead]
 
     solved = _solve_with(mass, force, contacts, touching, free, stiff, [contact.tangent for contact in contacts])
@@ -115,20 +119,23 @@ def _solve_with(
     for contact, share, push in zip(contacts, shares, free, strict=True):
         mass = mass + share * stiff * contact.normal @ contact.normal.T
         force = force + share * push * contact.normal
-    return solve_symmetric(mass, ca.horzcat(force, *more))
+    return solve_definite(mass, ca.horzcat(force, *more))
 
 
-def solve_symmetric(A: SX, B: SX) -> SX:
-    """Solution of A X = B (n, m) for a symmetric positive definite A (n, n), by L D L^T, without branches."""
+def solve_definite(A: SX, B: SX) -> SX:
+    """Solution of A X = B (n, m) by elimination without pivoting, hence without branches.
+
+    Args:
+        A: (n, n) with a positive definite symmetric part; it need not be symmetric.
+        B: (n, m) right-hand sides.
+    """
     n = A.shape[0]
-    L, d = SX.eye(n), [SX(0)] * n
-    for j in range(n):
-        d[j] = A[j, j] - sum((L[j, k] ** 2 * d[k] for k in range(j)), SX(0))
-        for i in range(j + 1, n):
-            L[i, j] = (A[i, j] - sum((L[i, k] * L[j, k] * d[k] for k in range(j)), SX(0))) / d[j]
-    rows = [B[i, :] for i in range(n)]
-    for i in range(n):
-        rows[i] -= sum((L[i, k] * rows[k] for k in range(i)), SX(1, B.shape[1]))
+    rows = [ca.horzcat(A[i, :], B[i, :]) for i in range(n)]
+    for k in range(n):
+        for i in range(k + 1, n):
+            rows[i] = rows[i] - rows[i][k] / rows[k][k] * rows[k]
+    found = [row[n:] for row in rows]
     for i in reversed(range(n)):
-        rows[i] = rows[i] / d[i] - sum((L[k, i] * rows[k] for k in range(i + 1, n)), SX(1, B.shape[1]))
-    return ca.vertcat(*rows)
+        known = sum((rows[i][k] * found[k] for k in range(i + 1, n)), SX(1, B.shape[1]))
+        found[i] = (rows[i][n:] - known) / rows[i][i]
+    return ca.vertcat(*found)

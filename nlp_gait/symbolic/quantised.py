@@ -8,7 +8,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.symbolic.contact import Contact, Ground, implicit_response, solve_symmetric
+from nlp_gait.symbolic.contact import Contact, Ground, implicit_response, solve_definite
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
 
 
@@ -55,7 +55,10 @@ def implicit_acceleration(
     disturbance: SX,
     quantum: float,
 ) -> SX:
-    """(n,) acceleration when controller and contacts act on the state at the end of the quantum: finite at every gain.
+    """(n,) acceleration when all velocity-dependent forces act at the end of the quantum: finite at every gain.
+
+    The Coriolis matrix multiplies the rates at the end too: as dM/dt - 2 C is skew, a free motion then loses kinetic energy to
+    first order in the quantum, and never gains any.
 
     Args:
         motion: equations of motion at the state.
@@ -73,7 +76,9 @@ def implicit_acceleration(
     coasting = after(state, SX(state.q.shape[0], 1), quantum)
     stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
     force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
-    return implicit_response(motion.M + ca.diag(stiffness), force, state.v, contacts, ground, quantum).acceleration
+    return implicit_response(
+        motion.M + quantum * motion.C + ca.diag(stiffness), force, state.v, contacts, ground, quantum
+    ).acceleration
 
 
 def explicit_acceleration(
@@ -97,4 +102,4 @@ def explicit_acceleration(
         rate, slip = ca.dot(contact.normal, state.v), ca.dot(contact.tangent, state.v)
         pressed = (contact.height <= 0) * (-ground.stiffness * contact.height - ground.damping * rate)  # (eq. 33)
         force += pressed * (contact.normal - ground.friction * ca.sign(slip) * contact.tangent)  # (eqs. 34, 35)
-    return solve_symmetric(motion.M, force)
+    return solve_definite(motion.M, force)

@@ -123,22 +123,24 @@ def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
     Source:
         Bhardwaj et al., eqs. (1), (2), (5)-(14). Changed: the Bezier curve has its binomial factors, its third control point
         lies on the cycloid's tangent and its argument is 2 u^2 - u^3, so that the velocity is continuous at both ends; the
-        cycloid ends so far ahead that the foot, once flat, stands exactly two treads on.
+        cycloid ends so far ahead that the foot, once flat, stands exactly two treads on. Where pi r is less than the distance
+        the printed foot slides along the ground first, into the edge of the step; here the cycloid is stretched instead.
     """
     rising = ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
     lift_off = ankle_on_toe(foot, SX(0), plan.toe_angle)
     radius = stair.rise  # half of the double rise
     distance = 2 * stair.tread
-    first = _first_cycloid_angle(ca.pi - distance / radius)
+    width = ca.fmax(radius, distance / ca.pi)  # a stair flatter than 2 / pi stretches the cycloid over the whole distance
+    first = _first_cycloid_angle(ca.pi - distance / width)
     caught = first + 2 * plan.catch_angle
 
     def cycloid(angle: SX) -> SX:
-        x = distance + radius * (angle - ca.sin(angle) - ca.pi)  # (eqs. 5, 7)
+        x = distance + width * (angle - ca.sin(angle) - ca.pi)  # (eqs. 5, 7)
         return lift_off + ca.vertcat(x, radius * (1 - ca.cos(angle)))  # (eq. 6)
 
     p1, p4 = lift_off, cycloid(caught)
-    p2 = lift_off + ca.vertcat(ca.fmax(distance - ca.pi * radius, 0), radius * (1 - ca.cos(first)))  # (eqs. 8, 9)
-    p3 = p4 - plan.catch_angle * radius * ca.vertcat(1 - ca.cos(caught), ca.sin(caught))
+    p2 = lift_off + ca.vertcat(0, radius * (1 - ca.cos(first)))  # (eqs. 8, 9)
+    p3 = p4 - plan.catch_angle * ca.vertcat(width * (1 - ca.cos(caught)), radius * ca.sin(caught))
     b = s[2] ** 2 * (2 - s[2])
     bridge = (1 - b) ** 3 * p1 + 3 * (1 - b) ** 2 * b * p2 + 3 * (1 - b) * b**2 * p3 + b**3 * p4  # (eqs. 10, 11)
 

@@ -8,6 +8,7 @@ import nlp_gait
 from compare.animation import contact_sheet, frames
 from compare.skeletons import skeleton_of
 from nlp_gait.export.result import Result
+from nlp_gait.problems import problem_names
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 WALK = (0.13, 0.1135, 0.02, 0.0204)
@@ -43,6 +44,25 @@ def test_walk12_legs_reach_from_hip_to_ankle():
     lengths = np.linalg.norm(np.diff(np.stack([limb.points for limb in walk.limbs]), axis=2), axis=3)
     np.testing.assert_allclose(lengths[..., 1:], np.broadcast_to(lengths[0, 0, 1:], lengths[..., 1:].shape), atol=1e-9)
     assert walk.soles[0].supports[0] and not walk.soles[0].supports[-1]
+
+
+@pytest.mark.parametrize("name", problem_names())
+def test_every_problem_can_be_drawn(name):
+    skeleton = drawn(name)
+    low, high = skeleton.box()
+    assert np.isfinite(low).all() and (high - low).max() > 0.1
+    assert all(len(limb.points) == len(skeleton.t) for limb in skeleton.limbs)
+
+
+def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
+    problem = nlp_gait.load("stairs-plan")
+    x = problem.start_point(np.random.default_rng(0))
+    arrays = problem.signals(x, problem.p).arrays
+    swing = next(limb for limb in drawn("stairs-plan", frames_per_s=0.01).limbs if limb.side == "right").points
+    np.testing.assert_allclose(swing[:, 0][:, [0, 2]], arrays["hip"], atol=1e-9)
+    in_reach = np.abs(arrays["reach"]).max(axis=1) < 0.99  # beyond it the planner's leg does not meet its ankle
+    assert in_reach.sum() > 30
+    np.testing.assert_allclose(swing[in_reach, 2][:, [0, 2]], arrays["ankle"][in_reach], atol=1e-9)
 
 
 def test_stairs_are_drawn_under_the_feet():

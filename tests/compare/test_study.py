@@ -278,3 +278,19 @@ def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     os.utime(old, (long_ago, long_ago))
     remove_leftovers(tmp_path)
     assert sorted(tmp_path.iterdir()) == [new, record]
+
+
+def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def swallowing(*job: Any) -> Any:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            return attempt(*job)
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(compare.workers, "attempt", swallowing)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(Study(tasks=(Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
+    assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before

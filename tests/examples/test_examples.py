@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from compare.settings import read_settings
+from compare.study import Study, check_study
+
 ROOT = Path(__file__).parents[2]
 EXPECTED = {
     "solve_and_plot.py": "held back by dbm_y_mean",
@@ -37,3 +40,10 @@ def test_example(name: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert EXPECTED[name] in done.stdout
     assert len(done.stdout.splitlines()) > 1
+
+
+def test_the_study_file_can_run() -> None:
+    settings = read_settings(ROOT / "examples" / "study.toml")
+    study = Study(tasks=settings.tasks())
+    check_study(study)
+    assert len(study.tasks) == 2 * (31 + 31 + 2 * 31 + 31 + 11)

@@ -11,6 +11,9 @@ import nlp_gait
 from nlp_gait.errors import InputError, OutputError, UnknownNameError
 from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.export.result import Result, load_result
+from nlp_gait.export.tables import columns
+from nlp_gait.problems import problem_names
+from nlp_gait.problems.gait_problem import Signals
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
 
@@ -34,6 +37,34 @@ def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_pa
     np.testing.assert_allclose(
         table[::2, header.index("tau LKneePitch [Nm]")], signals.arrays["tau"][:, knee], rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("name", problem_names())
+def test_every_time_history_of_every_problem_has_its_unit(name):
+    problem = nlp_gait.load(name)
+    signals = problem.signals(problem.start_point(np.random.default_rng(0)), problem.p)
+    table = list(columns(signals))
+    values = sum(array.size for array in signals.arrays.values())
+    assert len({column for column, _, _ in table}) == len(table) == values // len(signals.arrays["t"])
+    units = {column: unit for column, unit, _ in table}
+    expected = {
+        "hip z": "m",
+        "power knee": "W",
+        "link_q UH": "rad",
+        "stance_force z": "N",
+        "reach swing knee": "1",
+        "zmp x": "m",
+    }
+    for column, unit in expected.items():
+        assert units.get(column, unit) == unit
+    if name == "stairs-plan":
+        assert expected.keys() <= units.keys()
+
+
+def test_an_array_of_unknown_unit_is_refused():
+    signals = Signals(joints=(), arrays={"t": np.zeros(2), "mood": np.zeros(2)})
+    with pytest.raises(InputError, match="'mood' cannot be exported"):
+        list(columns(signals))
 
 
 def test_json_can_be_played_again(result, tmp_path):

@@ -90,6 +90,43 @@ def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
     assert handling.rule(0.9, initial).order(f, v).tolist() == [1, 0, 2]
 
 
+def test_the_defaults_are_those_of_the_source() -> None:
+    """Takahama and Sakai (2006): theta 0.2, cp 5, and here Tc = 0.8 T."""
+    assert EpsilonLevel() == EpsilonLevel(share=0.2, exponent=5.0, control=0.8)
+
+
+def test_epsilon_takes_the_violation_below_which_the_share_lies() -> None:
+    initial = np.array([1.0, 2.0, 3.0, 4.0])
+    starts = [EpsilonLevel(share=share).epsilon(0.0, initial) for share in (0.0, 0.24, 0.25, 0.75, 1.0)]
+    assert starts == [1.0, 1.0, 2.0, 4.0, 4.0]
+    assert EpsilonLevel(share=1.0).epsilon(0.0, np.array([7.0])) == 7.0
+
+
+def test_epsilon_ends_at_the_control_fraction_and_not_before() -> None:
+    initial = np.ones(3)
+    handling = EpsilonLevel(exponent=0.5, control=0.5)
+    assert handling.epsilon(np.nextafter(0.5, 0.0), initial) > 0.0
+    assert [handling.epsilon(progress, initial) for progress in (0.5, 0.75, 1.0)] == [0.0] * 3
+
+
+def test_a_violation_equal_to_epsilon_counts_as_none() -> None:
+    """Then the objective decides; beyond it the violation itself does, also against one within epsilon."""
+    rule = EpsilonLevel(share=0.0).rule(0.0, np.array([2.0, 9.0]))
+    assert rule.order(np.array([1.0, 0.0, -1.0]), np.array([0.0, 2.0, 2.1])).tolist() == [1, 0, 2]
+    major, minor = rule.keys(np.array([5.0, 6.0]), np.array([2.0, 0.1]))
+    assert (major.tolist(), minor.tolist()) == ([0.0, 0.0], [5.0, 6.0])
+    strict = EpsilonLevel().rule(1.0, np.array([2.0]))
+    assert strict.order(np.array([0.0, 1.0, 0.5]), np.array([0.5, 0.0, 0.75])).tolist() == [1, 0, 2]
+
+
+@pytest.mark.parametrize(
+    "settings", [{"exponent": 0.1}, {"control": 0.1}, {"control": 1.0}, {"share": 0.0}, {"share": 1.0}]
+)
+def test_settings_at_the_edge_are_allowed(settings: dict[str, float]) -> None:
+    EpsilonLevel(**settings)
+    StaticPenalty(weight=1e-9)
+
+
 @pytest.mark.parametrize(
     ("factory", "settings", "message"),
     [
@@ -97,7 +134,10 @@ def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
         (StaticPenalty, {"weight": np.nan}, "weight"),
         (EpsilonLevel, {"share": 1.5}, "share must be .* >= 0.0 and <= 1.0, got 1.5"),
         (EpsilonLevel, {"exponent": -1.0}, "exponent"),
+        (EpsilonLevel, {"exponent": 0.0}, "exponent"),
         (EpsilonLevel, {"control": 0.0}, "control"),
+        (EpsilonLevel, {"control": 1.1}, "control"),
+        (EpsilonLevel, {"share": -0.1}, "share"),
     ],
 )
 def test_bad_settings(factory: type, settings: dict[str, float], message: str) -> None:

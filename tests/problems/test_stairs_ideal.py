@@ -82,8 +82,8 @@ def replay(arrays: dict[str, Array]) -> Array:
     step = ca.Function("step", [state, ref, t], [state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
     intervals = len(arrays["t"]) - 1
     substeps = round(arrays["t"][1] / 1e-3)
-    references = np.vstack([arrays[name][:-1].T for name in ("q", "qd", "qdd")])
+    references = np.vstack([arrays[name][:-1].T for name in ("link_q", "link_qd", "link_qdd")])
     times = np.tile(np.arange(substeps) * 1e-3, intervals)
-    start = np.concatenate([arrays["q"][0], arrays["qd"][0]])
+    start = np.concatenate([arrays["link_q"][0], arrays["link_qd"][0]])
     ends = step.mapaccum(intervals * substeps)(start, np.repeat(references, substeps, axis=1), times[None, :])
-    return np.array(ends)[:7, -1] - arrays["q"][-1]
+    return np.array(ends)[:7, -1] - arrays["link_q"][-1]

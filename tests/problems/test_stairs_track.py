@@ -43,7 +43,7 @@ def test_doing_nothing_is_rejected_by_the_tolerance(problem: GaitProblem) -> Non
 
 
 def test_finite_at_every_gain(problem: GaitProblem) -> None:
-    gains = np.linspace(0.0, 100.0, 6)
+    gains = np.linspace(0.0, 100.0, 11)
     X = np.array([[kp, kd, torso] for kp in gains for kd in gains for torso in (1.2, 1.5)])
     f, violation = nlp_gait.compile_objective(problem)(X)
     assert np.isfinite(f).all()
@@ -58,8 +58,8 @@ def test_the_printed_explicit_scheme_diverges_and_says_when(problem: GaitProblem
 
 
 def test_multiple_shooting_meets_the_ants() -> None:
-    """On the first 0.12 s, which solve in seconds."""
-    short = nlp_gait.load("stairs-track", duration_s=0.12)
+    """On the first 0.08 s, which solve in seconds."""
+    short = nlp_gait.load("stairs-track", duration_s=0.08)
     solution = nlp_gait.solve(short, x0=[60.0, 60.0, 1.4])
     assert solution.success, solution.status
     found = minimize(nlp_gait.compile_objective(short), AntColony(), evaluations=2_000, seed=0)

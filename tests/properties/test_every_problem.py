@@ -19,24 +19,28 @@ from nlp_gait.problems.gait_problem import Array
 # Left out of all but the first test, with the reason.
 TRANSCRIBED = {"stairs-ideal": "more than a thousand variables tied by equations: no candidate of a search is feasible"}
 SEARCHABLE = [name for name in PROBLEMS if name not in TRANSCRIBED]
-SLOW = {"stairs-plan": "a start takes ten seconds; its own tests solve it"}
-SOLVABLE = [name for name in SEARCHABLE if name not in SLOW]
+# A start of the others takes ten seconds and more; their own tests solve them.
+SOLVABLE = [name for name in SEARCHABLE if not name.startswith("stairs-")]
 DERIVATIVES = {"nao-ssp": ("analytic", "finite-difference"), "nao-dsp": ("analytic", "finite-difference")}
 VARIANTS = [(name, kind) for name in SEARCHABLE for kind in DERIVATIVES.get(name, (None,))]
 of_every_variant = pytest.mark.parametrize(
     ("name", "kind"), VARIANTS, ids=[f"{n} {k or ''}".strip() for n, k in VARIANTS]
 )
 
+# The other is a closed loop with contacts that begin and end: a difference across one of them is no derivative.
+SMOOTH = [name for name in SEARCHABLE if name != "stairs-track"]
+
 # Squares of squares of squares stay below 1e308; beyond, a candidate overflows and counts as a failed evaluation.
 FARTHEST = 1e30
-# How many ranges beyond the bounds a problem is defined, where it is not everywhere: a hip below the ground has no leg.
-DEFINED_BEYOND = {"stairs-plan": 1.0}
+# How many ranges beyond the bounds a problem is defined, where it is not everywhere: with its hip at the ground a robot has no
+# posture, and with negative gains a closed loop is unstable and overflows. Such candidates count as failed evaluations.
+DEFINED_BEYOND = {"stairs-plan": 1.0, "stairs-track": 0.0}
 # The same sums in another order.
 ROUNDING = 1e-12
 # IPOPT's tolerance of 1e-8 on scaled rows, times the number of lifted variables in the sum and slopes of order ten.
 SOLVED = 1e-5
-# Central differences with this step on functions of order one; their third derivatives reach 1e3.
-DIFFERENCE_STEP, DIFFERENCE_TOLERANCE = 1e-5, 1e-4
+# Central differences with this step on functions of order one, whose third derivatives reach 1e5; rounding gives 1e-9.
+DIFFERENCE_STEP, DIFFERENCE_TOLERANCE = 1e-6, 1e-5
 
 
 @cache
@@ -163,7 +167,7 @@ def assert_derivative(function: ca.Function, slope: ca.Function, at: Array, rest
         np.testing.assert_allclose((up - down) / (2 * DIFFERENCE_STEP), expected, rtol=0, atol=tolerance)
 
 
-@pytest.mark.parametrize("name", SEARCHABLE)
+@pytest.mark.parametrize("name", SMOOTH)
 def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     """Of the Lagrangian with random multipliers."""
     model, at, values = inside(name)
@@ -175,7 +179,7 @@ def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     assert_derivative(slope, bend, at, (values, np.random.default_rng(3).normal(size=g.shape[0])))
 
 
-@pytest.mark.parametrize("name", [name for name in SEARCHABLE if not name.startswith("nao-")])  # those: test_nlp.py
+@pytest.mark.parametrize("name", [name for name in SMOOTH if not name.startswith("nao-")])  # those: test_nlp.py
 def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
     model, at, values = inside(name)
     x, p, f, g = (model.nlp[key] for key in "xpfg")

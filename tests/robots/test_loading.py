@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -157,6 +158,23 @@ def test_robots_that_extend_each_other_are_refused(tmp_path: Path) -> None:
         load_robot(str(path))
 
 
+def test_two_files_that_extend_each_other_by_roundabout_paths_are_refused(tmp_path: Path) -> None:
+    for name, other in (("a", "b"), ("b", "a")):
+        raw = {"schema": 1, "name": name, "extends": f"../{tmp_path.name}/{other}.json"}
+        (tmp_path / f"{name}.json").write_text(json.dumps(raw), encoding="utf-8")
+    with pytest.raises(RobotDataError, match="'extends' must name another robot"):
+        load_robot(str(tmp_path / "a.json"))
+
+
+def test_a_file_is_extended_from_the_folder_of_the_one_that_names_it(tmp_path: Path) -> None:
+    folder = tmp_path / "robots"
+    folder.mkdir()
+    (folder / "base.json").write_text(json.dumps(tiny()), encoding="utf-8")
+    raw = {"schema": 1, "name": "child", "extends": "base.json", "links": {"torso": link(mass=7.0)}}
+    (folder / "child.json").write_text(json.dumps(raw), encoding="utf-8")
+    assert load_robot(str(folder / "child.json")).links["torso"].mass_kg == 7.0
+
+
 def test_a_damaged_group_beside_extends_is_named(tmp_path: Path) -> None:
     raw = {"schema": 1, "name": "odd", "extends": "nao-v5", "links": ["LThigh"]}
     with pytest.raises(RobotDataError, match=r"'links' must be an object, got \['LThigh'\]"):
@@ -195,6 +213,16 @@ def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> 
     heavy = load_robot(written(tmp_path, raw))
     assert heavy.mass_kg == pytest.approx(base.mass_kg - base.links["LThigh"].mass_kg + 9.0)
     assert heavy.joints == base.joints
+
+
+def test_records_made_in_code_are_checked_like_those_of_a_file() -> None:
+    knee, thigh = load_robot("nao-v5").joint("LKneePitch"), load_robot("nao-v5").links["LThigh"]
+    with pytest.raises(RobotDataError, match=r"link 'LThigh': com_m must be finite numbers, got \(0\.0, nan, 0\.0\)"):
+        dataclasses.replace(thigh, com_m=(0.0, float("nan"), 0.0))
+    with pytest.raises(
+        RobotDataError, match=r"joint 'LKneePitch': axis must be a unit vector, got \(0\.0, 2\.0, 0\.0\)"
+    ):
+        dataclasses.replace(knee, axis=(0.0, 2.0, 0.0))
 
 
 def test_robots_and_their_records_are_frozen() -> None:

@@ -262,6 +262,11 @@ def test_a_urdf_alone_is_answered_with_the_robot_file_to_write(tmp_path: Path) -
         load_robot(path)
 
 
+def test_a_roundabout_path_to_a_urdf_is_the_same_path(tmp_path: Path) -> None:
+    path = Path(stored(tmp_path, as_urdf(nao())))
+    assert load_robot(f"{path.parent}/../{path.parent.name}/{path.name}").name == "nao-v5"
+
+
 def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
     with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', beside which it lies"):

@@ -13,7 +13,7 @@ from nlp_gait.problems.gait_problem import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import Body, inertia_matrix, tree_from, weld
 from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import Wrench, newton_euler
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regrouped_inertias
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 
 GRAVITY = 9.8
@@ -174,3 +174,38 @@ def test_the_combined_zmp_is_the_load_weighted_mean_and_ignores_an_unloaded_foot
     feet = [SX([0.0, 0.1]), SX([0.2, -0.1])]
     assert np.array(ca.DM(combined_zmp(feet, [SX(10), SX(30)]))).ravel() == pytest.approx([0.15, -0.05])
     assert np.array(ca.DM(combined_zmp(feet, [SX(10), SX(0)]))).ravel() == pytest.approx([0.0, 0.1])
+
+
+def test_regrouping_leaves_mass_in_the_first_body_only_and_none_along_the_axes() -> None:
+    first, *others = regrouped_inertias(TREE)
+    assert first.mass == pytest.approx(ROBOT.mass_kg)
+    for body, inertia in zip(TREE[1:], others, strict=True):
+        assert body.joint is not None
+        axis = np.array(body.joint.axis)
+        assert inertia.mass == 0.0
+        assert axis @ inertia.first == pytest.approx(0.0, abs=1e-15)
+        assert axis @ inertia.second @ axis == pytest.approx(0.0, abs=1e-15)
+
+
+def test_links_that_are_kept_neither_give_nor_take() -> None:
+    plain = {body.link.name: inertia for body, inertia in zip(TREE, regrouped_inertias(TREE), strict=True)}
+    names = [body.link.name for body in TREE]
+    kept = dict(zip(names, regrouped_inertias(TREE, kept=["torso"]), strict=True))
+    assert kept["torso"].mass == pytest.approx(ROBOT.links["torso"].mass_kg)
+    for body in TREE[1:]:
+        beside = "torso" in (body.link.name, TREE[body.parent].link.name)
+        assert (kept[body.link.name].mass > 0.0) == beside
+        assert plain[body.link.name].mass == 0.0
+
+
+def test_to_know_what_stays_upright_saves_operations() -> None:
+    q, qd, qdd = (SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd"))
+    counts = [
+        ca.Function(
+            "torques",
+            [q, qd, qdd],
+            list(newton_euler(TREE, by_name(q), by_name(qd), by_name(qdd), GRAVITY, upright=upright)[0].values()),
+        ).n_instructions()
+        for upright in ((), (ROBOT.root,))
+    ]
+    assert counts[1] < counts[0]

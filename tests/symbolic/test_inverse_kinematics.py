@@ -129,3 +129,21 @@ def test_the_lifted_knee_falls_on_with_the_tangent_beyond_the_margin() -> None:
     """So a solver that stretched the leg too far is drawn back by the slope, instead of losing it."""
     near, far = (angles(LIFTED, np.array([0.0, 0.0, -z]), STILL, STILL)[0][2] for z in (0.25, 0.3))
     assert far < near < np.arccos(1 - MARGIN)
+
+
+def test_rates_are_damped_within_a_tenth_of_a_millimetre_of_the_roll_axis_only() -> None:
+    """Roll rate by hand for a lateral speed of 1 m/s: 1 / length outside, length / (0.1 mm)^2 within."""
+    for length, rate in ((2e-4, 5e3), (1e-4, 1e4), (5e-5, 5e3)):
+        _, qd, _, _ = angles(EXACT, np.array([0.15, 0.0, -length]), np.array([0.0, 1.0, 0.0]), STILL)
+        assert qd[0] == pytest.approx(rate)
+
+
+def test_a_nearly_folded_leg_of_equal_links_turns_as_a_whole() -> None:
+    """Ankle and hip 3 mm apart, thigh and tibia equally long: the hip pitch goes with half the knee, as in any such leg."""
+    motion = Motion(SX.sym("p", 3), SX.sym("v", 3), SX.sym("a", 3))
+    leg = leg_angles(motion, THIGH, THIGH, SX(0.0), Exact())
+    function = ca.Function("equal", list(motion), [*leg.joints, leg.reach])
+    q, qd, _, _ = angles(function, np.array([0.0, 0.0, -3e-3]), np.array([0.0, 0.0, -0.01]), STILL)
+    assert q[1] == pytest.approx(-q[2] / 2, abs=1e-12)
+    assert qd[1] == pytest.approx(-qd[2] / 2, rel=1e-9)
+    assert qd[2] < 0.0

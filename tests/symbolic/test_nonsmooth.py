@@ -90,3 +90,70 @@ def test_exact_acos_clamps_and_lifted_acos_goes_on_along_the_tangent() -> None:
     slope = -1 / np.sqrt(1 - limit**2)
     got = [float(v) for v in acos(Lifted(MX(1e-3)))(1.5)]
     assert got == pytest.approx([np.arccos(limit) + slope * (1.5 - limit), slope, 0.0], rel=1e-12)
+
+
+def test_a_stretched_knee_has_a_steep_and_finite_slope_when_exact() -> None:
+    """At +-1 the sine is taken as 1e-8; beyond, the leg is out of reach and still."""
+    for c, second in ((1.0, -1e24), (-1.0, 1e24)):
+        _, first, bend = (float(v) for v in acos(Exact())(c))
+        assert (first, bend) == pytest.approx((-1e8, second))
+        assert [float(v) for v in acos(Exact())(c * (1 + 1e-15))[1:]] == [0.0, 0.0]
+
+
+def test_without_a_margin_the_tangent_begins_a_millionth_before_the_stretched_leg() -> None:
+    ops = Lifted(MX(1e-3))
+    assert float(acos(ops, 0.0)(1 - 1.5e-6)[2]) < -1e8  # still an arc cosine
+    assert float(acos(ops, 0.0)(1 - 0.5e-6)[2]) == 0.0
+
+
+@given(switch=reals, below=reals, above=reals)
+def test_an_exact_step_takes_one_of_its_branches(switch: float, below: float, above: float) -> None:
+    got = value(Exact().step(MX(switch), MX(below), MX(above)))[0]
+    expected = above if switch >= 0 else below
+    assert got == pytest.approx(expected, abs=1e-9)  # below + (above - below), with values of up to a million
+
+
+@given(v=st.lists(reals, min_size=1, max_size=9))
+def test_the_largest_of_a_vector_is_found_at_every_place(v: list[float]) -> None:
+    column, largest = MX(ca.DM(v)), max(map(abs, v))
+    got = value(Exact().largest(column))
+    assert got.tolist() == [largest]
+    ops = Lifted(MX(1e-3))
+    ops.largest(column)
+    (lift,) = ops.lifts
+    rows = ca.Function("rows", [lift.variable], [lift.rows])
+    assert value(lift.value).tolist() == [largest]
+    assert lift.rows.shape == (2 * len(v), 1)
+    assert np.array(rows(largest)).min() == 0.0
+    assert lift.from_above
+
+
+def recurrence() -> ca.Function:
+    """(a, b) to (a + b + u, 2 b + w)."""
+    state, u, w = MX.sym("state", 2), MX.sym("u"), MX.sym("w")
+    return ca.Function("step", [state, u, w], [ca.vertcat(state[0] + state[1] + u, 2 * state[1] + w)])
+
+
+def test_a_rollout_by_hand_and_its_equations() -> None:
+    """From (1, 1) with u = (0, 10, 0) and w = (0, 0, -1): (2, 2), (14, 4), (18, 7)."""
+    initial, inputs = MX(ca.DM([1, 1])), (MX(ca.DM([[0, 10, 0]])), MX(ca.DM([[0, 0, -1]])))
+    path = [2.0, 2.0, 14.0, 4.0, 18.0, 7.0]
+    assert value(ca.vec(Exact().rollout(recurrence(), initial, *inputs))).tolist() == path
+    ops = Lifted(MX(1e-3))
+    lifted = ops.rollout(recurrence(), initial, *inputs)
+    (lift,) = ops.lifts
+    assert lifted.shape == (2, 3)
+    assert lift.tight
+    assert value(lift.value).tolist() == path
+    rows = ca.Function("rows", [lift.variable], [lift.rows])
+    assert np.array(rows(path)).ravel().tolist() == [0.0] * 6
+    # An error in the second state is seen in its own step and carried into the next one.
+    off = np.array(rows(np.array(path) + np.array([0, 0, 1.0, 0, 0, 0]))).ravel().tolist()
+    assert off == [0.0, 0.0, 1.0, 0.0, -1.0, 0.0]
+
+
+def test_lifts_of_minima_and_absolute_values_leave_freedom_on_one_side() -> None:
+    ops = Lifted(MX(1e-3))
+    ops.abs(MX(1.0))
+    ops.min(MX(1.0), MX(2.0))
+    assert [(lift.from_above, lift.tight) for lift in ops.lifts] == [(True, False), (False, False)]

@@ -1,0 +1,125 @@
+"""Algorithms of other packages and constraint handlings, by name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from metaheuristics import (
+    ADAPTERS,
+    Deb,
+    EpsilonLevel,
+    SearchError,
+    StaticPenalty,
+    algorithm,
+    handling,
+    minimize,
+    registry,
+)
+from metaheuristics.adapters.cma import CmaEs
+from metaheuristics.adapters.pymoo import MODULES, Pymoo
+from metaheuristics.adapters.scipy_de import STRATEGIES, DifferentialEvolution
+from metaheuristics.interface import Array
+from tests.metaheuristics.problems import disc, sphere
+
+
+def test_names_of_adapters() -> None:
+    assert algorithm("cma", population=20) == CmaEs(population=20)
+    assert algorithm("de", strategy="rand1bin") == DifferentialEvolution(strategy="rand1bin")
+    assert algorithm("pymoo:NSGA2") == Pymoo(algorithm="NSGA2") and algorithm("pymoo:NSGA2").name == "pymoo:NSGA2"
+    assert all(algorithm(name).name == name for name in ADAPTERS)
+
+
+def test_a_package_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    with pytest.raises(SearchError, match=r"'cma' needs the package cma.*pip install 'nlp-gait\[algorithms\]'"):
+        algorithm("cma")
+    with pytest.raises(SearchError, match="'pymoo:GA' needs the package pymoo"):
+        algorithm("pymoo:GA")
+    assert algorithm("pso").name == "pso"
+
+
+def test_importing_the_package_imports_none_of_them() -> None:
+    program = "import sys, metaheuristics; print(*sorted(sys.modules))"
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", program], cwd=root, capture_output=True, text=True, timeout=60)
+    assert not {"cma", "pymoo", "scipy"} & set(done.stdout.split())
+
+
+def test_handlings_by_name() -> None:
+    assert handling("deb") == Deb() and handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
+    assert handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
+    for name, settings, message in (
+        ("penalty", {}, "constraint handling 'penalty' needs a value for 'weight'"),
+        ("deb", {"weight": 1.0}, "constraint handling 'deb' has no setting 'weight'"),
+        ("epsilonn", {}, "unknown constraint handling 'epsilonn'; did you mean 'epsilon'"),
+    ):
+        with pytest.raises(SearchError, match=message):
+            handling(name, **settings)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "message"),
+    [
+        ("cma", {"population": 3}, "population must be a whole number >= 4"),
+        ("cma", {"sigma": 0.0}, "sigma"),
+        ("cma", {"growth": 0.5}, "growth"),
+        ("de", {"population": 4}, "population must be a whole number >= 5"),
+        ("de", {"strategy": "best"}, "strategy must be one of best1bin"),
+        ("de", {"mutation_low": 1.2}, "mutation_low must be .* <= 1.0"),
+        ("de", {"recombination": 2.0}, "recombination"),
+        ("pymoo:GA", {"population": 1}, "population"),
+        ("pymoo:GAA", {}, "unknown algorithm 'pymoo:GAA'; did you mean 'pymoo:GA'"),
+        ("pymoo:GA", {"settings": {"nonsense": 1, "seed": 1}}, None),
+    ],
+)
+def test_bad_settings_of_adapters(name: str, settings: dict[str, object], message: str | None) -> None:
+    if message is None:  # what pymoo itself takes, it takes: its own settings are passed on
+        assert algorithm(name, **settings).population == 50
+        return
+    with pytest.raises(SearchError, match=message):
+        algorithm(name, **settings)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_pymoo_algorithm_runs_from_the_shared_points_and_leaves_the_global_generator(name: str) -> None:
+    pytest.importorskip("pymoo")
+    generations: list[Array] = []
+    before = np.random.get_state()[1].copy()  # type: ignore[union-attr]
+    result = minimize(
+        disc(),
+        algorithm(f"pymoo:{name}", population=20),
+        evaluations=400,
+        seed=7,
+        observe=lambda X, f, v: generations.append(X),
+    )
+    reference: list[Array] = []
+    minimize(
+        disc(), algorithm("pso", population=20), evaluations=20, seed=7, observe=lambda X, f, v: reference.append(X)
+    )
+    np.testing.assert_array_equal(generations[0], reference[0])
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]
+    assert result.evaluations == 400 and result.objective < generations[0].sum(axis=1).max()
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_every_strategy_of_differential_evolution_converges(strategy: str) -> None:
+    result = minimize(sphere(2), DifferentialEvolution(strategy=strategy, population=20), evaluations=4000, seed=3)
+    assert result.objective < 1e-3
+
+
+def test_cma_restarts_with_a_growing_population() -> None:
+    sizes: list[int] = []
+    minimize(sphere(2), CmaEs(), evaluations=6000, seed=2, observe=lambda X, f, v: sizes.append(len(X)))
+    assert sizes[0] == 10 and sorted(sizes) == sizes or set(sizes[:-1]) <= {10, 20, 40, 80, 160}
+    assert 20 in sizes
+
+
+def test_cma_does_not_touch_the_global_generator() -> None:
+    before = np.random.get_state()[1].copy()  # type: ignore[union-attr]
+    minimize(disc(), CmaEs(), evaluations=500, seed=1)
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]
