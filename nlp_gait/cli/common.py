@@ -26,7 +26,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
-Robot = Annotated[str | None, typer.Option(help="nao-v5 (default), nao-v6, nao-v4, or a robot file (.json).")]
+Robot = Annotated[str | None, typer.Option(help="nao-v5 (default), nao-v6, nao-v4, or a robot file (.json, .urdf).")]
 Intervals = Annotated[int | None, typer.Option(help="Equal parts of the phase (default 10).")]
 Derivatives = Annotated[str | None, typer.Option(help="analytic (default) or finite-difference.")]
 Options = Annotated[

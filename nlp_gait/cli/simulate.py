@@ -14,14 +14,15 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.measurements import Measurements
     from nlp_gait.simulation.robustness import Robustness
 
-FRAMES_PER_S = 25.0
-
 
 @command
 def simulate(
     result: ResultFile,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
+    frames_per_s: Annotated[
+        float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")
+    ] = 25.0,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
     torque_limits: Annotated[str, typer.Option(help="urdf, stall or continuous: published limits differ.")] = "urdf",
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
@@ -59,8 +60,8 @@ def simulate(
     plan = plan_of(load_result(result))
     drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
     if target is not None:
-        trace, frames = filmed(plan, conditions, drive, sole, FRAMES_PER_S)
-        write_video(target, frames, FRAMES_PER_S)
+        trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)
+        write_video(target, frames, frames_per_s)
     else:
         trace = (shown if viewer else play)(plan, conditions, drive, sole)
     report = measure(plan, trace, drive)

@@ -34,7 +34,8 @@ def engine_torques(result: Result, signals: Signals) -> Array:
         _fill(torques, tree_from(robot, robot.feet["left"].link), signals)
         return torques
     hip = SX.sym("hip")
-    by_side = torso_shares(hip, options["torso_share"])  # type: ignore[arg-type]
+    feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
+    by_side = torso_shares(hip, options["torso_share"], feet_y)  # type: ignore[arg-type]
     for side, foot in FEET.items():
         tree = tree_from(robot, robot.feet[foot].link, [j for j in signals.joints if j.startswith(side)])
         share = ca.Function("share", [hip], [by_side[side]])(signals.arrays["hip"][:, 1]).full().ravel()

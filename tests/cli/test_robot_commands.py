@@ -90,9 +90,9 @@ def test_a_film_is_made_without_a_display(gait, tmp_path):
     pytest.importorskip("mujoco")
     film = tmp_path / "film.gif"
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
-    command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film)]
+    command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film), "--fps", "4"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
         pytest.skip("no off-screen graphics here")
     assert done.returncode == 0, done.stderr
-    assert "stays up" in done.stdout and film.stat().st_size > 50_000
+    assert "stays up" in done.stdout and film.stat().st_size > 20_000
