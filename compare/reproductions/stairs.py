@@ -45,7 +45,11 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     cases = {case: _case(steps, case) for case in TABLE_4}
     stairs = [fingerprint(loaded(name)) for name in ("stairs-plan", "stairs-ideal")]
     other = steps("other-stairs", {"problems": stairs}, stairs_runs.other_stairs)
-    network = steps("network", {"plan": _plan(cases[1])}, partial(stairs_runs.network, 1, complete(1, _plan(cases[1]))))
+    network = steps(
+        "network",
+        {**fingerprint(plan_problem(1)), "plan": _plan(cases[1])},
+        partial(stairs_runs.network, 1, complete(1, _plan(cases[1]))),
+    )
     for case, found in cases.items():  # last, as they take minutes each
         track = track_problem(case, _plan(found))
         found["track"]["ipopt"] = steps(
@@ -86,7 +90,11 @@ def _case(steps: Steps, case: int) -> dict[str, Any]:
     found["printed"] = steps(f"printed-{case}", fingerprint(track), partial(stairs_runs.printed_scheme, case, best))
     plans = {"energy": best, "jerk": found["jerk"]["x"]}
     found["differences"] = {
-        name: steps(f"differences-{name}-{case}", {"plan": used}, partial(stairs_runs.differences, case, used))
+        name: steps(
+            f"differences-{name}-{case}",
+            {**fingerprint(track), "plan": used},
+            partial(stairs_runs.differences, case, used),
+        )
         for name, used in plans.items()
     }
     return found

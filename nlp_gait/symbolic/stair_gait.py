@@ -130,7 +130,8 @@ def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
     lift_off = ankle_on_toe(foot, SX(0), plan.toe_angle)
     radius = stair.rise  # half of the double rise
     distance = 2 * stair.tread
-    width = ca.fmax(radius, distance / ca.pi)  # a stair flatter than 2 / pi stretches the cycloid over the whole distance
+    # A stair flatter than 2 / pi stretches the cycloid over the whole distance.
+    width = ca.fmax(radius, distance / ca.pi)
     first = _first_cycloid_angle(ca.pi - distance / width)
     caught = first + 2 * plan.catch_angle
 
