@@ -60,7 +60,7 @@ class IpoptSettings:
 
     tolerance: float = 1e-8
     iterations: int = 300
-    time_limit_s: float = 60.0
+    time_limit_s: float = 300.0
     hessian: str | None = None
     compiled: bool | None = None
 

@@ -20,7 +20,7 @@ from rich.table import Table
 from compare.runner import ProblemSpec
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError, InputError, unknown
-from nlp_gait.problems import PROBLEMS
+from nlp_gait.problems import problem_maker
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -95,11 +95,9 @@ def problem_spec(
         UnknownNameError: problem, option, parameter or variable.
         InputError: a value that is not allowed.
     """
-    if name not in PROBLEMS:
-        raise unknown("problem", name, PROBLEMS)
     named = {"robot": robot, "intervals": intervals, "derivatives": derivatives}
     given: dict[str, Any] = {key: value for key, value in named.items() if value is not None}
-    known = inspect.signature(PROBLEMS[name]).parameters
+    known = inspect.signature(problem_maker(name)).parameters
     for key, text in _pairs(options, "--option"):
         if key not in known:
             raise unknown(f"option of {name}", key, known)

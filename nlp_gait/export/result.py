@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.problems import PROBLEMS, GaitProblem, load
+from nlp_gait.problems import PROBLEMS, GaitProblem, load, problem_maker
 from nlp_gait.problems.gait_problem import Array
 
 
@@ -70,7 +70,7 @@ def _result(raw: Any) -> Result:
 
 def _check_types(name: str, options: Mapping[str, Any]) -> None:
     """Refuse a value of another type than the option's default."""
-    known = inspect.signature(PROBLEMS[name]).parameters
+    known = inspect.signature(problem_maker(name)).parameters
     for key, value in options.items():
         expected = type(known[key].default) if key in known else type(value)
         if type(value) is not expected and not (expected is float and type(value) is int):
