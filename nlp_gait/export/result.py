@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.problems import PROBLEMS, GaitProblem, load, problem_maker
+from nlp_gait.problems import GaitProblem, load, problem_maker
 from nlp_gait.problems.gait_problem import Array
 
 
@@ -54,8 +54,7 @@ def _result(raw: Any) -> Result:
     if not isinstance(name, str):
         raise InputError(f"'problem' must be the name of a problem, got {name!r}; see `nlp-gait list`")
     options, parameters = (_object(raw.get(key, {}), key) for key in ("options", "parameters"))
-    if name in PROBLEMS:
-        _check_types(name, options)
+    _check_types(name, options)
     problem = load(name, **options).with_values(**parameters)
     values = _object(raw.get("x"), "x")
     missing = [variable for variable in problem.names if variable not in values]
