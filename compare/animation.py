@@ -10,8 +10,8 @@ import numpy as np
 
 from compare.figures import new_figure, style
 from compare.skeleton import LEFT, RIGHT, TRUNK, Skeleton
-from nlp_gait.errors import OutputError
 from nlp_gait.export.video import Frame
+from nlp_gait.files import new_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,10 +67,8 @@ def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
         for axis, k in zip(axes[0], chosen, strict=True):
             axis.set_title(f"{skeleton.t[k]:.2f} s")
         figure.suptitle(f"{skeleton.title}: {_legend(skeleton)}", fontsize=9)
-        try:
-            figure.savefig(path, dpi=SHEET_DPI)
-        except OSError as error:
-            raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+        with new_file(path) as file:
+            figure.savefig(file, format="png", dpi=SHEET_DPI)
 
 
 def _width(skeleton: Skeleton, views: list[str]) -> float:

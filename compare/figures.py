@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.storage import write_text
-from nlp_gait.errors import OutputError
+from nlp_gait.files import new_file, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,11 +119,8 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
     write_text(paths[1], svg_text(figure))
     figure.set_layout_engine("none")  # it stands; finding it again takes as long as drawing
-    try:
-        with style():
-            figure.savefig(paths[0])
-    except OSError as error:
-        raise OutputError(f"cannot write {str(paths[0])!r}: {error.strerror}") from error
+    with style(), new_file(paths[0]) as file:
+        figure.savefig(file, format="png")
     return paths
 
 

@@ -125,7 +125,7 @@ def _ipopt(task: Task, problem: GaitProblem, x0: Array, build: float) -> Outcome
 
 
 def _other(task: Task, problem: GaitProblem, x0: Array, build: float) -> Outcome:
-    end = solve_with(str(task.algorithm), problem, x0)
+    end = solve_with(str(task.algorithm), problem, x0, task.stop.time_limit_s)
     cost, violation = claimed(problem, end.x)
     counts = asdict(end.evaluations)
     return Outcome(

@@ -71,7 +71,7 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers; the robot stands beside the problem's name."""
         robot = {"robot": self.options["robot"]} if "robot" in self.options else {}
-        return {"problem": self.problem, **robot, **asdict(self)}
+        return {"schema": 1, "problem": self.problem, **robot, **asdict(self)}
 
 
 def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:

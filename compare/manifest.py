@@ -6,20 +6,22 @@ import os
 import platform
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from compare.decoding import decoded
 from compare.settings import StudySettings, settings_from
-from compare.storage import read_json, write_json
 from nlp_gait.backends.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.native_kernel import BASE_FLAGS
 from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.files import read_json, write_json
 
 SCHEMA = 1
 FILE = "study.json"
+REMEDY = "delete it, the records are still good"
 PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
 
 
@@ -68,6 +70,15 @@ class Manifest:
     sessions: tuple[Session, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Kept:
+    """Content of the file."""
+
+    schema: int
+    study: Mapping[str, Any]
+    sessions: tuple[Session, ...]
+
+
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
     """Add a session to the folder's manifest.
 
@@ -94,25 +105,17 @@ def read_manifest(folder: Path) -> Manifest:
         InputError: it is damaged or of another schema.
     """
     path = folder / FILE
-    if not path.exists():
+    if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())
-    raw = read_json(path)
-    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
-        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-        raise InputError(f"{str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}")
+    raw = read_json(path, "manifest", remedy=REMEDY)
+    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(found) is not int or found != SCHEMA:
+        raise InputError(f"manifest {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {REMEDY}")
     try:
-        sessions = tuple(_session(item) for item in raw["sessions"])
-        study = raw["study"]
-    except (AttributeError, KeyError, TypeError) as error:
-        raise InputError(f"{str(path)!r} is damaged ({error!r}); delete it, the records are still good") from error
-    return Manifest(settings=settings_from(study, f"{str(path)!r}"), sessions=sessions)
-
-
-def _session(raw: Mapping[str, Any]) -> Session:
-    values: dict[str, Any] = {field.name: str(raw[field.name]) for field in fields(Session)}
-    for name in ("machine", "versions"):
-        values[name] = {str(key): str(value) for key, value in raw[name].items()}
-    return Session(**values)
+        kept = decoded(_Kept, raw)
+    except ValueError as error:
+        raise InputError(f"manifest {str(path)!r} is damaged: {error}; {REMEDY}") from error
+    return Manifest(settings=settings_from(kept.study, f"manifest {str(path)!r}"), sessions=kept.sessions)
 
 
 def _versions() -> dict[str, str]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from compare.decoding import decoded
 from compare.judge import Evaluation
-from compare.storage import read_json, write_json
-from nlp_gait.backends.solution import ActiveConstraint
+from compare.task import LABEL
+from nlp_gait.backends.solution import ActiveConstraint, Evaluations
 from nlp_gait.errors import InputError
+from nlp_gait.files import read_json, without_nan, write_json
+from nlp_gait.problems.gait_problem import Objective
 
 SCHEMA = 2
+CALLS = frozenset(field.name for field in fields(Evaluations))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,11 +149,34 @@ class RunRecord:
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
-        return {"schema": SCHEMA, **_without_nan(asdict(self))}
+        return {"schema": SCHEMA, **without_nan(asdict(self))}
 
     def write(self, path: Path) -> None:
         """One file, whole or absent."""
         write_json(path, self.to_json())
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Problem:
+    """What a definition says of the problem."""
+
+    name: str
+    options: Mapping[str, str | int | float | bool]
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Definition:
+    """Shape of a definition, see ``Task.definition``."""
+
+    problem: _Problem
+    objective: Objective
+    algorithm: str | Mapping[str, Any]
+    settings: Mapping[str, Any]
+    seed: int
+    handling: Mapping[str, Any] | None = None
+    stop: Mapping[str, Any] | None = None
+    polishes: Mapping[str, Any] | None = None
 
 
 def read_record(path: Path) -> RunRecord:
@@ -157,69 +185,38 @@ def read_record(path: Path) -> RunRecord:
     Raises:
         InputError: the file is damaged or of another schema.
     """
-    raw = read_json(path)
-    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
-        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-        raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; run the study anew")
+    raw = read_json(path, "record", remedy="delete it to have it made anew")
+    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(found) is not int or found != SCHEMA:
+        newer = type(found) is int and found > SCHEMA
+        remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
+        raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
     try:
-        return _from_json(raw)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"record {str(path)!r} is damaged ({error!r}); delete it to have it made anew") from error
+        return _checked(decoded(RunRecord, {key: value for key, value in raw.items() if key != "schema"}))
+    except ValueError as error:
+        raise InputError(f"record {str(path)!r} is damaged: {error}; delete it to have it made anew") from error
 
 
-def _from_json(raw: Mapping[str, Any]) -> RunRecord:
-    values = {field.name: raw[field.name] for field in fields(RunRecord)}
-    verdict = {**raw["verdict"], "violated": tuple(map(str, raw["verdict"]["violated"]))}
-    verdict["objective"] = _number(verdict["objective"], math.nan)
-    verdict["violation"] = _number(verdict["violation"], math.inf)
-    verdict["indexes"] = _numbers(verdict["indexes"])
-    verdict["dense"] = None if verdict["dense"] is None else _numbers(verdict["dense"])
-    values["verdict"] = Verdict(**verdict)
-    values["active_constraints"] = tuple(
-        ActiveConstraint(**{**row, "price": float(row["price"]), "bound": float(row["bound"])})
-        for row in raw["active_constraints"]
-    )
-    history = History(
-        evaluations=tuple(int(count) for count in raw["history"]["evaluations"]),
-        objective=tuple(None if value is None else float(value) for value in raw["history"]["objective"]),
-    )
-    times = {name: _number(raw["time_s"][name], math.nan) for name in ("build", "compile", "solve", "objective")}
-    values["history"] = history
-    values["time_s"] = Times(**times, history=tuple(float(t) for t in raw["time_s"]["history"]))
-    for name, kind in (
-        ("problem", str),
-        ("algorithm", str),
-        ("status", str),
-        ("run", int),
-        ("seed", int),
-        ("success", bool),
-    ):
-        if not isinstance(values[name], kind):
-            raise TypeError(f"{name} must be {kind.__name__}, got {values[name]!r}")
-    values["x"] = _numbers(raw["x"])
-    values["evaluations"] = {str(kind): int(count) for kind, count in raw["evaluations"].items()}
-    for name in ("objective", "violation"):
-        values[name] = None if values[name] is None else float(values[name])
-    if not len(history.evaluations) == len(history.objective) == len(values["time_s"].history):
+def _checked(record: RunRecord) -> RunRecord:
+    """The record, if its parts agree with each other."""
+    objective = decoded(_Definition, record.definition, "definition").objective
+    for text in (objective.name, objective.unit):
+        if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
+            raise ValueError(f"{text!r} is no name or unit of an objective")
+    for title in (record.problem, record.algorithm):
+        if not LABEL.fullmatch(title):  # names of files are made from it
+            raise ValueError(f"{title!r} is no label of a problem or solver")
+    history, times, verdict = record.history, record.time_s, record.verdict
+    if not len(history.evaluations) == len(history.objective) == len(times.history):
         raise ValueError("the columns of the history differ in length")
-    if values["verdict"].feasible and not math.isfinite(values["verdict"].objective):
+    counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
+    if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
+        raise ValueError("counts must be at least 0, and those of the history ascend")
+    if "f" not in record.evaluations or not CALLS.issuperset(record.evaluations):
+        raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
+    if record.definition["seed"] != record.seed:
+        raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
+    if verdict.feasible and not math.isfinite(verdict.objective):
         raise ValueError("a feasible verdict without an objective")
-    return RunRecord(**values)
-
-
-def _number(value: float | None, missing: float) -> float:
-    return missing if value is None else float(value)
-
-
-def _numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    return {str(name): _number(value, math.nan) for name, value in values.items()}
-
-
-def _without_nan(data: Any) -> Any:
-    if isinstance(data, float):
-        return data if math.isfinite(data) else None
-    if isinstance(data, dict):
-        return {key: _without_nan(value) for key, value in data.items()}
-    if isinstance(data, (list, tuple)):
-        return [_without_nan(value) for value in data]
-    return data
+    violation = math.inf if math.isnan(verdict.violation) else verdict.violation
+    return replace(record, verdict=replace(verdict, violation=violation))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -11,6 +10,11 @@ from typing import Any
 
 from compare.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import check_plain, read_text
+
+SCHEMA = 1  # of study files, which need not state it
+LARGEST_FILE = 2**17  # bytes; a study has some hundred
+MOST_RUNS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +57,12 @@ class StudySettings:
     handling: Handling = field(default_factory=Handling)
     stop: Stop = field(default_factory=Stop)
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what no machine can hold."""
+        for count in (self.runs, self.starts, *(s.runs for s in self.solvers if s.runs is not None)):
+            if not 1 <= count <= MOST_RUNS:
+                raise InputError(f"runs and starts must be from 1 to {MOST_RUNS}, got {count}")
 
     def tasks(self) -> tuple[Task, ...]:
         """Every run of the study."""
@@ -108,10 +118,11 @@ def read_settings(path: Path) -> StudySettings:
     Raises:
         InputError: the file cannot be read, or something in it is not allowed; the message says what and where.
     """
+    text = read_text(path, "study file", at_most=LARGEST_FILE)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"study file {str(path)!r} cannot be read: {error}") from error
+        raw = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"study file {str(path)!r} is not valid TOML: {error}") from error
     return settings_from(raw, f"study file {str(path)!r}")
 
 
@@ -127,19 +138,22 @@ def settings_from(raw: Any, source: str) -> StudySettings:
         UnknownNameError: a key that does not exist.
     """
     try:
-        json.dumps(raw, allow_nan=False)
-    except (TypeError, ValueError, RecursionError) as error:
+        check_plain(raw)
+    except ValueError as error:
         raise InputError(f"{source} may hold finite numbers, texts, lists and tables only: {error}") from error
     read = _Reader(source, "the study", raw)
     stop = {name: read.take(name, kind, None) for name, kind in STOP_KINDS.items()}
-    handling = read.table("handling", {"name": "deb"})
+    handling = _Reader(source, "handling", read.table("handling", {"name": "deb"}))
+    schema = read.take("schema", int, SCHEMA)
+    if schema != SCHEMA:
+        raise InputError(f"{source}: schema must be {SCHEMA}, got {schema}; a newer version of nlp-gait may read it")
     settings = StudySettings(
         problems=tuple(_problem(item, source) for item in read.tables("problem")),
         solvers=tuple(_solver(item, source) for item in read.tables("solver")),
         runs=read.take("runs", int, 11, at_least=1),
         starts=read.take("starts", int, 20, at_least=1),
         seed=read.take("seed", int, 0, at_least=0),
-        handling=Handling(name=str(handling.pop("name", "deb")), settings=handling),
+        handling=Handling(name=handling.take("name", str, "deb"), settings=handling.rest()),
         stop=Stop(**{name: value for name, value in stop.items() if value is not None}),
     )
     read.done()
@@ -221,6 +235,10 @@ class _Reader:
         if not isinstance(value, list) or not value:
             raise InputError(f"{self._where} needs at least one [[{name}]]")
         return value
+
+    def rest(self) -> dict[str, Any]:
+        """What has not been taken."""
+        return self._raw
 
     def done(self) -> None:
         """Raise if anything is left."""

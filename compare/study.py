@@ -11,7 +11,8 @@ from compare.record import RunRecord, read_record
 from compare.storage import remove_leftovers, writable_folder
 from compare.task import Task, check_task
 from compare.workers import default_jobs, run_jobs
-from nlp_gait.errors import InputError
+from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.errors import InputError, OutputError
 
 __all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
 
@@ -66,11 +67,24 @@ def run_study(
         UnknownNameError: a problem, option, parameter, algorithm or setting does not exist.
         InputError: the folder holds another study.
         OutputError: the folder cannot be written to; found out before the first run.
+        Interrupted: Ctrl-C; carries the records of the finished runs.
     """
     check_study(study)
     records = _finished(study)
     if kept is not None:
         kept(len(records))
+    try:
+        _run_waiting(study, records, progress)
+    except KeyboardInterrupt:
+        finished = [records[index] for index in sorted(records)]
+        raise Interrupted(f"interrupted after {len(finished)} of {len(study.tasks)} runs", finished) from None
+    return [records[index] for index in range(len(study.tasks))]
+
+
+def _run_waiting(
+    study: Study, records: dict[int, RunRecord], progress: Callable[[Task, RunRecord], None] | None
+) -> None:
+    """Run what is not among the records, by index of the task, and add it."""
     by_key = {_key(task): index for index, task in enumerate(study.tasks)}
     for polishing in (False, True):
         waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
@@ -82,11 +96,19 @@ def run_study(
         for position, record in run_jobs(jobs, study.jobs, study.scheduler):
             index = waiting[position]
             if study.folder is not None:
-                record.write(record_file(study.folder, study.tasks[index]))
+                _keep(record, record_file(study.folder, study.tasks[index]), len(records))
             records[index] = record
             if progress is not None:
                 progress(study.tasks[index], record)
-    return [records[index] for index in range(len(study.tasks))]
+
+
+def _keep(record: RunRecord, path: Path, before: int) -> None:
+    try:
+        record.write(path)
+    except OutputError as error:
+        raise OutputError(
+            f"{error}; the {before} runs before it are kept: mend that, and the same call continues"
+        ) from error
 
 
 def check_study(study: Study) -> None:
@@ -97,8 +119,12 @@ def check_study(study: Study) -> None:
 
 def record_file(folder: Path, task: Task) -> Path:
     """``<folder>/records/<problem>/<solver>-<run>.json``; a colon in a label becomes a full stop."""
-    problem, solver = (title.replace(":", ".") for title in (task.problem.title, task.title))
-    return folder / RECORDS / problem / f"{solver}-{task.run:04d}.json"
+    return _file(folder, task.problem.title, task.title, task.run)
+
+
+def _file(folder: Path, problem: str, solver: str, run: int) -> Path:
+    problem, solver = (title.replace(":", ".") for title in (problem, solver))
+    return folder / RECORDS / problem / f"{solver}-{run:04d}.json"
 
 
 def read_records(folder: Path) -> list[RunRecord]:
@@ -110,7 +136,15 @@ def read_records(folder: Path) -> list[RunRecord]:
     paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
-    return [read_record(path) for path in paths]
+    return [_named_alike(path, read_record(path)) for path in paths]
+
+
+def _named_alike(path: Path, record: RunRecord) -> RunRecord:
+    """The record, if it lies where a study puts it: a copy under another name would count twice."""
+    own = _file(path.parents[2], record.problem, record.algorithm, record.run)
+    if own != path:
+        raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
+    return record
 
 
 def _finished(study: Study) -> dict[int, RunRecord]:

@@ -6,14 +6,17 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from compare.runner import run_task
 from compare.task import IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.continuation import solve_both_ways
+from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.solution import Solution
 from nlp_gait.errors import InputError
+from nlp_gait.problems.gait_problem import GaitProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +99,7 @@ def sweep(
     Raises:
         UnknownNameError: an axis is neither a variable nor a parameter; no such algorithm.
         InputError: a value outside what is allowed, or an axis twice.
+        Interrupted: Ctrl-C; carries the points that were tried until then.
     """
     names = [axis.name for axis in axes]
     if len(set(names)) < len(names):
@@ -104,15 +108,19 @@ def sweep(
     specs = [_with(spec, axes, at) for at in walk]  # all checked before the work
     named = [dict(zip(names, at, strict=True)) for at in walk]
     if algorithm == IPOPT:
-        solutions = solve_both_ways([s.load() for s in specs], starts=starts, seed=seed, progress=progress)
-        points = [_ipopt_point(at, solution) for at, solution in zip(named, solutions, strict=True)]
+        solutions, sentence = _solutions([s.load() for s in specs], starts, seed, progress)
+        points = [None if s is None else _ipopt_point(at, s) for at, s in zip(named, solutions, strict=True)]
     else:
         stop = Stop(evaluations=evaluations)
         tasks = [Task(problem=s, algorithm=algorithm, stop=stop, seed=seed) for s in specs]
         check_task(tasks[0])
-        points = [_search_point(at, task, progress) for at, task in zip(named, tasks, strict=True)]
-    found = dict(zip(walk, points, strict=True))
-    return [found[at] for at in itertools.product(*(axis.values for axis in axes))]
+        points, sentence = _search_points(named, tasks, progress)
+    found = dict(zip(walk, points, strict=False))
+    grid = [found.get(at) for at in itertools.product(*(axis.values for axis in axes))]
+    known = [point for point in grid if point is not None]
+    if sentence:
+        raise Interrupted(sentence, known)
+    return known
 
 
 def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
@@ -139,6 +147,32 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
             for value in (axis.values if row % 2 == 0 else axis.values[::-1])
         ]
     return points
+
+
+def _solutions(
+    problems: Sequence[GaitProblem], starts: int, seed: int, progress: Callable[[], None] | None
+) -> tuple[Sequence[Solution | None], str]:
+    """Solutions along the walk, and how far it came if it was interrupted."""
+    try:
+        return solve_both_ways(problems, starts=starts, seed=seed, progress=progress), ""
+    except Interrupted as interrupt:
+        return cast("list[Solution | None]", interrupt.partial), interrupt.sentence
+
+
+def _search_points(
+    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Callable[[], None] | None
+) -> tuple[list[SweepPoint | None], str]:
+    """Points along the walk, and how far it came if it was interrupted."""
+    points: list[SweepPoint | None] = []
+    try:
+        for at, task in zip(named, tasks, strict=True):
+            with remembered_interrupts() as check:
+                point = _search_point(at, task, progress)
+                check()
+            points.append(point)
+    except KeyboardInterrupt:
+        return points, f"interrupted after {len(points)} of {len(tasks)} points"
+    return points, ""
 
 
 def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:

@@ -12,8 +12,8 @@ import numpy as np
 
 from compare.figures import COLOURS, new_figure, save, style
 from compare.labels import axis_label, quantity
-from compare.storage import write_text
 from compare.sweep import SweepPoint
+from nlp_gait.files import write_text
 from nlp_gait.problems.gait_problem import GaitProblem
 
 if TYPE_CHECKING:

@@ -11,9 +11,11 @@ from typing import Any
 
 import metaheuristics
 import nlp_gait
+from compare.decoding import decoded
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends import nlpsol
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.problems import check_options
 from nlp_gait.problems.gait_problem import GaitProblem
 
 IPOPT = "ipopt"
@@ -50,6 +52,7 @@ class ProblemSpec:
 
     def load(self) -> GaitProblem:
         """The problem, built once in each process."""
+        check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
         return _load(self.name, tuple(sorted(self.options.items()))).with_values(**self.values)
 
 
@@ -74,7 +77,7 @@ class Stop:
         evaluations: budget of a search, and of SLSQP; an NLP solver ends by itself.
         target: a feasible objective at least this good ends a search, in the problem's sense.
         stagnation: so many generations without a better point end a search.
-        time_limit_s: wall time [s]; NLP solvers other than IPOPT do not heed it.
+        time_limit_s: wall time [s]; refused for a solver that cannot heed it (fatrop).
     """
 
     evaluations: int = 10_000
@@ -166,9 +169,14 @@ def check_task(task: Task) -> None:
     if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
         raise unknown("algorithm", task.algorithm, solver_names())
     if task.algorithm == IPOPT:
-        nlp_gait.IpoptSettings(**_checked_names(task.settings, nlp_gait.IpoptSettings, IPOPT))
+        _checked_names(task.settings, nlp_gait.IpoptSettings, IPOPT)
+        try:
+            decoded(nlp_gait.IpoptSettings, task.settings)
+        except ValueError as error:
+            raise InputError(f"setting of {IPOPT}: {error}") from error
     elif task.algorithm in nlpsol.OPTIONS:
         _checked_names(task.settings, None, str(task.algorithm))
+        nlpsol.check_time_limit(str(task.algorithm), task.stop.time_limit_s)
         reason = nlpsol.probe(str(task.algorithm))
         if reason is not None:
             raise InputError(f"NLP solver {task.algorithm!r} does not run in this installation: {reason}")

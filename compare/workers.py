@@ -6,10 +6,10 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 
-from compare.interrupts import remembered_interrupts
 from compare.record import RunRecord
 from compare.runner import attempt
 from compare.task import Task
+from nlp_gait.backends.interrupts import deaf_children, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
@@ -70,7 +70,9 @@ def _parallel(jobs: list[tuple[int, Job]], workers: int | None) -> Iterator[tupl
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers if workers is not None else -1, return_as="generator_unordered", batch_size=1)
-    yield from parallel(delayed(_numbered)(position, job) for position, job in jobs)
+    with deaf_children():
+        results = parallel(delayed(_numbered)(position, job) for position, job in jobs)
+    yield from results
 
 
 def _numbered(position: int, job: Job) -> tuple[int, RunRecord]:

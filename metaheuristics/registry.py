@@ -40,7 +40,7 @@ HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
 )
 
 
-def algorithm(name: str, **settings: object) -> Algorithm:
+def algorithm(name: str, /, **settings: object) -> Algorithm:
     """Make an algorithm by name.
 
     Args:
@@ -63,7 +63,7 @@ def algorithm(name: str, **settings: object) -> Algorithm:
     return _made("algorithm", name, factories, settings)
 
 
-def handling(name: str, **settings: object) -> ConstraintHandling:
+def handling(name: str, /, **settings: object) -> ConstraintHandling:
     """Make a constraint handling by name.
 
     Args:

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 # Earlier layers know nothing of later ones.
-LAYERS = ("errors", "robots", "symbolic", "problems", "backends")
+LAYERS = ("errors", "files", "robots", "symbolic", "problems", "backends")
 # Where search and comparison may be called from.
 COMMAND_LINE = ("nlp_gait.cli", "nlp_gait.__main__")
 

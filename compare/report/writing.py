@@ -18,9 +18,9 @@ from compare.report.document import Document, Figure, Section
 from compare.report.method_section import method_section
 from compare.report.problem_section import problem_section
 from compare.statistics.run_length import Weighting
-from compare.storage import write_text
 from compare.study import read_records
 from compare.verdict import verdict
+from nlp_gait.files import write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
 

@@ -16,7 +16,7 @@ from compare.reproductions.nao_tables import (
     variables_table,
 )
 from compare.reproductions.tables import write_csv
-from compare.storage import write_text
+from nlp_gait.files import write_text
 
 
 def write_report(folder: Path, findings: Findings) -> None:

@@ -17,6 +17,8 @@ import nlp_gait
 from compare.judge import evaluate
 from compare.task import ProblemSpec
 from nlp_gait.backends.continuation import solve_both_ways
+from nlp_gait.errors import InputError
+from nlp_gait.files import new_file
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 from nlp_gait.problems.nao import PLANNED_JOINTS
 
@@ -47,7 +49,7 @@ def search(problem: str, algorithm: str, seed: int, evaluations: int, points: Pa
         seed=seed,
         observe=keep,
     )
-    _write_points(points, *(np.concatenate(part) for part in zip(*feasible, strict=True)))
+    write_points(points, *(np.concatenate(part) for part in zip(*feasible, strict=True)))
     best = zip(result.history.objective, result.history.violation, strict=True)
     return {
         **judged(model, result.x),
@@ -116,13 +118,20 @@ def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
 
 
 def read_points(path: Path) -> tuple[Array, Array]:
-    """Feasible solutions of a run: x (m, n) and power (m,) [W]."""
-    with np.load(path) as archive:
-        return archive["x"], archive["power_W"]
+    """Feasible solutions of a run: x (m, n) and power (m,) [W].
+
+    Raises:
+        InputError: the archive is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return np.asarray(archive["x"], dtype=float), np.asarray(archive["power_W"], dtype=float)
+    except Exception as error:
+        # NumPy and zipfile raise a dozen kinds of errors on damaged archives.
+        raise InputError(f"points {str(path)!r} cannot be read ({error}); delete it to have it made anew") from error
 
 
-def _write_points(path: Path, x: Array, power: Array) -> None:
+def write_points(path: Path, x: Array, power: Array) -> None:
     """Whole or absent, as every file of a step."""
-    temporary = path.with_name(f".{path.name}.tmp.npz")
-    np.savez_compressed(temporary, x=x, power_W=power)
-    temporary.replace(path)
+    with new_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, x=x, power_W=power)

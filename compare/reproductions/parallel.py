@@ -10,6 +10,7 @@ from typing import Any
 
 from compare.reproductions.resume import Steps
 from compare.workers import default_jobs
+from nlp_gait.backends.interrupts import deaf_children
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +55,9 @@ def _results(out: Path, jobs: Sequence[Job]) -> Iterator[Any]:
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers, return_as="generator", batch_size=1, pre_dispatch="all")
-    yield from parallel(delayed(_run)(out, job) for job in jobs)
+    with deaf_children():
+        results = parallel(delayed(_run)(out, job) for job in jobs)
+    yield from results
 
 
 def _run(out: Path, job: Job) -> Any:

@@ -10,9 +10,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from compare.storage import read_json, writable_folder, write_json
+from compare.storage import writable_folder
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
+from nlp_gait.files import read_json, write_json
 from nlp_gait.problems.gait_problem import GaitProblem
 
 
@@ -47,8 +48,10 @@ class Steps:
             self._progress(f"{name}: kept from an earlier run")
             return kept["result"]
         self._progress(name)
-        write_json(path, {"inputs": inputs, "sha256": digest, "result": compute()})
-        return read_json(path)["result"]
+        # As JSON gives it back, now and whenever it is read again.
+        result = json.loads(json.dumps(compute(), allow_nan=False))
+        write_json(path, {"inputs": inputs, "sha256": digest, "result": result, "result_sha256": _digest(result)})
+        return result
 
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
@@ -67,8 +70,14 @@ def _kept(path: Path, digest: str) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        content = read_json(path)
+        content = read_json(path, "step")
     except InputError:
         return None  # damaged: made again
-    usable = isinstance(content, dict) and content.get("sha256") == digest and "result" in content
-    return content if usable else None
+    if not isinstance(content, dict) or content.get("sha256") != digest or "result" not in content:
+        return None
+    return content if content.get("result_sha256") == _digest(content["result"]) else None
+
+
+def _digest(result: Any) -> str:
+    """Checksum of a result: a file that was changed by hand or by a broken disk is made again."""
+    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()

@@ -12,7 +12,7 @@ import numpy as np
 from compare.reproductions.stairs_paper import TABLE_3, TABLE_4
 from compare.reproductions.stairs_runs import PLAN_EVALUATIONS, TRACK_EVALUATIONS
 from compare.reproductions.tables import Cell, write_table
-from compare.storage import write_text
+from nlp_gait.files import write_text
 from nlp_gait.problems.stairs_governing import GOVERNING_VARIABLES
 
 Cases = Mapping[int, Mapping[str, Any]]

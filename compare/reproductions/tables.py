@@ -7,8 +7,8 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from compare.storage import write_text
 from compare.table import markdown
+from nlp_gait.files import write_text
 
 Cell = str | float | int
 

@@ -13,7 +13,7 @@ import numpy as np
 from compare.reproductions.walk12_paper import F1MAX, TABLE_3, row_of
 from compare.reproductions.walk12_runs import GA_EVALUATIONS, PSO_EVALUATIONS, RUNS, STARTS, Run
 from compare.reproductions.walk12_tables import MODEL, PAPER, Findings, f_of_papers_gaits, gaits, table_3, table_4
-from compare.storage import write_text
+from nlp_gait.files import write_text
 
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
 from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
 from nlp_gait.backends.solution import Solution
 from nlp_gait.backends.solve import outcome_of, solution_of
@@ -46,25 +47,28 @@ class Continuation:
         """Solution of the next problem on the path: a copy of the first one with other parameter values."""
         return self.solution(problem, self.run(problem))
 
-    def run(self, problem: GaitProblem, earlier: Sequence[Attempt] = ()) -> list[Attempt]:
+    def run(
+        self, problem: GaitProblem, earlier: Sequence[Attempt] = (), stop: Callable[[], bool] = never
+    ) -> list[Attempt]:
         """Attempts at the next problem; the best of these and the earlier ones is the next problem's neighbour.
 
         Args:
             problem: a copy of the first one with other parameter values.
             earlier: attempts at the same problem from elsewhere. Random starts are not repeated where they were in vain.
+            stop: asked after each iteration whether to end at once.
         """
         ipopt = ipopt_for(problem, self._settings, self._solves)
         attempts: list[Attempt] = []
         if self._neighbour is not None:
             x0 = np.clip(self._neighbour.x, problem.lower, problem.upper)
-            attempts.append(Attempt(x0, ipopt.run_from(problem, self._neighbour.guess)))
-            if not attempts[-1].end.success:
-                attempts.append(Attempt(x0, ipopt.run(problem, x0)))
+            attempts.append(Attempt(x0, ipopt.run_from(problem, self._neighbour.guess, stop)))
+            if not attempts[-1].end.success and not stop():
+                attempts.append(Attempt(x0, ipopt.run(problem, x0, stop)))
         in_vain = bool(earlier) and best_end(earlier) is None
         if best_end(attempts) is None and not in_vain and (self._neighbour is None or not earlier):
             rng = np.random.default_rng(self._seed)
             points = [problem.start_point(rng) for _ in range(self._starts)]
-            attempts += [Attempt(x0, ipopt.run(problem, x0)) for x0 in points]
+            attempts += [Attempt(x0, ipopt.run(problem, x0, stop)) for x0 in points if not stop()]
         self._neighbour = best_end([*earlier, *attempts]) or self._neighbour
         return attempts
 
@@ -99,13 +103,23 @@ def solve_both_ways(
         seed: of the random starts.
         settings: of IPOPT.
         progress: called after each problem, twice as often as there are problems.
+
+    Raises:
+        Interrupted: Ctrl-C; carries the solutions from the attempts until then, None for problems without any.
     """
     order = range(len(problems))
     attempts: list[list[Attempt]] = [[] for _ in problems]
-    for path_seed, direction in ((seed, order), (seed + 1, order[::-1])):
-        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=2 * len(problems))
-        for k in direction:
-            attempts[k] += path.run(problems[k], attempts[k])
-            if progress is not None:
-                progress()
+    with deferred_interrupts() as interrupted:
+        for path_seed, direction in ((seed, order), (seed + 1, order[::-1])):
+            path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=2 * len(problems))
+            for k in direction:
+                if interrupted():
+                    break
+                attempts[k] += path.run(problems[k], attempts[k], interrupted)
+                if progress is not None:
+                    progress()
+    if interrupted():
+        tried = [path.solution(p, found) if found else None for p, found in zip(problems, attempts, strict=True)]
+        count = sum(solution is not None for solution in tried)
+        raise Interrupted(f"interrupted after {count} of {len(problems)} points", tried)
     return [path.solution(problem, found) for problem, found in zip(problems, attempts, strict=True)]

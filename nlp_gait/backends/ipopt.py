@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,9 @@ import numpy as np
 
 from nlp_gait.backends.derivatives import WORTHWHILE_STARTS, compiled_nlp
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.backends.ipopt_installation import QUIET, linear_solver
+from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
+from nlp_gait.backends.iteration_watch import INTERRUPTED, TIME_IS_UP, IterationWatch
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solution import Evaluations
 from nlp_gait.errors import CompilerError, InputError
@@ -35,12 +37,13 @@ STATUS_WORDS = {
     "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
     "Infeasible_Problem_Detected": "converged to a point of local infeasibility",
     "Maximum_Iterations_Exceeded": "stopped at the iteration limit",
-    "Maximum_WallTime_Exceeded": "stopped at the time limit",
+    TIME_IS_UP: "stopped at the time limit",
     "Restoration_Failed": "restoration of feasibility failed",
     "Search_Direction_Becomes_Too_Small": "search direction became too small",
     "Diverging_Iterates": "iterates diverged",
     "Invalid_Number_Detected": "a function returned NaN or inf",
     "Error_In_Step_Computation": "the linear solver failed",
+    INTERRUPTED: "was interrupted",
 }
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -52,10 +55,12 @@ class IpoptSettings:
     Attributes:
         tolerance: IPOPT's ``tol``.
         iterations: limit of iterations for each stage.
-        time_limit_s: limit of wall time for each stage [s].
+        time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
         hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
         compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
             is a compiler.
+        linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is refused: IPOPT
+            never takes another one in its place.
     """
 
     tolerance: float = 1e-8
@@ -63,6 +68,7 @@ class IpoptSettings:
     time_limit_s: float = 300.0
     hessian: str | None = None
     compiled: bool | None = None
+    linear_solver: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what IPOPT would refuse late."""
@@ -74,15 +80,21 @@ class IpoptSettings:
             )
         if self.hessian not in (None, "exact", "limited-memory"):
             raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
+        if self.linear_solver not in (None, *LINEAR_SOLVERS):
+            raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Guess:
-    """Primal and dual start of IPOPT: scaled variables with the lifted ones, multipliers of bounds and rows."""
+    """Primal and dual start of IPOPT: scaled variables with the lifted ones, multipliers of bounds and rows.
+
+    ``width`` is the sigmoid width of the stage that they come from.
+    """
 
     primal: Array
     bounds: Array
     rows: Array
+    width: float = WIDTHS[-1]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,14 +162,19 @@ class Ipopt:
 
     def __init__(self, model: NlpModel, settings: IpoptSettings) -> None:
         started = time.perf_counter()
+        self.linear_solver = linear_solver(settings.linear_solver)
+        self._time_limit_s = settings.time_limit_s
+        self._watch = IterationWatch(model.nlp)
         options: dict[str, Any] = {
             **QUIET,
+            "iteration_callback": self._watch,
             "ipopt.mu_strategy": "adaptive",
             "ipopt.tol": settings.tolerance,
             "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits by what IPOPT relaxes them
             "ipopt.max_iter": settings.iterations,
             "ipopt.max_wall_time": settings.time_limit_s,
             "ipopt.hessian_approximation": settings.hessian,
+            **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
         }
         self.model = model
         self.compiled = bool(settings.compiled)
@@ -180,26 +197,33 @@ class Ipopt:
             "ipopt.warm_start_mult_bound_push": 1e-6,
         }
         self._warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
-        self.linear_solver = linear_solver()
         self.create_s = time.perf_counter() - started
 
-    def run(self, problem: GaitProblem, x0: Array) -> End:
-        """All stages from a start point (n,)."""
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> End:
+        """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
         z0 = (x0 - self.model.offset) / self.model.scale
         widths = WIDTHS if self.model.smoothed else WIDTHS[-1:]
         primal = np.concatenate([z0, np.array(self.model.lift_start(z0, problem.p, widths[0])).ravel()])
-        return self._stages(problem, {"x0": primal}, widths, cold=True)
+        return self._stages(problem, {"x0": primal}, widths, stop, cold=True)
 
-    def run_from(self, problem: GaitProblem, guess: Guess) -> End:
+    def run_from(self, problem: GaitProblem, guess: Guess, stop: Callable[[], bool] = never) -> End:
         """The last stage alone, from the end of a neighbouring problem."""
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
-        return self._stages(problem, start, WIDTHS[-1:], cold=False)
+        return self._stages(problem, start, WIDTHS[-1:], stop, cold=False)
 
-    def _stages(self, problem: GaitProblem, start: dict[str, Array], widths: tuple[float, ...], cold: bool) -> End:
+    def _stages(
+        self,
+        problem: GaitProblem,
+        start: dict[str, Array],
+        widths: tuple[float, ...],
+        stop: Callable[[], bool],
+        cold: bool,
+    ) -> End:
         model, exact, p, n = self.model, exact_model(problem), problem.p, self.model.variables
         bounds = self._bounds(problem)
         iterations, evaluations = 0, Evaluations()
         started = time.perf_counter()
+        self._watch.begin(stop, started + self._time_limit_s)
         for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
             solver = self._cold if cold and stage == 0 else self._warm
             result = solver(p=np.append(p, width), **start, **bounds)
@@ -208,11 +232,12 @@ class Ipopt:
             evaluations += _counts(stats)
             z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
             start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
-            if stage + 1 < len(widths):
+            status = self._watch.reason or str(stats["return_status"])
+            if stage + 1 < len(widths) and status not in (INTERRUPTED, TIME_IS_UP):
                 continue
             x = np.clip(model.offset + model.scale * z[:n], problem.lower, problem.upper)
             cost, violation = (float(value) for value in exact.function(x, p)[:2])
-            if stats["return_status"] not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
+            if status not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
                 break
         return End(
             x=x,
@@ -220,11 +245,11 @@ class Ipopt:
             violation=violation,
             row_multipliers=rows[: len(model.row_names)],
             bound_multipliers=multipliers[:n],
-            return_status=str(stats["return_status"]),
+            return_status=status,
             iterations=iterations,
             evaluations=evaluations,
             time_s=time.perf_counter() - started,
-            guess=Guess(primal=z, bounds=multipliers, rows=rows),
+            guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
         )
 
     def _bounds(self, problem: GaitProblem) -> dict[str, Array]:

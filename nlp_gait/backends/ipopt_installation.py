@@ -11,6 +11,8 @@ from typing import Any
 
 import casadi as ca
 
+from nlp_gait.errors import InputError
+
 # Options of every IPOPT here: silent, and deaf to an ``ipopt.opt`` that happens to lie in the working folder.
 QUIET: Mapping[str, Any] = {
     "print_time": False,
@@ -21,9 +23,20 @@ QUIET: Mapping[str, Any] = {
 }
 
 
+# Linear solvers that IPOPT knows; all but the last two load a library that the user must have.
+LINEAR_SOLVERS = ("ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "mumps", "spral")
+
+
 @cache
-def linear_solver() -> str:
-    """Linear solver that IPOPT uses by default in this installation, read from its own log."""
+def linear_solver(wanted: str | None = None) -> str:
+    """Linear solver that IPOPT really uses in this installation, read from its own log.
+
+    Args:
+        wanted: one of ``LINEAR_SOLVERS``; None for IPOPT's default.
+
+    Raises:
+        InputError: the wanted one does not run here.
+    """
     x = ca.MX.sym("x")
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ipopt.log"
@@ -31,7 +44,16 @@ def linear_solver() -> str:
             **QUIET,
             "ipopt.output_file": str(log),
             "ipopt.file_print_level": 5,
+            **({} if wanted is None else {"ipopt.linear_solver": wanted}),
         }
-        ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)(x0=1.0)
+        probe = ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)
+        probe(x0=1.0)
         found = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")
-    return found.group(1) if found else "unknown"
+    used = found.group(1) if found else "unknown"
+    status = str(probe.stats()["return_status"])
+    if wanted is not None and (status != "Solve_Succeeded" or used.lower() != wanted):
+        raise InputError(
+            f"IPOPT's linear solver {wanted!r} does not run in this installation ({status.replace('_', ' ').lower()}; its "
+            f"library is missing, perhaps); leave linear_solver out for {linear_solver()}"
+        )
+    return used

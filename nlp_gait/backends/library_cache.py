@@ -6,6 +6,7 @@ and renamed, so that two processes at once end with a good file each can use; wh
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import hashlib
@@ -46,7 +47,7 @@ def load_library(
         CompilerError: the compiler fails, or what it built cannot be loaded.
     """
     key = _key(source, compiler, flags)
-    folders = (cache_folder(), _private_folder())
+    folders = [cache_folder(), *_private_folder_made()]
     for library in [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]:
         loaded = _load(library, symbols)
         if loaded is not None:
@@ -58,17 +59,18 @@ def load_library(
         except OSError as error:
             raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
         compiler.build(written, built, flags)
-        library = _stored(built, key, folders)
+        library = _stored(built, key)
     loaded = _load(library, symbols)
     if loaded is None:
         raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
     return loaded, library
 
 
-def _stored(built: Path, key: str, folders: Sequence[Path]) -> Path:
+def _stored(built: Path, key: str) -> Path:
     """Where a new library was put: the first folder that takes it, under its final name at once."""
     name = f"{key}-{_digest(built)}{SUFFIX}"
-    for folder in folders:
+    for make_folder in (cache_folder, _private_folder):
+        folder = make_folder()
         try:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
                 copy = Path(landing) / name
@@ -125,13 +127,16 @@ def _warn_once(message: str) -> None:
 
 
 @cache
-def _temporary() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="nlp-gait-")
-
-
 def _private_folder() -> Path:
-    """Folder that only this process uses, removed at its end."""
-    return Path(_temporary().name)
+    """Folder that only this process uses, made when it is needed and removed at the end."""
+    folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _private_folder_made() -> list[Path]:
+    """That folder, if it was needed so far."""
+    return [_private_folder()] if _private_folder.cache_info().currsize else []
 
 
 def _key(source: str, compiler: Compiler, flags: Sequence[str]) -> str:

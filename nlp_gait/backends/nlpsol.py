@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import subprocess
 import sys
@@ -17,7 +18,9 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.ipopt import WIDTHS
+from nlp_gait.backends.interrupts import deferred_interrupts, never
+from nlp_gait.backends.ipopt import STATUS_WORDS, WIDTHS
+from nlp_gait.backends.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solution import Evaluations
 from nlp_gait.errors import InputError
@@ -34,6 +37,8 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = {
     },
     "uno": {"uno.logger": "SILENT"},
 }
+# Those that can be ended between two iterations, at a time limit or by Ctrl-C; fatrop never asks.
+WATCHED = ("sqpmethod", "uno")
 PROBE_TIME_LIMIT_S = 60.0
 PROBE = """
 import sys
@@ -95,11 +100,22 @@ def probe(name: str) -> str | None:
     return said[-1] if said else f"it ends with status {done.returncode}"
 
 
-def solve_with(name: str, problem: GaitProblem, x0: Array) -> NlpEnd:
-    """One run of a solver from a start point (n,), with its own default settings, in IPOPT's stages of sigmoid width."""
+def solve_with(name: str, problem: GaitProblem, x0: Array, time_limit_s: float | None = None) -> NlpEnd:
+    """One run of a solver, with its own default settings, in IPOPT's stages of sigmoid width.
+
+    Args:
+        name: of the solver.
+        problem: what is solved.
+        x0: (n,) start point.
+        time_limit_s: of wall time for all stages [s], checked after each iteration.
+
+    Raises:
+        InputError: the solver does not run here, or takes no time limit.
+    """
+    check_time_limit(name, time_limit_s)
     model = nlp_model(problem)
     started = time.perf_counter()
-    solver = problem.built(f"nlpsol {name}", lambda: _make(name, model))
+    solver, watch = problem.built(f"nlpsol {name}", lambda: _make(name, model))
     build_s = time.perf_counter() - started
     z0 = (np.clip(x0, problem.lower, problem.upper) - model.offset) / model.scale
     widths = WIDTHS if model.smoothed else WIDTHS[-1:]
@@ -107,24 +123,41 @@ def solve_with(name: str, problem: GaitProblem, x0: Array) -> NlpEnd:
     bounds = _bounds(problem, model)
     iterations, evaluations, stats = 0, Evaluations(), {}
     started = time.perf_counter()
-    for width in widths:
-        with _silent():
-            result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
-        primal = np.array(result["x"]).ravel()
-        stats = solver.stats()
-        iterations += int(stats.get("iter_count") or 0)
-        evaluations += _counts(stats)
+    with deferred_interrupts() if name in WATCHED else contextlib.nullcontext(never) as interrupted:
+        watch.begin(interrupted, math.inf if time_limit_s is None else started + time_limit_s)
+        for width in widths:
+            with _silent():
+                result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+            primal = np.array(result["x"]).ravel()
+            stats = solver.stats()
+            iterations += int(stats.get("iter_count") or 0)
+            evaluations += _counts(stats)
+            if watch.reason:
+                break
+    if watch.reason == INTERRUPTED or interrupted():
+        raise KeyboardInterrupt
     finite = bool(np.isfinite(primal).all())
+    said = STATUS_WORDS.get(watch.reason, f"{name} says {stats.get('return_status')!r}")
     x = model.offset + model.scale * primal[: model.variables] if finite else problem.lower
     return NlpEnd(
         x=np.clip(x, problem.lower, problem.upper),
-        success=bool(stats["success"]) and finite,
-        status=f"{name} says {stats.get('return_status')!r}" if finite else "it returned NaN or inf",
+        success=bool(stats["success"]) and finite and not watch.reason,
+        status=said if finite else "it returned NaN or inf",
         iterations=iterations,
         evaluations=evaluations,
         build_s=build_s,
         time_s=time.perf_counter() - started,
     )
+
+
+def check_time_limit(name: str, time_limit_s: float | None) -> None:
+    """Refuse a time limit for a solver that cannot heed it.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if time_limit_s is not None and name not in WATCHED:
+        raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
 
 
 def claimed(problem: GaitProblem, x: Array) -> tuple[float, float]:
@@ -133,12 +166,14 @@ def claimed(problem: GaitProblem, x: Array) -> tuple[float, float]:
     return float(cost), float(violation)
 
 
-def _make(name: str, model: NlpModel) -> ca.Function:
+def _make(name: str, model: NlpModel) -> tuple[ca.Function, IterationWatch]:
     reason = probe(name)
     if reason is not None:
         raise InputError(f"NLP solver {name!r} does not run in this installation: {reason}")
+    watch = IterationWatch(model.nlp)
+    options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **OPTIONS[name]}
     with _silent():
-        return ca.nlpsol(name, name, model.nlp, {"print_time": False, "error_on_fail": False, **OPTIONS[name]})
+        return ca.nlpsol(name, name, model.nlp, options), watch
 
 
 def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:

@@ -136,5 +136,5 @@ class Solution:
     seed: int
 
     def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers."""
-        return asdict(self)
+        """Plain dictionaries, lists and numbers, with the schema version of results."""
+        return {"schema": 1, **asdict(self)}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from nlp_gait.backends.exact import row_violations
+from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.ipopt import End, Ipopt, IpoptSettings, ipopt_for
 from nlp_gait.backends.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
 from nlp_gait.errors import InputError
@@ -42,7 +44,8 @@ def solve(
         if there is none, the least infeasible one with the rows that stand in the way.
 
     Raises:
-        InputError: no start, or x0 or a fixed value that is not allowed.
+        InputError: no start, x0 or a fixed value that is not allowed, or a linear solver that does not run here.
+        Interrupted: Ctrl-C; carries the solution from the starts until then, the one in progress where it was.
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
@@ -52,12 +55,19 @@ def solve(
     ipopt = ipopt_for(problem, settings, starts)
     ends: list[End] = []
     outcomes: list[StartOutcome] = []
-    for index, point in enumerate(points):
-        ends.append(ipopt.run(problem, point))
-        outcomes.append(outcome_of(index, problem, point, ends[-1]))
-        if progress is not None:
-            progress(outcomes[-1])
-    return solution_of(problem, ipopt, ends, outcomes, seed)
+    with deferred_interrupts() as interrupted:
+        for index, point in enumerate(points):
+            ends.append(ipopt.run(problem, point, interrupted))
+            outcomes.append(outcome_of(index, problem, point, ends[-1]))
+            if progress is not None:
+                progress(outcomes[-1])
+            if interrupted():
+                break
+    solution = solution_of(problem, ipopt, ends, outcomes, seed)
+    if interrupted():
+        sentence = f"interrupted in start {len(ends)} of {starts}"
+        raise Interrupted(sentence, replace(solution, status=f"{sentence}; {solution.status}"))
+    return solution
 
 
 def _start_points(problem: GaitProblem, starts: int, seed: int, x0: Sequence[float] | Array | None) -> list[Array]:

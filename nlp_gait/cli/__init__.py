@@ -16,12 +16,14 @@ from nlp_gait.cli.compare import compare
 from nlp_gait.cli.evaluate import evaluate
 from nlp_gait.cli.export import export
 from nlp_gait.cli.list import list_problems
+from nlp_gait.cli.prices import prices
 from nlp_gait.cli.report import report
 from nlp_gait.cli.reproduce import reproduce
 from nlp_gait.cli.search import search
 from nlp_gait.cli.simulate import simulate
 from nlp_gait.cli.solve import solve
 from nlp_gait.cli.sweep import sweep
+from nlp_gait.cli.walk import walk
 
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
@@ -38,6 +40,8 @@ app.command("compare")(compare)
 app.command("report")(report)
 app.command("sweep")(sweep)
 app.command("reproduce")(reproduce)
+app.command("prices")(prices)
+app.command("walk")(walk)
 app.command("simulate")(simulate)
 app.command("export")(export)
 app.command("animate")(animate)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import inspect
 import json
@@ -16,10 +17,12 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from compare.runner import ProblemSpec
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError, InputError, unknown
+from nlp_gait.files import without_nan
 from nlp_gait.problems import problem_maker
 
 P = ParamSpec("P")
@@ -48,11 +51,31 @@ Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k us
 Jobs = Annotated[int | None, typer.Option(min=1, help="Worker processes (default: all processors).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
+# What the system says where output cannot grow.
+NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+# Characters of an error; a value in it can be a whole file.
+LONGEST_SENTENCE = 2000
 # Wide enough for every table where there is no terminal to fit, for example in a pipe or a log.
 PIPE_WIDTH = 160
 
-stderr = Console(stderr=True, highlight=False, markup=False)
-stdout = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+
+
+class PlainConsole(Console):
+    """Console on which text is text: no markup, and control characters are shown, not obeyed."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Text as it is printed, titles and cells of tables included."""
+        return super().render_str(harmless(text), **options)
+
+
+def harmless(text: str) -> str:
+    """Text whose control characters, and what is no character at all, stand as escapes like ``\\x1b``."""
+    shown = (sign if sign.isprintable() or sign in "\n\t" else repr(sign)[1:-1] for sign in text)
+    return "".join(shown)
+
+
+stderr = PlainConsole(stderr=True, highlight=False, markup=False)
+stdout = PlainConsole(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
 
 
 def command(function: Callable[P, R]) -> Callable[P, R]:
@@ -61,22 +84,40 @@ def command(function: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(function)
     def run(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
-            return function(*args, **kwargs)
+            result = function(*args, **kwargs)
+            sys.stdout.flush()  # what cannot be written is said here, not by the interpreter at its end
+            return result
         except (GaitError, SearchError) as error:
             fail(str(error))
-        except KeyboardInterrupt:
-            stderr.print("nlp-gait: interrupted; finished runs are kept", soft_wrap=True)
-            raise typer.Exit(130) from None
+        except KeyboardInterrupt as interrupt:
+            end_interrupted(str(interrupt) or "interrupted")
         except BrokenPipeError:  # the reader of our output has gone, for example `| head`
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _close_output()
             raise typer.Exit(1) from None
+        except OSError as error:
+            if error.errno not in NO_ROOM:
+                raise
+            _close_output()
+            fail(f"cannot write the output: {error.strerror}")
 
     return run
 
 
+def _close_output() -> None:
+    """What is left in the buffers goes nowhere, so that the interpreter does not fail on it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def end_interrupted(sentence: str) -> NoReturn:
+    """End with status 130 and one sentence that says what was kept."""
+    stderr.print(f"nlp-gait: {sentence}", soft_wrap=True)
+    raise typer.Exit(130)
+
+
 def fail(message: str) -> NoReturn:
     """End with status 1 and one sentence."""
-    stderr.print(f"nlp-gait: {message}", soft_wrap=True)
+    said = " ".join(message.split())
+    stderr.print(f"nlp-gait: {said if len(said) <= LONGEST_SENTENCE else said[:LONGEST_SENTENCE] + ' ...'}", soft_wrap=True)
     raise typer.Exit(1)
 
 
@@ -121,7 +162,7 @@ def quantity(value: float, unit: str, digits: str = ".6f") -> str:
 
 def print_json(data: Any) -> None:
     """One JSON object on stdout; what is not finite is null, for not every reader takes NaN."""
-    sys.stdout.write(json.dumps(_finite(data), indent=1, allow_nan=False) + "\n")
+    sys.stdout.write(json.dumps(without_nan(data), indent=1, allow_nan=False) + "\n")
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -138,16 +179,16 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
     """Progress on stderr, of unknown length if total is None; the function inside advances it by one and shows a note."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
     )
     with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
-        task = progress.add_task(description, total=total, note="")
-        yield lambda note: progress.update(task, advance=1, note=note)
+        task = progress.add_task(harmless(description), total=total, note="")
+        yield lambda note: progress.update(task, advance=1, note=harmless(note))
 
 
 def output_file(path: Path) -> Path:
@@ -189,13 +230,3 @@ def _typed(name: str, text: str, default: Any) -> str | int | float | bool:
         except ValueError:
             raise InputError(f"--option {name} must be a {type(default).__name__}, got {text!r}") from None
     return text
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, float):
-        return data if data - data == 0.0 else None
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, (list, tuple)):
-        return [_finite(value) for value in data]
-    return data

@@ -22,6 +22,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     print_json,
     print_table,
     problem_spec,
@@ -100,6 +101,7 @@ def compare(
     from compare.settings import read_settings
     from compare.storage import writable_folder
     from compare.study import Study, check_study, default_jobs, run_study
+    from nlp_gait.backends.interrupts import Interrupted
 
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
@@ -127,11 +129,16 @@ def compare(
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
-        records = run_study(
-            study,
-            progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
-            kept=lambda count: _advance_by(advance, count),
-        )
+        try:
+            records = run_study(
+                study,
+                progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
+                kept=lambda count: _advance_by(advance, count),
+            )
+        except Interrupted as interrupt:
+            end_interrupted(
+                f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
+            )
     written = write_report(out, records, read_manifest(out))
     if as_json:
         print_json({"problems": summaries_of(records), "files": [str(path) for path in written]})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -19,6 +19,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     fail,
     print_json,
     print_table,
@@ -77,6 +78,7 @@ def search(
     from compare.settings import SolverSpec, StudySettings
     from compare.study import Study, default_jobs, run_study
     from compare.table import HEADER, cells, summarise
+    from nlp_gait.backends.interrupts import Interrupted
 
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
     settings = StudySettings(
@@ -87,11 +89,17 @@ def search(
         seed=seed,
     )
     tasks = settings.tasks()
+    stopped = ""
     with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
-        records = run_study(
-            Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
-            progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
-        )
+        try:
+            records = run_study(
+                Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
+                progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
+            )
+        except Interrupted as interrupt:
+            records, stopped = cast("list[RunRecord]", interrupt.partial), interrupt.sentence
+            if not records:
+                end_interrupted(stopped)
     loaded = spec.load()
     if as_json:
         print_json(
@@ -121,6 +129,9 @@ def search(
         for comparison in compare_problems(records):
             print_table("All runs", HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
         stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
+    if stopped:
+        kept = "printed, but kept nowhere: name a folder with --out" if out is None else f"kept in {out}"
+        end_interrupted(f"{stopped}; finished runs are {kept}" + (out is not None) * "; the same command continues")
     if not any(record.x for record in records):
         fail(f"no run has a result; the first {records[0].status}")
 

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nlp_gait.cli.common import AsJson, ResultFile, command, fail, output_file, print_json, print_table, stdout
+from nlp_gait.cli.common import (
+    AsJson,
+    ResultFile,
+    command,
+    end_interrupted,
+    fail,
+    output_file,
+    print_json,
+    print_table,
+    stdout,
+)
 from nlp_gait.simulation.mjcf import FRICTION
 
 if TYPE_CHECKING:
@@ -37,11 +47,11 @@ def simulate(
     Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
     from compare.playback_figure import plot_playback
-    from compare.storage import writable_folder, write_json
-    from nlp_gait.export.files import write_text
+    from compare.storage import writable_folder
     from nlp_gait.export.result import load_result
     from nlp_gait.export.signals import write_npz
     from nlp_gait.export.video import check_video_path, write_video
+    from nlp_gait.files import without_nan, write_json, write_text
     from nlp_gait.simulation.camera import filmed, shown
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
@@ -65,13 +75,25 @@ def simulate(
     else:
         trace = (shown if viewer else play)(plan, conditions, drive, sole)
     report = measure(plan, trace, drive)
-    survival = sweep(plan, drive) if robustness else None
-    data = {**report.to_json(), **({} if survival is None else {"robustness": survival.to_json()})}
+    survival, data = None, report.to_json()
     if folder is not None:
-        write_json(folder / "report.json", data)
+        write_json(folder / "report.json", {"schema": 1, **without_nan(data)})
         write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
         write_npz(folder / "playback.npz", trace.signals(plan.joints))
         plot_playback(plan, trace, drive, folder / "playback")
+    if robustness:
+        try:
+            survival = sweep(plan, drive)
+        except KeyboardInterrupt:
+            kept = (
+                "nothing was written; name a folder with --out"
+                if folder is None
+                else f"the playback is kept in {folder}"
+            )
+            end_interrupted(f"interrupted in the tests of robustness; {kept}")
+        data["robustness"] = survival.to_json()
+        if folder is not None:
+            write_json(folder / "report.json", {"schema": 1, **without_nan(data)})
     if as_json:
         print_json(data)
     else:

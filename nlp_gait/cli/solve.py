@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
@@ -19,6 +19,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     fail,
     output_file,
     parse_numbers,
@@ -43,6 +44,9 @@ def solve(
     option: Options = None,
     values: Set = None,
     fix: Fix = None,
+    linear_solver: Annotated[
+        str | None, typer.Option(help="IPOPT's, for example ma57 if its library is there (default: mumps).")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -51,26 +55,35 @@ def solve(
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
     import nlp_gait
+    from nlp_gait.backends.interrupts import Interrupted
+    from nlp_gait.files import without_nan, write_json
 
     target = None if out is None else output_file(out)
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
     first = None if x0 is None else loaded.check_x(parse_numbers(x0))
+    settings = nlp_gait.IpoptSettings(linear_solver=linear_solver)
+    stopped = ""
     with progress_bar("IPOPT starts", starts) as advance:
-        solution = nlp_gait.solve(
-            loaded,
-            starts=starts,
-            seed=seed,
-            x0=first,
-            progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
-        )
-    if target is not None:
-        from compare.storage import write_json
-
-        write_json(target, solution.to_json())
+        try:
+            solution = nlp_gait.solve(
+                loaded,
+                starts=starts,
+                seed=seed,
+                x0=first,
+                settings=settings,
+                progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
+            )
+        except Interrupted as interrupt:
+            solution, stopped = cast(Solution, interrupt.partial), interrupt.sentence
     if as_json:
         print_json(solution.to_json())
     else:
         _print(solution)
+    if target is not None:  # after printing, lest a full disk take the result with it
+        write_json(target, without_nan(solution.to_json()))
+    if stopped:
+        where = "printed" if target is None else f"in {target}"
+        end_interrupted(f"{stopped}; the best point until then is {where}")
     if not solution.success:
         fail(solution.status)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -19,12 +20,18 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     print_json,
     print_table,
     problem_spec,
     progress_bar,
     stdout,
 )
+from nlp_gait.errors import OutputError
+
+if TYPE_CHECKING:
+    from compare.sweep import SweepPoint
+    from nlp_gait.problems.gait_problem import GaitProblem
 
 
 @command
@@ -52,25 +59,46 @@ def sweep(
     from compare.sweep import count_solves, parse_axis
     from compare.sweep import sweep as run_sweep
     from compare.sweep_report import write_sweep
+    from nlp_gait.backends.interrupts import Interrupted
 
     folder = writable_folder(out)
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
     axes = [parse_axis(text) for text in over]
+    stopped = ""
     with progress_bar("solves", count_solves(axes, algorithm)) as advance:
-        points = run_sweep(
-            spec,
-            axes,
-            algorithm=algorithm,
-            starts=starts,
-            evaluations=evaluations,
-            seed=seed,
-            progress=lambda: advance(""),
-        )
+        try:
+            points = run_sweep(
+                spec,
+                axes,
+                algorithm=algorithm,
+                starts=starts,
+                evaluations=evaluations,
+                seed=seed,
+                progress=lambda: advance(""),
+            )
+        except Interrupted as interrupt:
+            points, stopped = cast("list[SweepPoint]", interrupt.partial), interrupt.sentence
+            if not points:
+                end_interrupted(f"{stopped}; nothing was written")
     loaded = spec.load()
-    written = write_sweep(folder, points, loaded, algorithm)
+    written: list[Path] = []
+    unwritten: OutputError | None = None
+    try:
+        written = write_sweep(folder, points, loaded, algorithm)
+    except OutputError as error:  # the points are printed all the same
+        unwritten = error
     if as_json:
         print_json({"problem": problem, "points": [asdict(p) for p in points], "files": [str(p) for p in written]})
-        return
+    else:
+        _print(points, loaded, algorithm, written)
+    if unwritten is not None:
+        raise unwritten
+    if stopped:
+        not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
+        end_interrupted(f"{stopped}; these are in {folder}{not_twice}")
+
+
+def _print(points: Sequence[SweepPoint], loaded: GaitProblem, algorithm: str, written: Sequence[Path]) -> None:
     header = (*points[0].at, loaded.objective.name, "status")
     rows = [
         (
@@ -80,6 +108,6 @@ def sweep(
         )
         for p in points
     ]
-    print_table(f"{problem} by {algorithm}", header, rows)
+    print_table(f"{loaded.name} by {algorithm}", header, rows)
     for path in written:
         stdout.print(f"wrote {path}", soft_wrap=True)

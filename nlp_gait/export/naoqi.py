@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.export.files import write_text
 from nlp_gait.export.setpoints import SetPoints
+from nlp_gait.files import write_text
 
 APPROACH_S = 2.0  # to the first pose, from wherever the robot stands: a key needs a time after zero
 # Both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name.

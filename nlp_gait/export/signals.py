@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.errors import OutputError
+from nlp_gait.files import new_file
 from nlp_gait.problems.gait_problem import Signals
 
 
@@ -16,10 +16,5 @@ def write_npz(path: Path, signals: Signals) -> None:
     Raises:
         OutputError: the file cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.tmp.npz")
-    try:
-        np.savez(temporary, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    with new_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nlp_gait.errors import InputError
-from nlp_gait.export.files import write_text
-from nlp_gait.export.result import Result
+from nlp_gait.export.result import SCHEMA, Result
+from nlp_gait.files import write_text
 from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.symbolic.stair_loads import MOVING
 
@@ -80,6 +80,7 @@ def write_json(path: Path, result: Result, signals: Signals) -> None:
     """The gait with its problem and all columns by name, each with its unit; raises InputError, OutputError."""
     problem = result.problem
     data = {
+        "schema": SCHEMA,
         "problem": problem.name,
         "options": dict(problem.options),
         "parameters": dict(problem.values),

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.errors import InputError, MissingExtraError, OutputError
+from nlp_gait.errors import InputError, MissingExtraError
+from nlp_gait.files import new_file
 
 SUFFIXES = (".gif", ".mp4")
 COLOURS = 128  # of a GIF; fewer lose small marks
@@ -43,14 +44,8 @@ def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> Non
         OutputError: the file cannot be written.
     """
     check_video_path(path)
-    temporary = path.with_name(f".{path.stem}.tmp{path.suffix.lower()}")
-    try:
+    with new_file(path) as temporary:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frames, frames_per_s)
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
@@ -61,7 +56,7 @@ def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
         for frame in frames
     ]
     duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
-    images[0].save(path, save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True)
+    images[0].save(path, format="GIF", save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True)
 
 
 def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
@@ -73,7 +68,7 @@ def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
             even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])  # for the codec
             if writer is None:
                 size = (even.shape[1], even.shape[0])
-                writer = imageio_ffmpeg.write_frames(str(path), size, fps=frames_per_s, macro_block_size=2)
+                writer = imageio_ffmpeg.write_frames(str(path), size, fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"])
                 writer.send(None)
             writer.send(even)
     finally:

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.export.files import write_text
 from nlp_gait.export.setpoints import SetPoints
+from nlp_gait.files import read_text, write_text
 
 HEADER, VERSION = "#WEBOTS_MOTION", "V1.0"
 LONGEST_LINE = 4095  # characters with the line's end: what the parser's buffer holds
@@ -57,10 +57,7 @@ def read_motion(path: Path, motors: Collection[str] | None = None) -> SetPoints:
     Raises:
         InputError: what breaks the grammar, with its line.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"motion {str(path)!r} cannot be read: {error}") from error
+    text = read_text(path, "motion")
     return parse_motion(text, path.name, motors)
 
 
@@ -120,7 +117,7 @@ def _milliseconds(text: str, where: str, last: int) -> int:
 def _angle(text: str, joint: str, where: str) -> float:
     if text == UNTOUCHED:
         return math.nan
-    if _NUMBER.fullmatch(text) is None:
+    if _NUMBER.fullmatch(text) is None or not math.isfinite(float(text)):
         raise InputError(f"{where}: expected an angle of {joint} in radians or {UNTOUCHED}, got {text!r}")
     return float(text)
 

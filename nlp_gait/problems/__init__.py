@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
-from nlp_gait.errors import unknown
+from nlp_gait.errors import InputError, unknown
 from nlp_gait.problems.gait_problem import GaitProblem
 
 # Module and function of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
     "nao-ssp": "nao_ssp",
     "nao-dsp": "nao_dsp",
+    "nao-ssp-free": "nao_ssp_free",
+    "nao-cycle": "nao_cycle",
     "walk12": "walk12",
     "stairs-plan": "stairs_plan",
     "stairs-track": "stairs_track",
     "stairs-ideal": "stairs_ideal",
 }
+
+# Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
+LARGEST_COUNT = 10_000
 
 
 def problem_names() -> tuple[str, ...]:
@@ -39,7 +46,27 @@ def problem_maker(name: str) -> Callable[..., GaitProblem]:
     return make
 
 
-def load(name: str, **options: str | int | float | bool) -> GaitProblem:
+def check_options(name: str, options: Mapping[str, Any]) -> None:
+    """Refuse options of a problem that do not exist, or are not of their default's type.
+
+    Raises:
+        UnknownNameError: no such problem or option.
+        InputError: a value of another type, or a count beyond what can be built.
+    """
+    known = inspect.signature(problem_maker(name)).parameters
+    for option, value in options.items():
+        if option not in known:
+            raise unknown(f"option of {name}", option, known)
+        expected = type(known[option].default)
+        if type(value) is not expected and not (expected is float and type(value) is int):
+            raise InputError(f"option {option} must be a {expected.__name__}, got {value!r}")
+        if expected is int and value > LARGEST_COUNT:
+            raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
+        if expected is float and not math.isfinite(value):
+            raise InputError(f"option {option} must be finite, got {value}")
+
+
+def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Problem by name, built with the given options; the others keep their defaults.
 
     Raises:
@@ -47,11 +74,8 @@ def load(name: str, **options: str | int | float | bool) -> GaitProblem:
         InputError: a value that the option does not allow.
     """
     make = problem_maker(name)
-    known = inspect.signature(make).parameters
-    for option in options:
-        if option not in known:
-            raise unknown(f"option of {name}", option, known)
+    check_options(name, options)
     return make(**options)
 
 
-__all__ = ["PROBLEMS", "GaitProblem", "load", "problem_maker", "problem_names"]
+__all__ = ["PROBLEMS", "GaitProblem", "check_options", "load", "problem_maker", "problem_names"]

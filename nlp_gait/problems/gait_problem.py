@@ -26,13 +26,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
-    """Decision variable with its default bounds, in ``unit``."""
+    """Decision variable with its default bounds, in ``unit``; no bound may be set beyond ``minimum`` and ``maximum``."""
 
     name: str
     unit: str
     lower: float
     upper: float
     description: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +186,12 @@ class GaitProblem:
         """All parameters, the variables' bounds included, in the order of p."""
         bounds = [
             Parameter(
-                name=f"{v.name}.{end}", unit=v.unit, default=getattr(v, end), description=f"{end} bound of {v.name}"
+                name=f"{v.name}.{end}",
+                unit=v.unit,
+                default=getattr(v, end),
+                description=f"{end} bound of {v.name}",
+                minimum=v.minimum,
+                maximum=v.maximum,
             )
             for end in ("lower", "upper")
             for v in self.variables
@@ -215,7 +222,7 @@ class GaitProblem:
         """Current value of a parameter."""
         return float(self.p[self._parameter_index(name)])
 
-    def with_values(self, **values: float) -> GaitProblem:
+    def with_values(self, /, **values: float) -> GaitProblem:
         """The same problem with other parameter values; nothing is rebuilt. Names with a dot go in as ``**{...}``.
 
         Raises:
@@ -224,7 +231,7 @@ class GaitProblem:
         """
         for name, value in values.items():
             parameter = self.parameters[self._parameter_index(name)]
-            if not (isinstance(value, (int, float)) and math.isfinite(value)):
+            if not is_number(value):
                 raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
             if not parameter.minimum <= value <= parameter.maximum:
                 raise InputError(
@@ -235,12 +242,12 @@ class GaitProblem:
         changed._check_pairs()
         return changed
 
-    def fix(self, **values: float) -> GaitProblem:
+    def fix(self, /, **values: float) -> GaitProblem:
         """The same problem with some variables held at a value, which must lie within their bounds."""
         bounds: dict[str, float] = {}
         for name, value in values.items():
             i = self.variable_index(name)
-            if not (isinstance(value, (int, float)) and self.lower[i] <= value <= self.upper[i]):
+            if not (is_number(value) and self.lower[i] <= value <= self.upper[i]):
                 raise InputError(
                     f"variable {name!r} cannot be fixed at {value!r}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
                     f"{self.variables[i].unit}; widen them with --set {name}.lower=... or --set {name}.upper=..."
@@ -271,7 +278,7 @@ class GaitProblem:
         """(n,) floats, or InputError if the length is wrong or a value is not finite."""
         try:
             array = np.asarray(x, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"x must be {len(self.names)} numbers, got {x!r}") from error
         if array.shape != (len(self.names),):
             raise InputError(
@@ -314,6 +321,14 @@ class GaitProblem:
                         f"bounds of {stem!r} are inverted: lower {low:g} is above upper {values[f'{stem}.upper']:g}; "
                         f"set {name} and {stem}.upper so that lower <= upper"
                     )
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number; a truth value is none."""
+    try:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond every float
+        return False
 
 
 def constraint_rows(constraint: Constraint) -> tuple[MX, MX, MX]:

@@ -7,9 +7,9 @@ torso, which depends on where the hip is between the feet.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar, get_args
 
-from casadi import DM, MX, SX, fmax, vertcat
+from casadi import MX, SX, fmax, vertcat
 
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import GaitProblem, Variable
@@ -17,14 +17,23 @@ from nlp_gait.problems.nao import (
     GRAVITY,
     JOINTS,
     LEAST_DURATION,
-    arm_joints,
-    hip_motion,
     leg_joints,
     nao,
     upright_links,
 )
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
+from nlp_gait.problems.nao_motion import (
+    Criterion,
+    Splines,
+    Trajectory,
+    arm_motions,
+    hip_and_arm_units,
+    hip_on_spline,
+    motion_options,
+    samples_in_interval,
+    with_motion,
+)
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
@@ -47,6 +56,7 @@ DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0
 
 TorsoShare = Literal["printed", "lever"]
 Point2: TypeAlias = tuple[float, float]
+Side = TypeVar("Side", float, MX)
 
 
 def nao_dsp(
@@ -57,7 +67,9 @@ def nao_dsp(
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "printed",
     step_length_m: float = 0.06,
-    samples_per_interval: int = 1,
+    samples_per_interval: int = 0,
+    trajectory: Trajectory = "cubic",
+    objective: Criterion = "power",
 ) -> GaitProblem:
     """Double support of NAO.
 
@@ -68,7 +80,10 @@ def nao_dsp(
         rotational_inertia: False takes every link as a point mass, in torques and ZMP.
         torso_share: how the torso's mass is shared between the legs (see ``torso_shares``).
         step_length_m: from foot to foot.
-        samples_per_interval: above 1 for a grid that is denser than the intervals.
+        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
+            cubics, 4 with splines, which would else bend between the samples.
+        trajectory: of hip and arms: the paper's cubics, or more coefficients on top of them.
+        objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
     """
     if torso_share not in get_args(TorsoShare):
         raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
@@ -76,23 +91,27 @@ def nao_dsp(
     model = nao(robot, rotational_inertia)
     soles = _soles(model, step_length_m)
     box = support_box(model, soles)
-    variables = (*hip_variables(model), DURATION)
-    return phase_problem(
+    own = (*hip_variables(model), DURATION)
+    splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING), first=len(own))
+    variables = (*own, *splines.variables)
+    samples = samples_in_interval(trajectory, samples_per_interval)
+    phase = Phase(
+        robot=model,
+        variables=len(variables),
+        duration="double_support_time_s",
+        plan=_planner(model, soles, splines),
+        loads=double_support_loads(model, torso_share),
+        intervals=intervals,
+        samples_per_interval=samples,
+        derivatives=derivatives,
+    )
+    problem = phase_problem(
         name="nao-dsp",
         title="NAO, double support: least mean power",
         variables=variables,
-        phase=Phase(
-            robot=model,
-            variables=len(variables),
-            duration="double_support_time_s",
-            plan=_planner(model, soles),
-            loads=_loads(model, soles, torso_share),
-            intervals=intervals,
-            samples_per_interval=samples_per_interval,
-            derivatives=derivatives,
-        ),
+        phase=phase,
         margins=lambda zmp, ops: double_support_margins(zmp, box, ops),
-        mean_dbm_m=_mean_margins(box),
+        mean_dbm_m=double_support_mean_margins(box),
         make=nao_dsp,
         options={
             "robot": robot,
@@ -101,15 +120,21 @@ def nao_dsp(
             "rotational_inertia": rotational_inertia,
             "torso_share": torso_share,
             "step_length_m": step_length_m,
+            **motion_options(trajectory, objective, samples),
         },
     )
 
+    def arms(x: SX, s: SX) -> Mapping[str, Motion]:
+        return arm_motions(x, splines, ARM_SWING, _duration(x), s)
 
-class Box(NamedTuple):
+    return with_motion(problem, phase, splines, objective, arms)
+
+
+class Box(NamedTuple, Generic[Side]):
     """Sides of the rectangle around both soles [m]."""
 
-    back: float
-    front: float
+    back: Side
+    front: Side
     right: float
     left: float
 
@@ -119,7 +144,7 @@ def _soles(robot: Robot, step: float) -> dict[str, Point2]:
     return {"L": (step, leg_geometry(robot, "L").hip_m[1]), "R": (2 * step, leg_geometry(robot, "R").hip_m[1])}
 
 
-def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box:
+def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
     """Rectangle around both soles, whose ankles stand at ``soles`` by side."""
     feet = {side: robot.feet[foot] for side, foot in FEET.items()}
     return Box(
@@ -130,13 +155,17 @@ def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box:
     )
 
 
-def _mean_margins(box: Box) -> Point2:
+def double_support_mean_margins(box: Box[float]) -> Point2:
     """Least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
 
 
-def _planner(robot: Robot, soles: Mapping[str, Point2]) -> Planner:
+def _duration(x: SX) -> SX:
+    return fmax(x[7], LEAST_DURATION)
+
+
+def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Planner:
     """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics.
 
     The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, rounded to a micrometre so
@@ -148,12 +177,12 @@ def _planner(robot: Robot, soles: Mapping[str, Point2]) -> Planner:
     ankles = {side: stack(*map(constant, (*xy, robot.feet[FEET[side]].ankle_height_m))) for side, xy in soles.items()}
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        duration = fmax(x[7], LEAST_DURATION)
-        hip = hip_motion(x[:7], hip_x, hip_y, duration, phase)
+        duration = _duration(x)
+        hip = hip_on_spline(x, splines, hip_x, hip_y, duration, phase)
         left, left_reach = leg_joints(robot, "L", hip, ankles["L"], margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, ankles["R"], margin, ops)
         return Plan(
-            joints={**left, **right, **arm_joints(ARM_SWING, duration, phase)},
+            joints={**left, **right, **arm_motions(x, splines, ARM_SWING, duration, phase)},
             hip=hip.position,
             ankles={side: ankle.position for side, ankle in ankles.items()},
             reach=vertcat(left_reach, right_reach),
@@ -182,31 +211,32 @@ def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) ->
     return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
 
 
-def _loads(robot: Robot, soles: Mapping[str, Point2], rule: TorsoShare) -> Loader:
+def double_support_loads(robot: Robot, rule: TorsoShare) -> Loader:
     """Torques of each half from its own foot, and the combined ZMP of both feet."""
     halves = {
         side: tree_from(robot, robot.feet[foot].link, [joint for joint in JOINTS if joint.startswith(side)])
         for side, foot in FEET.items()
     }
     weight, upright = robot.mass_kg * GRAVITY, upright_links(robot)
+    feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
 
-    def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
+    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        shares = torso_shares(hip[1], rule, (soles["L"][1], soles["R"][1]))
+        shares = torso_shares(hip[1], rule, feet_y)
         torques: dict[str, SX] = {}
         zmps, ground_loads = [], []
         for side, tree in halves.items():
             half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
             offset = zmp_of_wrench(wrench, robot.feet[FEET[side]].ankle_height_m, weight)
             torques |= half
-            zmps.append(DM(soles[side]) + offset)
+            zmps.append(feet[side] + offset)
             ground_loads.append(ground_load(wrench, weight))
         return Loads(torques, combined_zmp(zmps, ground_loads))
 
     return loads
 
 
-def double_support_margins(zmp: MX, box: Box, ops: Nonsmooth) -> tuple[MX, MX]:
+def double_support_margins(zmp: MX, box: Box[float] | Box[MX], ops: Nonsmooth) -> tuple[MX, MX]:
     """Balance margins in x and y, (1, N + 1) each [m]: distances to the sides of the box around both soles.
 
     Source:

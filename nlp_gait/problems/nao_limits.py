@@ -60,7 +60,7 @@ def phase_problem(
         return assemble_phase(point, ops, samples, margins(samples.zmp, ops), phase.samples_per_interval)
 
     def refine(factor: int) -> GaitProblem:
-        return make(**options, samples_per_interval=phase.samples_per_interval * factor)
+        return make(**{**options, "samples_per_interval": phase.samples_per_interval * factor})
 
     def signals(x: Array, p: Array) -> Signals:
         return phase.signals(problem.symbols(), x, p)

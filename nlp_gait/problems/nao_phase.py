@@ -54,8 +54,8 @@ class Loads(NamedTuple):
 
 # From x (n,), the reach margin, the phase in [0, 1] and an interpretation of acos.
 Planner = Callable[[SX, SX, SX, Nonsmooth], Plan]
-# From joint motions by name and the hip's position (3,).
-Loader = Callable[[Mapping[str, Motion], SX], Loads]
+# From joint motions by name, the hip's position (3,), and points (2,) on the ground under the ankles by side.
+Loader = Callable[[Mapping[str, Motion], SX, Mapping[str, SX]], Loads]
 
 
 class Samples(NamedTuple):
@@ -85,7 +85,7 @@ class Phase:
         variables: number of decision variables.
         duration: name of the variable that holds the phase's duration.
         plan: motion from x (n,), the reach margin, the phase in [0, 1] and an interpretation of acos.
-        loads: torques and ZMP from joint motions by name and the hip's position.
+        loads: torques and ZMP from joint motions by name, the hip's position and where the feet are.
         intervals: equal parts of the phase over which a torque may change by the limit.
         samples_per_interval: above 1 for a grid that is denser than the intervals.
         derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
@@ -118,15 +118,20 @@ class Phase:
         """The phase at N + 1 equidistant samples; per-sample functions are mapped, never unrolled."""
         if self.derivatives == "analytic":
             return Samples(*self._mapped(self.sample(ops), point))
-        q, _, _, hip, planned, reach, _ = self._mapped(self._kinematics(ops), point)
+        q, _, _, hip, planned, reach, world = self._mapped(self._kinematics(ops), point)
         qd, qdd = self._differences(q, point)
-        torque, moving_torque, zmp = self._dynamics().map(self.steps + 1)(q, qd, qdd, hip)
+        torque, moving_torque, zmp = self._dynamics().map(self.steps + 1)(q, qd, qdd, hip, world)
         return Samples(planned, reach, torque, qd * moving_torque, zmp)
+
+    def accelerations(self, point: Point, ops: Nonsmooth) -> MX:
+        """(m, N + 1) of the joints that move [rad/s^2]."""
+        q, _, qdd, *_ = self._mapped(self._kinematics(ops), point)
+        return qdd if self.derivatives == "analytic" else self._differences(q, point)[1]
 
     def sample(self, ops: Nonsmooth) -> ca.Function:
         """One sample with analytic derivatives: (x, margin, phase) to the fields of ``Samples``."""
         inputs, plan = self._symbolic_plan(ops)
-        loads = self.loads(plan.joints, plan.hip)
+        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()})
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
         planned = ca.vertcat(*(plan.joints[name].position for name in PLANNED_JOINTS))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
@@ -138,7 +143,7 @@ class Phase:
         q, qd, qdd, hip, _, _, world = self._mapped(self._kinematics(Exact()), point)
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, point)
-        torque, _, zmp = self._dynamics().map(self.steps + 1)(q, qd, qdd, hip)
+        torque, _, zmp = self._dynamics().map(self.steps + 1)(q, qd, qdd, hip, world)
         still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
         full = [
             ca.vertcat(*(rows[self.moving.index(n), :] if n in self.moving else MX(DM(fill(n))) for n in JOINTS))
@@ -181,15 +186,16 @@ class Phase:
         return ca.Function("kinematics", inputs, [*motion, plan.hip, planned, plan.reach, world])
 
     def _dynamics(self) -> ca.Function:
-        """One sample: torques, those of the moving joints, and ZMP, from given angles and derivatives."""
+        """One sample: torques, those of the moving joints, and ZMP, from given angles and derivatives, hip, and com with both feet."""
         _, plan = self._symbolic_plan(Exact())
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
-        hip = SX.sym("hip", 3)
+        hip, world = SX.sym("hip", 3), SX.sym("world", 9)
+        _, left, right = ca.vertsplit(world, 3)
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
-        loads = self.loads({**plan.joints, **moved}, hip)
+        loads = self.loads({**plan.joints, **moved}, hip, {"L": left[:2], "R": right[:2]})
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         moving = ca.vertcat(*(loads.torques[name] for name in self.moving))
-        return ca.Function("dynamics", [*parts, hip], economical([torque, moving, loads.zmp]))
+        return ca.Function("dynamics", [*parts, hip, world], economical([torque, moving, loads.zmp]))
 
     def _mapped(self, function: ca.Function, point: Point) -> list[MX]:
         """A function of (x, margin, phase) at all samples, one column each."""

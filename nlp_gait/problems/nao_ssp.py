@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from casadi import DM, MX, SX, fmax, vertcat
+from casadi import MX, SX, fmax, vertcat
 
 from nlp_gait.problems.gait_problem import GaitProblem, Variable
 from nlp_gait.problems.nao import (
     GRAVITY,
     LEAST_DURATION,
-    arm_joints,
-    hip_motion,
     leg_joints,
     nao,
     upright_links,
 )
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
+from nlp_gait.problems.nao_motion import (
+    Criterion,
+    Heights,
+    Splines,
+    Trajectory,
+    arm_motions,
+    hip_and_arm_units,
+    hip_on_spline,
+    motion_options,
+    samples_in_interval,
+    with_motion,
+)
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, stack
+from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, plus, stack
 
 # Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
 MEAN_DBM_SHARES = (1 / 3, 1 / 4)
@@ -35,6 +45,9 @@ ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
     "RShoulderPitch": (1.0, 2.0),
     "RElbowRoll": (0.64, 0.42),
 }
+
+# Curves that can be splines; the swing foot stays on its line across the walking direction.
+UNITS = hip_and_arm_units(ARM_SWING) | {"foot_x": "m", "foot_z": "m"}
 
 OWN_VARIABLES = (
     Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
@@ -49,7 +62,9 @@ def nao_ssp(
     derivatives: Derivatives = "analytic",
     rotational_inertia: bool = True,
     step_length_m: float = 0.06,
-    samples_per_interval: int = 1,
+    samples_per_interval: int = 0,
+    trajectory: Trajectory = "cubic",
+    objective: Criterion = "power",
 ) -> GaitProblem:
     """Single support of NAO.
 
@@ -59,29 +74,36 @@ def nao_ssp(
         derivatives: analytic, or finite differences of the sampled angles as in the paper.
         rotational_inertia: False takes every link as a point mass, in torques and ZMP.
         step_length_m: from foot to foot; the swing foot moves by twice as much.
-        samples_per_interval: above 1 for a grid that is denser than the intervals.
+        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
+            cubics, 4 with splines, which would else bend between the samples.
+        trajectory: of hip, swing foot and arms: the paper's cubics, or more coefficients on top of them.
+        objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
     """
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
     foot = model.feet["left"]
-    stance = _stance(model, step_length_m)
-    variables = (*hip_variables(model), *OWN_VARIABLES)
-    return phase_problem(
+    stance = stance_of(model, step_length_m)
+    own = (*hip_variables(model), *OWN_VARIABLES)
+    splines = Splines(trajectory=trajectory, units=UNITS, first=len(own))
+    variables = (*own, *splines.variables)
+    samples = samples_in_interval(trajectory, samples_per_interval)
+    phase = Phase(
+        robot=model,
+        variables=len(variables),
+        duration="single_support_time_s",
+        plan=single_support_plan(model, stance, splines),
+        loads=single_support_loads(model),
+        intervals=intervals,
+        samples_per_interval=samples,
+        derivatives=derivatives,
+    )
+    problem = phase_problem(
         name="nao-ssp",
         title="NAO, single support: least mean power",
         variables=variables,
-        phase=Phase(
-            robot=model,
-            variables=len(variables),
-            duration="single_support_time_s",
-            plan=_planner(model, stance),
-            loads=_loads(model, stance),
-            intervals=intervals,
-            samples_per_interval=samples_per_interval,
-            derivatives=derivatives,
-        ),
+        phase=phase,
         margins=lambda zmp, ops: single_support_margins(zmp, stance.support_xy, foot, ops),
-        mean_dbm_m=_mean_margins(foot),
+        mean_dbm_m=single_support_mean_margins(foot),
         make=nao_ssp,
         options={
             "robot": robot,
@@ -89,11 +111,20 @@ def nao_ssp(
             "derivatives": derivatives,
             "rotational_inertia": rotational_inertia,
             "step_length_m": step_length_m,
+            **motion_options(trajectory, objective, samples),
         },
+    )
+    return with_motion(
+        problem,
+        phase,
+        splines,
+        objective,
+        arms=lambda x, s: arm_motions(x, splines, ARM_SWING, single_support_duration(x), s),
+        foot=Heights(lambda x, s: _swing(x, stance, splines, 0.0, s).position[2], "swing_height_m"),
     )
 
 
-class _Stance(NamedTuple):
+class Stance(NamedTuple):
     """Where the left foot stands, and paths of the right foot and of the hip [m]."""
 
     support_xy: tuple[float, float]
@@ -103,33 +134,31 @@ class _Stance(NamedTuple):
     hip_y: tuple[float, float]
 
 
-def _stance(robot: Robot, step: float) -> _Stance:
+def stance_of(robot: Robot, step: float) -> Stance:
     """Each foot below its own hip joint, the hip halfway to the supporting one (section 4.1, Table 3)."""
     left, right = (leg_geometry(robot, side).hip_m[1] for side in "LR")
-    return _Stance((step, left), (0.0, 2 * step), right, (step / 2, 1.5 * step), (left / 2, left / 2))
+    return Stance((step, left), (0.0, 2 * step), right, (step / 2, 1.5 * step), (left / 2, left / 2))
 
 
-def _mean_margins(foot: Foot) -> tuple[float, float]:
+def single_support_mean_margins(foot: Foot) -> tuple[float, float]:
     """Least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
 
 
-def _planner(robot: Robot, stance: _Stance) -> Planner:
+def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Planner:
     """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
     ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        lift, duration = x[7], fmax(x[8], LEAST_DURATION)
-        hip = hip_motion(x[:7], stance.hip_x, stance.hip_y, duration, phase)
+        duration = single_support_duration(x)
+        hip = hip_on_spline(x, splines, stance.hip_x, stance.hip_y, duration, phase)
         support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
-        forward = cubic(SX(stance.swing_x[0]), SX(stance.swing_x[1]), SX(0), SX(0), duration, phase)
-        rise = parabola_lift(forward, *stance.swing_x, lift)
-        swing = stack(forward, constant(stance.swing_y), rise._replace(position=rise.position + ankle_heights[1]))
+        swing = _swing(x, stance, splines, ankle_heights[1], phase)
         left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
         return Plan(
-            joints={**left, **right, **arm_joints(ARM_SWING, duration, phase)},
+            joints={**left, **right, **arm_motions(x, splines, ARM_SWING, duration, phase)},
             hip=hip.position,
             ankles={"L": support.position, "R": swing.position},
             reach=vertcat(left_reach, right_reach),
@@ -138,16 +167,41 @@ def _planner(robot: Robot, stance: _Stance) -> Planner:
     return plan
 
 
-def _loads(robot: Robot, stance: _Stance) -> Loader:
-    """Torques of the whole tree from the support foot, and the ZMP from the ground's wrench on that foot."""
-    foot = robot.feet["left"]
-    tree, upright = tree_from(robot, foot.link), upright_links(robot)
+def single_support_duration(x: SX) -> SX:
+    """Time of the phase [s] from x (n,), never zero."""
+    return fmax(x[8], LEAST_DURATION)
 
-    def loads(joints: Mapping[str, Motion], hip: SX) -> Loads:
+
+def _swing(x: SX, stance: Stance, splines: Splines, ankle_height: float, phase: SX) -> Motion:
+    """Motion of the right ankle (3,) [m]: the paper's, and the splines on it."""
+    duration = single_support_duration(x)
+    more = splines.motions(x, duration, phase)
+    swing = swing_foot(*map(SX, stance.swing_x), stance.swing_y, ankle_height, x[7], duration, phase)
+    return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
+
+
+def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
+    """Motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
+    forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
+    rise = parabola_lift(forward, start_x, end_x, lift)
+    return stack(forward, constant(y), rise._replace(position=rise.position + ankle_height))
+
+
+def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -> Loader:
+    """Torques of the whole tree from the left foot, which supports it, and the ZMP from the ground's wrench on that foot.
+
+    Args:
+        robot: with links welded that never move.
+        upright: links that never turn; None for those of a robot whose torso is upright and whose soles are flat.
+    """
+    foot = robot.feet["left"]
+    tree, upright = tree_from(robot, foot.link), upright_links(robot) if upright is None else upright
+
+    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
         torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
-        return Loads(torques, DM(stance.support_xy) + offset)
+        return Loads(torques, feet["L"] + offset)
 
     return loads
 

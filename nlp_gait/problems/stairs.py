@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problems.gait_problem import Array, Parameter, Point
+from nlp_gait.problems.gait_problem import Array, Parameter, Point, Variable
 from nlp_gait.symbolic.stair_loads import JOINT_RATES, MOVING
 from nlp_gait.symbolic.stair_profile import Stair
 
@@ -44,6 +44,11 @@ STAIR_PARAMETERS = (
         name="rise_run_ratio", unit="1", default=CASES[2][1], description="rise over run", minimum=0.01, maximum=5.0
     ),
 )
+
+
+def within(point: Point, variable: Variable) -> MX:
+    """Value of a variable for the mathematics: beyond its minimum and maximum, where no bound lies, that of the nearer one."""
+    return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
 
 
 def stair_of(point: Point) -> Stair[MX]:

@@ -8,26 +8,100 @@ import casadi as ca
 from casadi import MX, SX
 
 from nlp_gait.problems.gait_problem import Parameter, Point, Variable
+from nlp_gait.problems.stairs import within
 from nlp_gait.symbolic.stair_gait import StairPlan
 
+# Beyond minimum and maximum a plan is none, and its numbers may overflow.
 GOVERNING_VARIABLES = (
     Variable(
-        name="hip_height_m", unit="m", lower=0.5, upper=0.8, description="z_Ci, above the rear ankle at the start"
+        name="hip_height_m",
+        unit="m",
+        lower=0.5,
+        upper=0.8,
+        description="z_Ci, above the rear ankle at the start",
+        minimum=0.1,
+        maximum=2.0,
     ),
     Variable(
-        name="hip_start_m", unit="m", lower=-0.1, upper=0.25, description="hip ahead of the rear ankle at the start"
+        name="hip_start_m",
+        unit="m",
+        lower=-0.1,
+        upper=0.25,
+        description="hip ahead of the rear ankle at the start",
+        minimum=-2.0,
+        maximum=2.0,
     ),
-    Variable(name="zmp_start_m", unit="m", lower=-0.1, upper=0.4, description="planned ZMP ahead of the rear ankle"),
-    Variable(name="zmp_end_m", unit="m", lower=-0.3, upper=0.4, description="planned ZMP ahead of the stance ankle"),
     Variable(
-        name="end_rate_rad_s", unit="rad/s", lower=0.0, upper=3.0, description="rate of the cycloid's angle at t3"
+        name="zmp_start_m",
+        unit="m",
+        lower=-0.1,
+        upper=0.4,
+        description="planned ZMP ahead of the rear ankle",
+        minimum=-2.0,
+        maximum=2.0,
     ),
-    Variable(name="torso_pitch_rad", unit="rad", lower=0.8, upper=1.75, description="q5, from the forward axis"),
-    Variable(name="t1_s", unit="s", lower=0.2, upper=1.0, description="t1, end of the heel's rise"),
-    Variable(name="t2_s", unit="s", lower=0.6, upper=2.0, description="t2, end of the double support"),
-    Variable(name="t_bc_s", unit="s", lower=1.0, upper=3.2, description="t_bc, the cycloid is caught"),
     Variable(
-        name="foot_pitch_rad", unit="rad", lower=0.0, upper=0.6, description="upward pitch of the foot in the air"
+        name="zmp_end_m",
+        unit="m",
+        lower=-0.3,
+        upper=0.4,
+        description="planned ZMP ahead of the stance ankle",
+        minimum=-2.0,
+        maximum=2.0,
+    ),
+    Variable(
+        name="end_rate_rad_s",
+        unit="rad/s",
+        lower=0.0,
+        upper=3.0,
+        description="rate of the cycloid's angle at t3",
+        minimum=-20.0,
+        maximum=20.0,
+    ),
+    Variable(
+        name="torso_pitch_rad",
+        unit="rad",
+        lower=0.8,
+        upper=1.75,
+        description="q5, from the forward axis",
+        minimum=-3.2,
+        maximum=3.2,
+    ),
+    Variable(
+        name="t1_s",
+        unit="s",
+        lower=0.2,
+        upper=1.0,
+        description="t1, end of the heel's rise",
+        minimum=0.0,
+        maximum=20.0,
+    ),
+    Variable(
+        name="t2_s",
+        unit="s",
+        lower=0.6,
+        upper=2.0,
+        description="t2, end of the double support",
+        minimum=0.0,
+        maximum=20.0,
+    ),
+    Variable(
+        name="t_bc_s",
+        unit="s",
+        lower=1.0,
+        upper=3.2,
+        description="t_bc, the cycloid is caught",
+        minimum=0.0,
+        maximum=20.0,
+    ),
+    Variable(
+        name="foot_pitch_rad",
+        unit="rad",
+        lower=0.0,
+        upper=0.6,
+        description="upward pitch of the foot in the air",
+        minimum=-1.6,
+        maximum=1.6,
     ),
 )
 GIVEN_PARAMETERS = (  # Table III
@@ -63,7 +137,8 @@ GOVERNING = (*(variable.name for variable in GOVERNING_VARIABLES), *(parameter.n
 
 def governing(point: Point) -> MX:
     """(14,) governing parameters in the order of GOVERNING, whatever each is in the problem."""
-    return ca.vertcat(*(point[name] for name in GOVERNING))
+    variables = (within(point, variable) for variable in GOVERNING_VARIABLES)
+    return ca.vertcat(*variables, *(point[parameter.name] for parameter in GIVEN_PARAMETERS))
 
 
 def plan_of(values: SX) -> StairPlan:

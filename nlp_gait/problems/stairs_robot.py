@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -10,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from nlp_gait.errors import RobotDataError
+from nlp_gait.files import read_json
 from nlp_gait.symbolic.planar_biped import LINKS, Rod
 
 DEFAULT_FILE = resources.files("nlp_gait.problems") / "data" / "stairs_biped.json"
@@ -104,11 +104,11 @@ def load_biped(file: str = "") -> ToeFootBiped:
         RobotDataError: the file cannot be read, or describes no such robot.
     """
     source = Path(file) if file else DEFAULT_FILE
+    data = read_json(Path(str(source)), "robot file", error=RobotDataError)
     try:
-        data = json.loads(source.read_text(encoding="utf-8"))
         links = tuple(PlanarLink(**link) for link in data["links"])
         return ToeFootBiped(name=data["name"], source=data["source"], links=links)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise RobotDataError(
             f"robot file {str(source)!r} cannot be used: {error}; it needs name, source and links with name, length_m, mass_kg"
         ) from error

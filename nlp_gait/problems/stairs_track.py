@@ -20,7 +20,7 @@ from nlp_gait.problems.gait_problem import (
     Signals,
     Variable,
 )
-from nlp_gait.problems.stairs import STAIR_PARAMETERS
+from nlp_gait.problems.stairs import STAIR_PARAMETERS, within
 from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES
 from nlp_gait.problems.stairs_layout import labels
 from nlp_gait.problems.stairs_robot import load_biped
@@ -43,12 +43,23 @@ PLAN = {
     "foot_pitch_rad": 0.3169,
 }
 TORSO_PITCH = "torso_pitch_rad"
+# Start points scatter about gains and a torso pitch with which the robot stays near its plan (normal, in units of the ranges):
+# a rollout of a robot that falls has no gradient of use.
+PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
+SCATTER = 0.05
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
     *(
-        Parameter(name=v.name, unit=v.unit, default=PLAN[v.name], description=v.description)
+        Parameter(
+            name=v.name,
+            unit=v.unit,
+            default=PLAN[v.name],
+            description=v.description,
+            minimum=v.minimum,
+            maximum=v.maximum,
+        )
         for v in GOVERNING_VARIABLES
         if v.name != TORSO_PITCH
     ),
@@ -124,9 +135,17 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
         *(v for v in GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
 
+    def rollout(point: Point, ops: Nonsmooth) -> Rollout:
+        return loop.rollout(point, ca.vertcat(*(within(point, variable) for variable in variables)), ops)
+
+    def start(_: Array, rng: np.random.Generator) -> Array:
+        gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
+        ranges = np.array([variable.upper - variable.lower for variable in variables])
+        return np.append(gains_about, PLAUSIBLE_TORSO) + SCATTER * ranges * rng.standard_normal(len(variables))
+
     def signals(x: Array, p: Array) -> Signals:
         point = problem.symbols()
-        outputs = list(loop.rollout(point, point.x, Exact()))
+        outputs = list(rollout(point, Exact()))
         desired, state, torque, zmp = (
             np.array(part).T for part in ca.Function("rollout", [point.x, point.p], outputs)(x, p)
         )
@@ -150,7 +169,9 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: _assemble(point, loop.rollout(point, point.x, ops), ops),
+        assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
+        start=start,
+        hessian="limited-memory",  # as many iterations as with the exact one, each at a fifth of its time
         signals=signals,
     )
     return problem
@@ -164,6 +185,8 @@ def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> t
             lower=0.0,
             upper=100.0,
             description=f"{symbol} of {suffix.removeprefix('_') or 'all links'}",
+            minimum=0.0,
+            maximum=1e4,
         )
         for suffix in suffixes
     )

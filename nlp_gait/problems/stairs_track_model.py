@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -14,7 +15,7 @@ from nlp_gait.problems.gait_problem import Point
 from nlp_gait.problems.stairs import GRAVITY, SETBACK, stair_of
 from nlp_gait.problems.stairs_governing import GOVERNING, governing, plan_of
 from nlp_gait.problems.stairs_robot import load_biped
-from nlp_gait.symbolic.contact import Contact, Ground
+from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.planar_biped import LINKS, biped_dynamics, centres, points
 from nlp_gait.symbolic.quantised import (
@@ -22,8 +23,8 @@ from nlp_gait.symbolic.quantised import (
     State,
     after,
     controller_torque,
-    explicit_acceleration,
-    implicit_acceleration,
+    explicit_quantum,
+    implicit_quantum,
 )
 from nlp_gait.symbolic.stair_loads import LEAST_LOAD, link_angles
 from nlp_gait.symbolic.stair_posture import posture
@@ -76,7 +77,7 @@ class ClosedLoop:
 
         Args:
             point: for the problem's parameters.
-            tuned: K_p (gains,), K_d (gains,) and the desired torso pitch.
+            tuned: K_p (gains,), K_d (gains,) and the desired torso pitch; gains are not negative.
             ops: interpretation of what is not smooth.
         """
         stair = stair_of(point)
@@ -104,6 +105,13 @@ class ClosedLoop:
     def step(self) -> ca.Function:
         """(state (18,), given, tuned) to the state one quantum later."""
         state, inputs, parts = self._symbols()
+        following = after(state, solve_definite(*self._equations(state, parts)), QUANTUM)
+        return ca.Function(
+            "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
+        )
+
+    def _equations(self, state: State, parts: Mapping[str, Any]) -> Equations:
+        """Of the acceleration within one quantum."""
         q, v = state
         found = points(load_biped().rods, q, SX(2, 1))
         motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, q)
@@ -119,13 +127,8 @@ class ClosedLoop:
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
         if self.scheme == "implicit":
-            acceleration = implicit_acceleration(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
-        else:
-            acceleration = explicit_acceleration(motion, state, control, aim, contacts, ground, disturbance)
-        following = after(state, acceleration, QUANTUM)
-        return ca.Function(
-            "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
-        )
+            return implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
+        return explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
 
     @cached_property
     def _outcome(self) -> ca.Function:

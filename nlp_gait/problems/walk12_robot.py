@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, fields
 from functools import cache
@@ -10,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from nlp_gait.errors import RobotDataError
+from nlp_gait.files import read_json
 
 DEFAULT_FILE = resources.files("nlp_gait.problems") / "data" / "walk12.json"
 
@@ -84,10 +84,7 @@ def load_biped(path: str | None = None) -> PointMassBiped:
         RobotDataError: the file cannot be read, lacks a field or has one too many, or a value is not allowed.
     """
     file = DEFAULT_FILE if path is None else Path(path)
-    try:
-        raw = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RobotDataError(f"robot file {str(file)!r} cannot be read: {error}") from error
+    raw = read_json(Path(str(file)), "robot file", error=RobotDataError)
     wanted = {field.name for field in fields(PointMassBiped)}
     if not isinstance(raw, dict) or set(raw) != wanted:
         wrong = sorted(wanted.symmetric_difference(raw)) if isinstance(raw, dict) else type(raw).__name__

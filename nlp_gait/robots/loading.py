@@ -12,12 +12,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.files import read_json
+from nlp_gait.robots.fields import check_keys
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
+from nlp_gait.robots.perturbation import perturbed, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot
 from nlp_gait.robots.tree import reversed_joint
 from nlp_gait.robots.urdf import urdf_record
 
 SCHEMA = 1
+LONGEST_CHAIN = 8  # of robots that extend each other
+LARGEST_NUMBER = 1e9  # in the unit of its field; beyond what any robot has, and squares of it stay finite
 
 T = TypeVar("T")
 
@@ -33,12 +38,15 @@ def robot_names() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
 
+    Behind an ``@`` may stand changes of masses, leg lengths and soles, see ``robots/perturbation.py``.
+
     Raises:
         UnknownNameError: no such robot.
         RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
         MissingExtraError: a URDF cannot be read without its extra.
     """
-    return _robot(_merged(_beside_urdf(name_or_path) if name_or_path.endswith(".urdf") else name_or_path))
+    source, changes = split_name(name_or_path)
+    return perturbed(_robot(_merged(_beside_urdf(source) if source.endswith(".urdf") else source)), changes)
 
 
 def _beside_urdf(path: str) -> str:
@@ -67,7 +75,7 @@ def _merged(source: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     if "extends" not in raw:
         return raw
     base_source = _resolved(raw["extends"], source)
-    if base_source is None or base_source in seen:
+    if base_source is None or base_source in seen or len(seen) >= LONGEST_CHAIN:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {raw['extends']!r}")
     if base_source.endswith(".urdf"):
         base = urdf_record(base_source, about_joint=about == "joint")
@@ -88,7 +96,7 @@ def _stamped(records: Mapping[str, Any], **stamp: object) -> dict[str, Any]:
 
 def _renamed(joints: Mapping[str, Any], names: Mapping[str, Any], source: str) -> dict[str, Any]:
     """Joints under new names, given as new to old; a minus sign before the old one reverses the joint's sense."""
-    old = {new: str(name).removeprefix("-") for new, name in names.items()}
+    old = {new: _get(names, new, str, f"robot {source!r}: joint_names").removeprefix("-") for new in names}
     for name in old.values():
         if name not in joints:
             raise unknown(f"joint in joint_names of {source!r}", name, joints)
@@ -96,7 +104,7 @@ def _renamed(joints: Mapping[str, Any], names: Mapping[str, Any], source: str) -
     for new, name in old.items():
         if new in renamed:
             raise RobotDataError(f"robot {source!r}: joint_names gives {new!r} to {name!r}, but that name is taken")
-        renamed |= _stamped({new: joints[name]}, reversed=str(names[new]).startswith("-"))
+        renamed |= _stamped({new: joints[name]}, reversed=names[new].startswith("-"))
     return renamed
 
 
@@ -110,21 +118,15 @@ def _resolved(base: Any, source: str) -> str | None:
 
 def _read(name_or_path: str) -> dict[str, Any]:
     if name_or_path.endswith(".json"):
-        try:
-            text = Path(name_or_path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise RobotDataError(f"robot file {name_or_path!r} cannot be read: {error}") from error
+        raw = read_json(Path(name_or_path), "robot file", error=RobotDataError)
     elif name_or_path in robot_names():
-        text = (_DATA / f"{name_or_path}.json").read_text(encoding="utf-8")
+        raw = json.loads((_DATA / f"{name_or_path}.json").read_text(encoding="utf-8"))
     else:
         raise unknown("robot", name_or_path, robot_names())
-    try:
-        raw = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise RobotDataError(f"robot file {name_or_path!r} is not valid JSON: {error}") from error
-    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
-        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(found) is not int or found != SCHEMA:
         raise RobotDataError(f"robot file {name_or_path!r}: 'schema' must be {SCHEMA}, got {found!r}")
+    check_keys(raw, name_or_path)
     return raw
 
 
@@ -137,8 +139,8 @@ def _robot(raw: Mapping[str, Any]) -> Robot:
     feet = {key: _foot(key, value) for key, value in _records(raw, "feet", owner)}
     return Robot(
         name=name,
-        description=str(raw.get("description", "")),
-        sources={key: str(value) for key, value in _group(raw, "sources", name).items()},
+        description=_get({"description": "", **raw}, "description", str, owner),
+        sources={key: _get({key: value}, key, str, f"{owner}: sources") for key, value in _group(raw, "sources", name).items()},
         root=_get(raw, "root", str, owner),
         links=links,
         joints=joints,
@@ -228,6 +230,8 @@ def _number(raw: Mapping[str, Any], key: str, owner: str) -> float:
     value = raw.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise RobotDataError(f"{owner}: {key!r} must be a finite number, got {value!r}")
+    if abs(value) > LARGEST_NUMBER:
+        raise RobotDataError(f"{owner}: {key!r} must be within {LARGEST_NUMBER:g}, got {value!r}")
     return float(value)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.files import read_bytes
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -61,13 +62,12 @@ def _parsed(path: str) -> Any:
             "pip install 'nlp-gait[urdf]'"
         )
     etree = import_module("lxml.etree")
+    parser: Any = import_module("urdf_parser_py.xml_reflection.core")
+    data = read_bytes(Path(path), "robot file", error=RobotDataError)
     try:
-        data = Path(path).read_bytes()
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
-    except OSError as error:
-        raise RobotDataError(f"robot file {path!r} cannot be read: {error}") from error
-    except etree.XMLSyntaxError as error:
-        raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise RobotDataError(f"robot file {path!r} is not valid XML: {' '.join(str(error).split())}") from error
     if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise RobotDataError(f"robot file {path!r}: a URDF must not have a DOCTYPE or entities; remove them")
     for element in list(root):
@@ -78,11 +78,19 @@ def _parsed(path: str) -> Any:
         for part in list(element):
             if part.tag not in kept:
                 element.remove(part)
+    tolerant, parser.on_error = parser.on_error, _refuse
     try:
         return import_module("urdf_parser_py.urdf").URDF.from_xml_string(etree.tostring(root))
     except Exception as error:  # the parser raises its own, KeyError, ValueError and AssertionError
         said = " ".join(str(error).split()) or type(error).__name__
         raise RobotDataError(f"robot file {path!r} is no URDF of a robot: {said}") from error
+    finally:
+        parser.on_error = tolerant
+
+
+def _refuse(message: str) -> None:
+    """In place of the parser's own answer to unknown tags and attributes, and to tags that stand twice: a line on stderr."""
+    raise RobotDataError(message)
 
 
 def _zero_pose(model: Any, joints: dict[str, Any], path: str) -> dict[str, Array]:
@@ -131,6 +139,8 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
     inertial = link.inertial
     if inertial is None:
         return 0.0, frame[:3, 3], np.zeros((3, 3))
+    if inertial.mass is None or inertial.inertia is None:
+        raise RobotDataError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:

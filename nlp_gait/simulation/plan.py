@@ -16,8 +16,10 @@ from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS, JOINTS, nao
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
+from nlp_gait.simulation.steps import walk
 
 SIDES = ("left", "right")
+CYCLE = "nao-cycle"
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 
 
@@ -72,19 +74,27 @@ class Plan:
     def mechanical_power_W(self) -> float:
         """Mean of the sum of |torque rate| over the phase."""
         arrays = self.signals.arrays
-        return _mean(np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1))
+        return self._mean(np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1))
 
     @cached_property
     def heat_power_W(self) -> float:
         """Mean of K times the sum of squared torques over the phase."""
-        return self.heat_loss * _mean((self.signals.arrays["tau"] ** 2).sum(axis=1))
+        return self.heat_loss * self._mean((self.signals.arrays["tau"] ** 2).sum(axis=1))
+
+    def _mean(self, samples: Array) -> float:
+        """Time mean by the trapezoidal rule."""
+        return float(trapezoid(samples, self.signals.arrays["t"]) / self.duration_s)
 
 
-def plan_of(result: Result) -> Plan:
+def plan_of(result: Result, steps: int | None = None) -> Plan:
     """Plan of a solved NAO problem.
 
+    Args:
+        result: of a phase or a cycle.
+        steps: how often a cycle is played, every second time mirrored; once by default. A phase cannot be repeated.
+
     Raises:
-        InputError: another problem, or a gait so damaged that its angles are not finite.
+        InputError: another problem, a gait so damaged that its angles are not finite, or several steps of a phase.
     """
     problem = result.problem
     robot = problem.options.get("robot")
@@ -93,14 +103,14 @@ def plan_of(result: Result) -> Plan:
     signals = finely_sampled(result)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
+    welded = nao(robot, rotational_inertia=True)
+    if steps is not None:
+        if problem.name != CYCLE:
+            raise InputError(f"only gaits of {CYCLE!r} can be played for several steps, got one of {problem.name!r}")
+        signals = walk(signals, welded, steps)
     return Plan(
-        robot=nao(robot, rotational_inertia=True),
+        robot=welded,
         full_robot=load_robot(robot),
         signals=signals,
         heat_loss=problem.value("heat_loss_W_per_Nm2"),
     )
-
-
-def _mean(samples: Array) -> float:
-    """Time mean of equidistant samples by the trapezoidal rule."""
-    return float(trapezoid(samples) / (len(samples) - 1))

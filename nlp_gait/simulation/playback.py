@@ -37,6 +37,7 @@ class Trace:
         set_points: (T, J) [rad].
         torso: (T, 3) its origin [m].
         tilt: (T,) angle between the torso's axis and the floor's normal [rad].
+        heading: (T,) angle of the torso's forward axis about that normal, positive to the left [rad].
         feet: (T, 2, 3) soles under the ankles, left and right [m].
         loads: (T, 2) force of the floor on the left and right foot, along its normal [N].
         pressure: (T, 2) centre of pressure of both feet [m]; NaN in flight.
@@ -50,6 +51,7 @@ class Trace:
     set_points: Array
     torso: Array
     tilt: Array
+    heading: Array
     feet: Array
     loads: Array
     pressure: Array
@@ -57,7 +59,7 @@ class Trace:
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """The time histories, for an archive."""
-        names = ("t", "q", "qd", "torque", "set_points", "torso", "tilt", "feet", "loads", "pressure")
+        names = ("t", "q", "qd", "torque", "set_points", "torso", "tilt", "heading", "feet", "loads", "pressure")
         return Signals(joints=joints, arrays={name: getattr(self, name) for name in names})
 
 
@@ -94,9 +96,10 @@ def play(
             observe(model, data)
         q, qd = data.qpos[at.angles], data.qvel[at.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
-        torso, upright = data.xpos[at.torso].copy(), float(data.xmat[at.torso, 8])
+        torso, axes = data.xpos[at.torso].copy(), data.xmat[at.torso]
+        upright, heading = float(axes[8]), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
-        rows.append((q, qd, torque, torso, upright, feet, *_pressure(data, at)))
+        rows.append((q, qd, torque, torso, upright, heading, feet, *_pressure(data, at)))
         diverged = not np.isfinite(data.qvel).all()  # no such row is kept
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
@@ -111,9 +114,10 @@ def play(
         torque=columns[2],
         torso=columns[3],
         tilt=np.arccos(np.clip(columns[4], -1.0, 1.0)),
-        feet=columns[5],
-        loads=columns[6],
-        pressure=columns[7],
+        heading=columns[5],
+        feet=columns[6],
+        loads=columns[7],
+        pressure=columns[8],
         fell_at_s=fell_at_s,
     )
 

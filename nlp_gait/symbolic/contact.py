@@ -39,32 +39,24 @@ class Contact(NamedTuple):
     tangent: SX
 
 
-class Response(NamedTuple):
-    """What happens within one quantum of time.
+class Equations(NamedTuple):
+    """mass @ acceleration = force, (n, n) and (n,); the symmetric part of the mass is positive definite."""
 
-    Attributes:
-        acceleration: (n,).
-        normal_forces: one for each contact [N].
-        tangent_forces: one for each contact [N].
-    """
-
-    acceleration: SX
-    normal_forces: SX
-    tangent_forces: SX
+    mass: SX
+    force: SX
 
 
-def implicit_response(
-    mass: SX, force: SX, velocity: SX, contacts: Sequence[Contact], ground: Ground, quantum: SX | float
-) -> Response:
-    """Acceleration over one quantum of time dt, with the contact forces at its end.
+def implicit_equations(
+    motion: Equations, velocity: SX, contacts: Sequence[Contact], ground: Ground, quantum: SX | float
+) -> Equations:
+    """Equations of the acceleration over one quantum of time dt, with the contact forces at its end.
 
     Spring, damper and friction act at the position and velocity that the acceleration leads to, so none of them can
     overshoot. A first pass without friction finds which contacts press, a second one adds friction and lets go of those
     that would pull.
 
     Args:
-        mass: (n, n): the inertia, with what other implicit forces add to it; its symmetric part is positive definite.
-        force: (n,) all forces but those of the contacts.
+        motion: without contacts; to the inertia is added what other implicit forces add.
         velocity: (n,) now.
         contacts: points that may touch.
         ground: below them.
@@ -74,6 +66,7 @@ def implicit_response(
         Bhardwaj et al., eqs. (33)-(35), (44)-(46), taken at the end of the quantum; the printed explicit scheme is stable
         only for k dt / 2 < c < 2 m / dt.
     """
+    mass, force = motion
     k, c, mu = ground
     stiff = k * quantum**2 / 2 + c * quantum  # force that one unit of normal acceleration takes away
     rates = [ca.dot(contact.normal, velocity) for contact in contacts]
@@ -83,7 +76,8 @@ def implicit_response(
     free = [k * depth - c * rate for depth, rate in zip(depths, rates, strict=True)]  # (eq. 33)
     touching = [(1 - ca.tanh(height / FADE_HEIGHT)) / 2 for height in ahead]
 
-    solved = _solve_with(mass, force, contacts, touching, free, stiff, [contact.tangent for contact in contacts])
+    pressing, pressed_by = _with_normal_forces(motion, contacts, touching, free, stiff)
+    solved = solve_definite(pressing, ca.horzcat(pressed_by, *(contact.tangent for contact in contacts)))
     first, yields = solved[:, 0], ca.horzsplit(solved[:, 1:])
     shares, grips = [], []
     for contact, touch, push, slip, give in zip(contacts, touching, free, slips, yields, strict=True):
@@ -98,28 +92,18 @@ def implicit_response(
     for contact, grip, slip in zip(contacts, grips, slips, strict=True):
         mass = mass + grip * quantum * contact.tangent @ contact.tangent.T
         force = force - grip * slip * contact.tangent
-    acceleration = _solve_with(mass, force, contacts, shares, free, stiff, [])
-    normal, tangent = [], []
-    for contact, share, push, grip, slip in zip(contacts, shares, free, grips, slips, strict=True):
-        normal.append(share * (push - stiff * ca.dot(contact.normal, acceleration)))
-        tangent.append(-grip * (slip + quantum * ca.dot(contact.tangent, acceleration)))
-    return Response(acceleration, ca.vertcat(*normal), ca.vertcat(*tangent))
+    return _with_normal_forces(Equations(mass, force), contacts, shares, free, stiff)
 
 
-def _solve_with(
-    mass: SX,
-    force: SX,
-    contacts: Sequence[Contact],
-    shares: Sequence[SX],
-    free: Sequence[SX],
-    stiff: SX,
-    more: Sequence[SX],
-) -> SX:
-    """Acceleration under the given shares of the contacts' normal forces (eq. 35), beside it those under unit forces."""
+def _with_normal_forces(
+    motion: Equations, contacts: Sequence[Contact], shares: Sequence[SX], free: Sequence[SX], stiff: SX
+) -> Equations:
+    """Equations with the given shares of the contacts' normal forces (eq. 35)."""
+    mass, force = motion
     for contact, share, push in zip(contacts, shares, free, strict=True):
         mass = mass + share * stiff * contact.normal @ contact.normal.T
         force = force + share * push * contact.normal
-    return solve_definite(mass, ca.horzcat(force, *more))
+    return Equations(mass, force)
 
 
 def solve_definite(A: SX, B: SX) -> SX:

@@ -34,11 +34,17 @@ def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsO
     Source:
         Bhardwaj et al., eqs. (40)-(42); with C as a matrix, so that the product C qd is the vector of eq. (42).
     """
-    M = ca.hessian(kinetic, qd)[0]
-    slopes = [ca.jacobian(M[:, k], q) for k in range(q.shape[0])]  # slopes[k][i, j] = dM_ik / dq_j
+    # Equal entries of M are one expression, so that what cancels in C cancels symbolically.
+    M = ca.triu2symm(ca.cse(ca.triu(ca.hessian(kinetic, qd)[0])))
     n = range(q.shape[0])
+    slopes = {(i, j): ca.jacobian(M[i, j], q) for i in n for j in n if i <= j}
+
+    def slope(i: int, j: int, k: int) -> SX:
+        """Derivative of M_ij by q_k."""
+        return slopes[min(i, j), max(i, j)][k]
+
     C = SX(q.shape[0], q.shape[0])
     for i in n:
         for j in n:
-            C[i, j] = sum(0.5 * (slopes[j][i, k] + slopes[k][i, j] - slopes[k][j, i]) * qd[k] for k in n)
-    return EquationsOfMotion(M, C, ca.gradient(potential, q))
+            C[i, j] = sum(0.5 * (slope(i, k, j) + slope(i, j, k) - slope(j, k, i)) * qd[k] for k in n)
+    return EquationsOfMotion(M, ca.sparsify(C), ca.gradient(potential, q))

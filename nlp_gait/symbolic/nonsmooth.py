@@ -45,6 +45,9 @@ class Nonsmooth(Protocol):
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Elementwise: ``below`` where switch < 0, else ``above``."""
 
+    def tie(self, v: MX) -> MX:
+        """The vector v (m, 1), a variable of its own where that spares a solver to differentiate through it."""
+
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """States (n, N) after each of N steps.
 
@@ -85,6 +88,10 @@ class Exact:
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """A true jump, written without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
+
+    def tie(self, v: MX) -> MX:
+        """The same v."""
+        return v
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """One step after the other, in a loop at run time."""
@@ -154,6 +161,12 @@ class Lifted:
         self.smoothed = True
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
+
+    def tie(self, v: MX) -> MX:
+        """A variable that an equation ties to v."""
+        tied = MX.sym(f"tied_{len(self.lifts)}", v.shape[0])
+        self.lifts.append(Lift(variable=tied, value=v, rows=tied - v, tight=True))
+        return tied
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """Multiple shooting: all states are variables, tied by one equation for each step."""

@@ -6,10 +6,11 @@ the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from nlp_gait.symbolic.lagrange import EquationsOfMotion, equations_of_motion
@@ -30,6 +31,8 @@ ENDS = {
 }
 # Links in the order in which they are reached from the stance ankle, and whether they are passed from their far end.
 _PATH = (("K'A'", -1), ("HK'", -1), ("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1), ("A'S'", 1), ("S'T'", 1))
+
+V = TypeVar("V", SX, np.ndarray)
 
 
 class Rod(NamedTuple):
@@ -54,11 +57,23 @@ def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, ankle: SX) -> dict[str
         q: nine angles in the order of LINKS [rad].
         ankle: (2,) position of the stance ankle A' [m].
     """
-    found = {"A'": ankle}
+    return _walked(ankle, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
+
+
+def _walked(base: V, along: Callable[[str], V]) -> dict[str, V]:
+    """Sums of what lies along the links on the way from the stance ankle to every point, by the point's name."""
+    found = {"A'": base}
     for link, sense in _PATH:
         near, far = ENDS[link][::sense]
-        found[far] = found[near] + sense * rods[link].length * direction(link, q[LINKS.index(link)])
+        found[far] = found[near] + sense * along(link)
     return found
+
+
+def _couplings(rods: Mapping[str, Rod]) -> np.ndarray:
+    """(9, 9) masses times arms [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, u the directions."""
+    arms = _walked(np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)])
+    middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
+    return middles.T @ np.diag([rods[link].mass for link in LINKS]) @ middles
 
 
 def centres(found: Mapping[str, SX]) -> dict[str, SX]:
@@ -80,10 +95,13 @@ def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angle
         Bhardwaj et al., eqs. (36)-(42).
     """
     spins = ca.jtimes(angles, q, qd)
+    velocities = [ca.jtimes(direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
     middles = centres(points(rods, angles, SX(2, 1)))
-    kinetic, potential = SX(0), SX(0)
+    kinetic, potential, couplings = SX(0), SX(0), _couplings(rods)
     for i, link in enumerate(LINKS):
-        rod, velocity = rods[link], ca.jtimes(middles[link], q, qd)
-        kinetic += 0.5 * rod.mass * ca.sumsqr(velocity) + 0.5 * rod.inertia * spins[i] ** 2  # (eqs. 36, 37)
-        potential += rod.mass * gravity * middles[link][1]  # (eq. 38)
+        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])  # (eqs. 36, 37)
+        for j in range(i):
+            if couplings[i, j] != 0.0:
+                kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])
+        potential += rods[link].mass * gravity * middles[link][1]  # (eq. 38)
     return equations_of_motion(kinetic, potential, q, qd)

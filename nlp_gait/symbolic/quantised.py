@@ -8,8 +8,13 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.symbolic.contact import Contact, Ground, implicit_response, solve_definite
+from nlp_gait.symbolic.contact import Contact, Equations, Ground, implicit_equations
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
+
+
+# A link that turns by a radian within a quantum is not resolved by it: there this power of its turn brakes it as much as its
+# own inertia. At the rates of a gait, a tenth of that, the brake is 1e-8 of the inertia.
+BRAKE_POWER = 8
 
 
 class Controller(NamedTuple):
@@ -45,7 +50,7 @@ def controller_torque(control: Controller, desired: State, state: State, gravity
     return errors + control.gravity_share * gravity
 
 
-def implicit_acceleration(
+def implicit_quantum(
     motion: EquationsOfMotion,
     state: State,
     control: Controller,
@@ -54,11 +59,12 @@ def implicit_acceleration(
     ground: Ground,
     disturbance: SX,
     quantum: float,
-) -> SX:
-    """(n,) acceleration when all velocity-dependent forces act at the end of the quantum: finite at every gain.
+) -> Equations:
+    """Equations of the acceleration when all velocity-dependent forces act at the end of the quantum: finite at every gain.
 
     The Coriolis matrix multiplies the rates at the end too: as dM/dt - 2 C is skew, a free motion then loses kinetic energy to
-    first order in the quantum, and never gains any.
+    first order in the quantum. That holds while links turn by less than a radian in a quantum. A robot that collapses without
+    damping whips its toes round ten times faster, which no step of this length follows: such links are braked.
 
     Args:
         motion: equations of motion at the state.
@@ -76,12 +82,12 @@ def implicit_acceleration(
     coasting = after(state, SX(state.q.shape[0], 1), quantum)
     stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
     force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
-    return implicit_response(
-        motion.M + quantum * motion.C + ca.diag(stiffness), force, state.v, contacts, ground, quantum
-    ).acceleration
+    brake = ca.diag(motion.M) * (quantum * state.v) ** BRAKE_POWER
+    mass = motion.M + quantum * motion.C + ca.diag(stiffness + brake)
+    return implicit_equations(Equations(mass, force - brake * state.v / quantum), state.v, contacts, ground, quantum)
 
 
-def explicit_acceleration(
+def explicit_quantum(
     motion: EquationsOfMotion,
     state: State,
     control: Controller,
@@ -89,8 +95,8 @@ def explicit_acceleration(
     contacts: Sequence[Contact],
     ground: Ground,
     disturbance: SX,
-) -> SX:
-    """(n,) acceleration of the printed scheme: controller and contacts act on the state at the start of the quantum.
+) -> Equations:
+    """Equations of the acceleration of the printed scheme: controller and contacts act on the state at the start of the quantum.
 
     It is stable only for K_d below twice the least inertia over dt: 0.018 N m s/rad at the toe and dt = 0.01 s.
 
@@ -102,4 +108,4 @@ def explicit_acceleration(
         rate, slip = ca.dot(contact.normal, state.v), ca.dot(contact.tangent, state.v)
         pressed = (contact.height <= 0) * (-ground.stiffness * contact.height - ground.damping * rate)  # (eq. 33)
         force += pressed * (contact.normal - ground.friction * ca.sign(slip) * contact.tangent)  # (eqs. 34, 35)
-    return solve_definite(motion.M, force)
+    return Equations(motion.M, force)

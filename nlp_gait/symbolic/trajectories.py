@@ -41,7 +41,7 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
     )
 
 
-def parabola_lift(along: Motion, start: float, end: float, height: SX) -> Motion:
+def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX) -> Motion:
     """Height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
 
     Args:
@@ -72,6 +72,11 @@ def through(function: Callable[[SX], SX], argument: Motion) -> Motion:
     slope = ca.jtimes(value, q, argument.velocity)
     bend = ca.jtimes(slope, q, argument.velocity) + ca.jtimes(value, q, argument.acceleration)
     return Motion(*ca.substitute([value, slope, bend], [q], [argument.position]))
+
+
+def plus(first: Motion, second: Motion) -> Motion:
+    """Sum of two motions of one shape and unit."""
+    return Motion(*(a + b for a, b in zip(first, second, strict=True)))
 
 
 def constant(value: float) -> Motion:

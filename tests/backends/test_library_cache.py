@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import stat
 import subprocess
@@ -26,7 +27,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     private = tmp_path / "private"
     private.mkdir()
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "_private_folder", lambda: private)
+    monkeypatch.setattr(library_cache, "_private_folder", functools.cache(lambda: private))
     library_cache._warn_once.cache_clear()
     return folder
 

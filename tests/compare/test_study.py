@@ -98,7 +98,7 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     path.parent.mkdir(parents=True)
     good = record_file(undisturbed, task).read_text()
     for text, message in (
-        (good[: len(good) // 2], "cannot be read as JSON"),
+        (good[: len(good) // 2], "is not valid JSON"),
         ("[]", "'schema' must be 2, got 'list'"),
         (good.replace('"schema": 2', '"schema": 1'), "'schema' must be 2, got 1"),
         (good.replace('"evaluations": 500', '"evaluations": "many"'), None),
@@ -254,7 +254,7 @@ def test_study_file(tmp_path: Path) -> None:
         (("target = 0.9", "target = nan"), "finite numbers"),
         (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
         (('algorithm = "ipopt"', 'label = "x"'), "needs 'algorithm'"),
-        (("runs = 3", "runs = "), "cannot be read"),
+        (("runs = 3", "runs = "), "is not valid TOML"),
         (('name = "nao-ssp"', "name = 3"), "name must be a str, got 3"),
         (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
         (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be a table"),

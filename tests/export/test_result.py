@@ -55,7 +55,7 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
         ({"problem": "nao-dsp", "x": {k: v for k, v in X.items() if k != "hip_height_m"}}, "'x' lacks hip_height_m"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": "tall"}}, "hip_height_m must be a number, got 'tall'"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": None}}, "hip_height_m must be a number, got None"),
-        ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m must be finite"),
+        ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m' must be finite, got nan"),
         ({"problem": "nao-dsp", "x": X, "options": {"robot": 5}}, "option robot must be a str, got 5"),
         ({"problem": "nao-dsp", "x": X, "options": {"intervals": True}}, "option intervals must be a int, got True"),
         ({"problem": "nao-dsp", "x": X, "options": {"robots": "nao-v5"}}, "unknown option of nao-dsp 'robots'"),

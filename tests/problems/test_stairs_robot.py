@@ -43,5 +43,5 @@ def test_a_link_that_does_not_exist(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(RobotDataError, match="cannot be used"):
+    with pytest.raises(RobotDataError, match="cannot be read"):
         load_biped(str(tmp_path / "missing.json"))

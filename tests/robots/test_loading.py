@@ -65,7 +65,7 @@ DAMAGES = [
     (set_in("links", "left", "mass_kg", to=-1.0), r"link 'left': mass_kg must be > 0, got -1\.0"),
     (set_in("links", "left", "mass_kg", to="1"), r"link 'left': 'mass_kg' must be a finite number, got '1'"),
     (set_in("links", "left", "mass_kg", to=True), r"'mass_kg' must be a finite number, got True"),
-    (set_in("links", "left", "mass_kg", to=float("nan")), r"'mass_kg' must be a finite number, got nan"),
+    (set_in("links", "left", "mass_kg", to=float("nan")), r"'links\.left\.mass_kg' must be finite, got nan"),
     (set_in("links", "left", "com_m", to=[0.0, 0.0]), r"'com_m' must be a list of 3 numbers, got \[0\.0, 0\.0\]"),
     (
         set_in("links", "left", "inertia_com_kgm2", to=[3e-3, 1e-3, 1e-3, 0, 0, 0]),

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.symbolic.contact import CREEP_SPEED, YIELD_DEPTH, Contact, Ground, implicit_response, solve_definite
+from nlp_gait.symbolic.contact import (
+    CREEP_SPEED,
+    YIELD_DEPTH,
+    Contact,
+    Equations,
+    Ground,
+    implicit_equations,
+    solve_definite,
+)
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6
@@ -19,7 +27,8 @@ def flight(mass: float, height: float, speed: float, steps: int) -> np.ndarray:
     position, velocity = state[:2], state[2:]
     contact = Contact(position[1], SX([0, 1]), SX([1, 0]))
     ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
-    a = implicit_response(mass * SX.eye(2), SX([0, -mass * GRAVITY]), velocity, [contact], ground, QUANTUM).acceleration
+    motion = Equations(mass * SX.eye(2), SX([0, -mass * GRAVITY]))
+    a = solve_definite(*implicit_equations(motion, velocity, [contact], ground, QUANTUM))
     after = ca.vertcat(position + velocity * QUANTUM + a * QUANTUM**2 / 2, velocity + a * QUANTUM)
     step = ca.Function("step", [state], [after]).mapaccum(steps)
     return np.array(step([0.0, height, speed, 0.0]))

@@ -1,0 +1,1 @@
+"""Questions past the papers, which one differentiable model can answer."""

@@ -1,0 +1,63 @@
+"""Ends an NLP solver between two of its iterations: at the time limit, or when somebody asks for it."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+
+import casadi as ca
+from casadi import MX
+
+from nlp_gait.backends.interrupts import never
+
+INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
+
+
+class IterationWatch(ca.Callback):
+    """CasADi's ``iteration_callback``; it changes nothing in the iterations, and must be kept as long as its solver."""
+
+    def __init__(self, nlp: Mapping[str, MX]) -> None:
+        """Take the NLP's size: CasADi's dictionary of x, p, f, g."""
+        ca.Callback.__init__(self)
+        n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))
+        self._sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": k}
+        self._of_thread = threading.local()
+        self.construct("watch", {})
+
+    def begin(self, stop: Callable[[], bool], deadline: float) -> None:
+        """Watch the next run of this thread.
+
+        Args:
+            stop: whether somebody wants it to end.
+            deadline: of ``time.perf_counter`` [s].
+        """
+        self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
+
+    @property
+    def reason(self) -> str:
+        """Why the run of this thread was ended from here, in IPOPT's manner; empty if it was not."""
+        return getattr(self._of_thread, "reason", "")
+
+    def get_n_in(self) -> int:
+        """As CasADi asks."""
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        """As CasADi asks."""
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        """As CasADi asks."""
+        return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(i)], 1)
+
+    def eval(self, iterate: object) -> list[int]:
+        """One to end, zero to go on."""
+        stop = getattr(self._of_thread, "stop", never)
+        deadline = getattr(self._of_thread, "deadline", math.inf)
+        if stop():
+            self._of_thread.reason = INTERRUPTED
+        elif time.perf_counter() >= deadline:
+            self._of_thread.reason = TIME_IS_UP
+        return [int(bool(self.reason))]

@@ -1,0 +1,202 @@
+"""Files of data: read strictly, written whole or not at all.
+
+Reading takes regular files of valid UTF-8 only, and JSON with no key twice, no number beyond 64 bits or not finite, and no text
+that cannot be written again. Writing goes to a new file beside the old one, which takes its name in one step: a link of that
+name is replaced, never followed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import secrets
+import stat
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from nlp_gait.errors import GaitError, InputError, OutputError
+
+LARGEST_FILE = 64 * 2**20  # bytes; a study's record has some 10 kB, a result with thousands of variables some MB
+DEEPEST = 32  # levels of objects and lists; the package's own files have six
+LARGEST_INTEGER = 2**63 - 1
+SHOWN = 60  # characters of a value in a message
+BYTE_ORDER_MARK = "\ufeff"
+
+
+def read_bytes(
+    path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
+) -> bytes:
+    """Content of a regular file.
+
+    Args:
+        path: of the file; a link to a regular file is followed.
+        what: kind of file, for messages.
+        error: class to raise.
+        at_most: bytes.
+        remedy: what to do about it, appended to the message.
+
+    Raises:
+        GaitError: of that class: it cannot be read, is no regular file, or too long.
+    """
+    with _refusing(path, what, "cannot be read", error, remedy):
+        # Opening a pipe would wait for its writer.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+        with open(descriptor, "rb") as file:
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
+                raise ValueError("it is a folder" if stat.S_ISDIR(status.st_mode) else "it is no regular file")
+            content = file.read(at_most + 1)
+        if len(content) > at_most:
+            raise ValueError(f"it has more than {at_most} bytes")
+    return content
+
+
+def read_text(
+    path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
+) -> str:
+    """Content of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
+    content = read_bytes(path, what, error=error, at_most=at_most, remedy=remedy)
+    with _refusing(path, what, "cannot be read", error, remedy):
+        text = content.decode("utf-8")
+        if text.startswith(BYTE_ORDER_MARK):
+            raise ValueError("it begins with a byte-order mark; save it as UTF-8 without one")
+    return text
+
+
+def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:
+    """Content of a JSON file, see ``check_plain``; a key that stands twice in an object is refused too.
+
+    Args:
+        path: of the file.
+        what: kind of file, for messages.
+        error: class to raise.
+        remedy: what to do about it, appended to the message.
+
+    Raises:
+        GaitError: of that class.
+    """
+    text = read_text(path, what, error=error, remedy=remedy)
+    with _refusing(path, what, "is not valid JSON", error, remedy):
+        data = json.loads(text, object_pairs_hook=_without_twins)
+        check_plain(data)
+    return data
+
+
+def check_plain(data: Any) -> None:
+    """Refuse what is not plain data: texts, finite numbers, truth values, null, lists, objects.
+
+    Raises:
+        ValueError: with the place of what is not allowed.
+    """
+    waiting: list[tuple[str, Any, int]] = [("", data, 1)]
+    while waiting:
+        where, value, level = waiting.pop()
+        if level > DEEPEST:
+            raise ValueError(f"it nests deeper than {DEEPEST} levels")
+        if isinstance(value, Mapping):
+            for key, inner in value.items():
+                _check_leaf(f"a key of {where}" if where else "a key", key)
+                waiting.append((f"{where}.{key}" if where else str(key), inner, level + 1))
+        elif isinstance(value, (list, tuple)):
+            waiting += [(f"{where}[{i}]", inner, level + 1) for i, inner in enumerate(value)]
+        else:
+            _check_leaf(where or "the value", value)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in one step.
+
+    Raises:
+        OutputError: no room, no permission, no folder.
+    """
+    with new_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON in one step; NaN and infinity are refused, for not every reader takes them: see ``without_nan``.
+
+    Raises:
+        OutputError: no room, no permission, no folder.
+    """
+    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Empty file beside ``path``, made by this process under a hidden name in ``.tmp``, that takes its name at the end.
+
+    Raises:
+        OutputError: no room, no permission, no folder.
+    """
+    temporary = None
+    try:
+        if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
+            raise OSError("it is a folder" if path.is_dir() else "it is no regular file")
+        unused = path.parent / f".{secrets.token_hex(8)}.tmp"
+        # With O_EXCL it cannot be a file or a link that somebody has put there.
+        os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        temporary = unused
+        yield temporary
+        temporary.replace(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"cannot write {str(path)!r}: {reason}") from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def without_nan(data: Any) -> Any:
+    """The same plain data with null for every number that is not finite."""
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if isinstance(data, Mapping):
+        return {key: without_nan(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [without_nan(value) for value in data]
+    return data
+
+
+@contextmanager
+def _refusing(path: Path, what: str, wrong: str, error: type[GaitError], remedy: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError, RecursionError) as reason:
+        said = getattr(reason, "strerror", None) or _shortened(str(reason))
+        raise error(f"{what} {str(path)!r} {wrong}: {said}{remedy and f'; {remedy}'}") from reason
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        keys = [key for key, _ in pairs]
+        twin = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twin[:SHOWN]!r} stands there twice")
+    return found
+
+
+def _check_leaf(where: str, value: Any) -> None:
+    place = _shortened(where)
+    if isinstance(value, str):
+        if not value.isascii() and not value.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in value):
+            raise ValueError(f"{place!r} holds half a character, got {_shortened(value)!r}")
+    elif isinstance(value, bool) or value is None:
+        return
+    elif isinstance(value, int):
+        if abs(value) > LARGEST_INTEGER:
+            raise ValueError(f"{place!r} must be within 64 bits, got a whole number of {value.bit_length()} bits")
+    elif not isinstance(value, float):
+        raise ValueError(f"{place!r} must be a text, a number, a list or a table, got {type(value).__name__}")
+    elif not math.isfinite(value):
+        raise ValueError(f"{place!r} must be finite, got {value}")
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
+

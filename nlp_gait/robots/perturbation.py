@@ -1,0 +1,147 @@
+"""A robot with other masses, leg lengths or soles: for sensitivities, worst cases, and what-if questions.
+
+As text behind a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it goes wherever a robot's name goes:
+
+    mass            factor on the masses and inertias of all links
+    LINK.mass       the same for one link, for example ``LThigh.mass``
+    thigh_m         added to both thighs; mass, centre of mass and inertia of the link stay
+    tibia_m         likewise
+    sole_x_m        both soles shifted forwards under their ankles
+    sole_y_m        likewise to the left
+    sole_front_m    added to both soles' extent forwards; likewise ``sole_back_m``, ``sole_left_m``, ``sole_right_m``
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from nlp_gait.errors import InputError, UnknownNameError, unknown
+from nlp_gait.robots.robot import Foot, Link, Robot
+
+MARK = "@"
+MASS = "mass"
+SIDES = "LR"
+# What is added to each extent of a sole, for each unit of a quantity.
+SOLES: Mapping[str, Mapping[str, int]] = {
+    "sole_x_m": {"front_m": 1, "back_m": -1},
+    "sole_y_m": {"left_m": 1, "right_m": -1},
+    **{f"sole_{extent}": {extent: 1} for extent in ("front_m", "back_m", "left_m", "right_m")},
+}
+# The joint at the lower end of a part of the leg.
+LENGTHS = {"thigh_m": "KneePitch", "tibia_m": "AnklePitch"}
+
+
+def perturbed(robot: Robot, changes: Mapping[str, float]) -> Robot:
+    """The same robot with some quantities changed, in the order given.
+
+    Args:
+        robot: to begin with.
+        changes: by name; factors of masses, and lengths that are added [m].
+
+    Raises:
+        UnknownNameError: no such quantity, link or joint.
+        RobotDataError: no robot can have the result.
+        InputError: a value that is not a finite number.
+    """
+    for name, value in changes.items():
+        if not math.isfinite(value):
+            raise InputError(f"robot {robot.name!r}: {name} must be a finite number, got {value}")
+        robot = _change(name, robot)(robot, value)
+    return replace(robot, name=perturbed_name(robot.name, changes)) if changes else robot
+
+
+def perturbed_name(name: str, changes: Mapping[str, float]) -> str:
+    """A robot's name with its changes as text, to the last digit."""
+    return f"{name}{MARK}{','.join(f'{key}={value!r}' for key, value in changes.items())}" if changes else name
+
+
+def split_name(text: str) -> tuple[str, dict[str, float]]:
+    """A robot's name, and its changes if the text has some.
+
+    Raises:
+        InputError: what stands behind the mark is no list of changes.
+    """
+    name, mark, listed = text.rpartition(MARK)
+    if not mark or listed.endswith((".json", ".urdf")):  # a mark may be part of a file's path
+        return text, {}
+    changes: dict[str, float] = {}
+    for item in listed.split(","):
+        key, equals, value = item.partition("=")
+        try:
+            changes[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"robot {text!r}: behind {MARK} it takes NAME=NUMBER, separated by commas, got {item!r}; for example "
+                f"nao-v5{MARK}mass=1.05,thigh_m=0.001"
+            ) from None
+    return name, changes
+
+
+def quantities(robot: Robot) -> tuple[str, ...]:
+    """Names of everything that can be changed in a robot."""
+    return (MASS, *(f"{link}.{MASS}" for link in robot.links), *LENGTHS, *SOLES)
+
+
+def _change(name: str, robot: Robot) -> Callable[[Robot, float], Robot]:
+    if name == MASS:
+        return lambda robot, factor: _with_masses(robot, dict.fromkeys(robot.links, factor))
+    if name in LENGTHS:
+        return lambda robot, metres: _with_length(robot, LENGTHS[name], metres)
+    if name in SOLES:
+        return lambda robot, metres: _with_soles(robot, SOLES[name], metres)
+    link, dot, quantity = name.rpartition(".")
+    if dot and quantity == MASS and link in robot.links:
+        return lambda robot, factor: _with_masses(robot, {link: factor})
+    raise unknown(f"quantity of robot {robot.name}", name, quantities(robot))
+
+
+def _with_masses(robot: Robot, factors: Mapping[str, float]) -> Robot:
+    links = {name: _heavier(link, factors.get(name, 1.0)) for name, link in robot.links.items()}
+    return replace(robot, links=links)
+
+
+def _heavier(link: Link, factor: float) -> Link:
+    ixx, iyy, izz, ixy, ixz, iyz = (factor * value for value in link.inertia_com_kgm2)
+    return replace(link, mass_kg=factor * link.mass_kg, inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
+
+
+def _with_length(robot: Robot, joint: str, metres: float) -> Robot:
+    """Both legs longer above a joint, which moves away from the one before it."""
+    joints = dict(robot.joints)
+    for side in SIDES:
+        name = f"{side}{joint}"
+        if name not in joints:
+            raise UnknownNameError(f"robot {robot.name!r} has no joint {name!r}, so its legs have no length to change")
+        origin = joints[name].origin_m
+        length = math.hypot(*origin)
+        if not length + metres > 0.0:
+            raise InputError(
+                f"robot {robot.name!r}: joint {name!r} is {length:g} m below the one before it; adding {metres:g} m "
+                "leaves nothing"
+            )
+        x, y, z = (value * (1.0 + metres / length) for value in origin)
+        joints[name] = replace(joints[name], origin_m=(x, y, z))
+    return replace(robot, joints=joints)
+
+
+def _with_soles(robot: Robot, shares: Mapping[str, int], metres: float) -> Robot:
+    return replace(robot, feet={side: _with_sole(foot, shares, metres) for side, foot in robot.feet.items()})
+
+
+def _with_sole(foot: Foot, shares: Mapping[str, int], metres: float) -> Foot:
+    """Extents changed; the true outline is shifted, or stretched on the side whose extent grows."""
+    extents = {name: getattr(foot, name) + share * metres for name, share in shares.items()}
+    outline = tuple(
+        (_along(x, "front_m", "back_m", shares, foot, metres), _along(y, "left_m", "right_m", shares, foot, metres))
+        for x, y in foot.sole_polygon_m
+    )
+    return replace(foot, **extents, sole_polygon_m=outline)
+
+
+def _along(value: float, positive: str, negative: str, shares: Mapping[str, int], foot: Foot, metres: float) -> float:
+    if positive in shares and negative in shares:
+        return value + shares[positive] * metres
+    extent = positive if value > 0.0 else negative
+    return value * (1.0 + shares.get(extent, 0) * metres / getattr(foot, extent))

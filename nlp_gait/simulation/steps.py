@@ -1,0 +1,71 @@
+"""A walk of several steps from one cycle: every second step is the mirror image of the one before, a step further."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.robots import Robot
+from nlp_gait.robots.mirror import mirror_sign, partner
+
+JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
+SIDES_SWAPPED = {"left_foot": "right_foot", "right_foot": "left_foot"}
+
+
+def walk(cycle: Signals, robot: Robot, steps: int) -> Signals:
+    """Time histories of so many steps.
+
+    Args:
+        cycle: of one step that begins on the left foot and ends in the mirror image of its beginning.
+        robot: whose joints are mirrored.
+        steps: at least 1.
+
+    Raises:
+        InputError: no step.
+    """
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
+    image = mirror_image(cycle, robot)
+    advance, period = step_of(cycle), float(cycle.arrays["t"][-1])
+    parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
+    return Signals(
+        joints=cycle.joints,
+        arrays={
+            name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]
+        },
+    )
+
+
+def step_of(cycle: Signals) -> float:
+    """How far a cycle moves the hip forward [m]."""
+    hip = cycle.arrays["hip"]
+    return float(hip[-1, 0] - hip[0, 0])
+
+
+def mirror_image(signals: Signals, robot: Robot) -> Signals:
+    """Time histories with left and right exchanged. Torques are those of a robot that is itself symmetric."""
+    columns = [signals.joints.index(partner(name)) for name in signals.joints]
+    signs = np.array([mirror_sign(robot, name) for name in signals.joints])
+    arrays: dict[str, Array] = {}
+    for name, array in signals.arrays.items():
+        if name in JOINT_ARRAYS:
+            arrays[name] = signs * array[:, columns]
+        elif name == "t":
+            arrays[name] = array
+        else:
+            arrays[SIDES_SWAPPED.get(name, name)] = array * np.array([1.0, -1.0, 1.0])[: array.shape[1]]
+    return Signals(joints=signals.joints, arrays=arrays)
+
+
+def _moved(signals: Signals, distance: float, delay: float) -> dict[str, Array]:
+    """Arrays with all positions moved forward [m] and all times delayed [s]."""
+    arrays = {}
+    for name, array in signals.arrays.items():
+        shift = np.zeros(array.shape[1:])
+        if name == "t":
+            shift = np.float64(delay)
+        elif name not in JOINT_ARRAYS:
+            shift[0] = distance
+        arrays[name] = array + shift
+    return arrays

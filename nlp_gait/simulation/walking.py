@@ -1,0 +1,73 @@
+"""What a walk of several steps showed in the engine: how far it came, and how straight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import Measurements, measure
+from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.playback import Trace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walk:
+    """A walk in numbers; distances are those of the point halfway between the feet, from start to rest.
+
+    Attributes:
+        steps: planned.
+        steps_done: whole steps before a fall; all of them if it fell later or not at all.
+        planned_m: distance.
+        walked_m: distance forward; None after a fall.
+        drift_m: distance to the left; None after a fall.
+        heading_deg: direction of the torso at the end, positive to the left; None after a fall.
+        energy_J_per_m: of the servos, mechanical and heat, for each metre walked; None after a fall or without progress.
+        measurements: as of any playback.
+    """
+
+    steps: int
+    steps_done: int
+    planned_m: float
+    walked_m: float | None
+    drift_m: float | None
+    heading_deg: float | None
+    energy_J_per_m: float | None
+    measurements: Measurements
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries, lists and numbers."""
+        return asdict(self)
+
+
+def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
+    """Numbers of one simulation of so many steps."""
+    measurements = measure(plan, trace, drive)
+    feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
+    planned = float(feet[-1, 0] - feet[0, 0]) / 2
+    if trace.fell_at_s is not None:
+        done = min(steps, math.floor(steps * trace.fell_at_s / plan.duration_s))
+        return Walk(
+            steps=steps,
+            steps_done=done,
+            planned_m=planned,
+            walked_m=None,
+            drift_m=None,
+            heading_deg=None,
+            energy_J_per_m=None,
+            measurements=measurements,
+        )
+    middle = trace.feet.mean(axis=1)
+    walked, drift = (float(value) for value in (middle[-1] - middle[0])[:2])
+    energy = measurements.measured.total_W * plan.duration_s
+    return Walk(
+        steps=steps,
+        steps_done=steps,
+        planned_m=planned,
+        walked_m=walked,
+        drift_m=drift,
+        heading_deg=math.degrees(float(trace.heading[-1])),
+        energy_J_per_m=energy / walked if walked > 0.0 else None,
+        measurements=measurements,
+    )

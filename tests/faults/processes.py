@@ -1,0 +1,48 @@
+"""Processes and programs that the tests of faults share."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """The command line in a process group of its own, as a terminal would start it."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "nlp_gait", *arguments],
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def in_own_mounts(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A shell script that may mount file systems nobody else sees; the test is skipped where that is not allowed."""
+    unshare = shutil.which("unshare")
+    if unshare is None or subprocess.run([unshare, "-rm", "true"], capture_output=True).returncode != 0:
+        pytest.skip("mounting needs user namespaces")
+    return subprocess.run(
+        [unshare, "-rm", "sh", "-euc", script, "sh", sys.executable, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def fake_compiler(folder: Path, body: str) -> str:
+    """A compiler that is a shell script: it answers ``--version``, and then does what the body says."""
+    path = folder / "compiler.sh"
+    path.write_text(f'#!/bin/sh\nif [ "$1" = --version ]; then echo "fake 1"; exit 0; fi\n{body}\n', encoding="ascii")
+    path.chmod(0o700)
+    return str(path)

@@ -1,0 +1,214 @@
+"""Ctrl-C in every long command: one sentence, exit status 130, and what was found until then is kept and named."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import nlp_gait
+from compare.record import read_record
+from compare.reproductions.resume import Steps
+from nlp_gait.backends.compiled import CompiledObjective
+from nlp_gait.backends.continuation import solve_both_ways
+from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, remembered_interrupts
+from nlp_gait.backends.iteration_watch import IterationWatch
+from nlp_gait.cli import app
+from tests.backends.toys import corner, toy
+from tests.faults.processes import start
+
+RUN = CliRunner()
+
+
+def press_after(
+    monkeypatch: pytest.MonkeyPatch, owner: type, name: str, calls: int, before: Callable[[], None] = lambda: None
+) -> None:
+    """Ctrl-C during a certain call of a method."""
+    method, count = getattr(owner, name), 0
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count == calls:
+            before()
+            signal.raise_signal(signal.SIGINT)
+        return method(*arguments)
+
+    monkeypatch.setattr(owner, name, counted)
+
+
+def run(*arguments: str, status: int = 130) -> Result:
+    before = signal.getsignal(signal.SIGINT)
+    done = RUN.invoke(app, list(arguments))
+    assert done.exit_code == status, done.output
+    assert done.stderr.startswith("nlp-gait: interrupted") and done.stderr.count("\n") == 1
+    assert signal.getsignal(signal.SIGINT) is before
+    return done
+
+
+def test_solve_within_a_later_start_keeps_the_best_of_the_earlier_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = nlp_gait.solve(nlp_gait.load("walk12"), starts=1)
+    press_after(monkeypatch, IterationWatch, "eval", 3 * whole.starts[0].iterations)
+    out = tmp_path / "best.json"
+    done = run("solve", "walk12", "--starts", "50", "--out", str(out))
+    kept = json.loads(out.read_text())
+    starts = len(kept["starts"])
+    assert 2 <= starts < 50 and kept["success"] and kept["objective"] >= whole.objective - 1e-6
+    assert kept["starts"][-1]["status"] == "was interrupted" or kept["starts"][-1]["success"]
+    assert kept["status"].startswith(f"interrupted in start {starts} of 50; ")
+    assert f"interrupted in start {starts} of 50; the best point until then is in {out}" in done.stderr
+    assert "walk12: f " in done.stdout
+
+
+def test_solve_within_the_first_start_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    press_after(monkeypatch, IterationWatch, "eval", 4)
+    with pytest.raises(Interrupted, match="interrupted in start 1 of 2") as caught:
+        nlp_gait.solve(nlp_gait.load("walk12"), starts=2)
+    solution = caught.value.partial
+    assert isinstance(solution, nlp_gait.Solution)
+    assert not solution.success and solution.iterations == 3 and "was interrupted" in solution.status
+    assert isinstance(caught.value, KeyboardInterrupt)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == "interrupted in start 1 of 2"
+
+
+def test_a_second_press_is_not_deferred() -> None:
+    with pytest.raises(KeyboardInterrupt), deferred_interrupts() as pressed:
+        signal.raise_signal(signal.SIGINT)
+        assert pressed()
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_an_ignored_interrupt_stays_ignored() -> None:
+    """As under nohup, and for what a shell runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with deferred_interrupts() as pressed, remembered_interrupts() as check:
+            signal.raise_signal(signal.SIGINT)
+            check()
+            assert not pressed()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    press_after(monkeypatch, IterationWatch, "eval", 60)
+    over = ["--over", "step_length_m=0.05:0.12:30", "--starts", "1"]
+    done = run("sweep", "walk12", *over, "--out", str(tmp_path))
+    table = (tmp_path / "walk12-sweep-step_length_m-ipopt.csv").read_text().splitlines()
+    assert 2 < len(table) < 31
+    assert f"after {len(table) - 1} of 30 points; these are in {tmp_path}, not all of them solved from" in done.stderr
+
+
+def test_sweep_by_a_search_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    press_after(monkeypatch, CompiledObjective, "__call__", 30)
+    over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
+    done = run("sweep", "walk12", *over, "--out", str(tmp_path))
+    table = (tmp_path / "walk12-sweep-step_length_m-pso.csv").read_text().splitlines()
+    assert len(table) == 3 and f"after 2 of 30 points; these are in {tmp_path}\n" in done.stderr
+
+
+def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    problems = [toy(corner).with_values(limit=limit) for limit in (0.5, 0.6, 0.7)]
+    press_after(monkeypatch, IterationWatch, "eval", 1)
+    with pytest.raises(Interrupted, match="interrupted after 1 of 3 points") as caught:
+        solve_both_ways(problems, starts=1)
+    assert isinstance(caught.value.partial, list)
+    assert [solution is None for solution in caught.value.partial] == [False, True, True]
+
+
+@pytest.mark.parametrize("with_folder", [True, False])
+def test_search_shows_the_finished_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_folder: bool) -> None:
+    press_after(monkeypatch, CompiledObjective, "__call__", 25)  # ten generations a run
+    folder = ["--out", str(tmp_path / "study")] if with_folder else []
+    done = run("search", "walk12", "--runs", "9", "--evaluations", "500", *folder)
+    assert "interrupted after 2 of 9 runs; finished runs are" in done.stderr
+    assert ("kept in" in done.stderr) == with_folder and ("kept nowhere" in done.stderr) != with_folder
+    assert done.stdout.count("evaluation budget used") == 2
+    assert len(list(tmp_path.glob("study/records/*/*.json"))) == 2 * with_folder
+
+
+def test_search_before_the_first_run_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    press_after(monkeypatch, CompiledObjective, "__call__", 2)
+    done = run("search", "walk12", "--runs", "9", "--evaluations", "500")
+    assert done.stderr == "nlp-gait: interrupted after 0 of 9 runs\n" and done.stdout == ""
+
+
+def test_compare_with_worker_processes_is_continued_with_resume(tmp_path: Path) -> None:
+    """As a terminal does it: the signal goes to the workers too."""
+    study = ["compare", "walk12", "--algorithms", "pso", "--runs", "400", "--starts", "0", "--evaluations", "2000"]
+    process = start(*study, "--jobs", "2", "--out", str(tmp_path))
+    end = time.monotonic() + 60.0
+    while not list(tmp_path.glob("records/*/pso-*.json")) and time.monotonic() < end:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    _, messages = process.communicate(timeout=60)
+    records = list(tmp_path.glob("records/*/*.json"))
+    assert process.returncode == 130, messages
+    assert messages.count("\n") == 1 and f"`nlp-gait compare --resume --out {tmp_path}`" in messages
+    assert f"interrupted after {len(records)} of 400 runs" in messages
+    assert all(read_record(path).evaluations == {"f": 2000} for path in records)
+    assert not list(tmp_path.rglob("*.tmp*")) and not (tmp_path / "report.html").exists()
+
+
+def test_reproduce_names_the_steps_that_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("reproduction")
+
+    def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
+        steps = Steps(out, progress)
+        steps("one", {}, lambda: 1)
+        steps("two", {}, lambda: signal.raise_signal(signal.SIGINT))
+
+    module.reproduce = reproduce  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "reproduction", module)
+    monkeypatch.setitem(sys.modules["nlp_gait.cli.reproduce"].REPRODUCTIONS, "nao", "reproduction")
+    done = run("reproduce", "nao", "--out", str(tmp_path))
+    assert f"1 finished steps are kept in {tmp_path}; the same command continues" in done.stderr
+    assert [path.name for path in (tmp_path / "steps").iterdir()] == ["one.json"]
+
+
+@pytest.fixture(scope="module")
+def gait(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("gait") / "best.json"
+    assert RUN.invoke(app, ["solve", "nao-ssp", "--starts", "1", "--out", str(path)]).exit_code == 0
+    return str(path)
+
+
+def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gait: str) -> None:
+    pytest.importorskip("mujoco")
+    from nlp_gait.simulation import robustness
+
+    monkeypatch.setattr(robustness, "robustness", lambda *_: signal.raise_signal(signal.SIGINT))
+    done = run("simulate", gait, "--robustness", "--out", str(tmp_path))
+    assert f"interrupted in the tests of robustness; the playback is kept in {tmp_path}" in done.stderr
+    assert {"report.json", "model.xml", "playback.npz"} <= {path.name for path in tmp_path.iterdir()}
+    assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
+
+
+def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
+    from tests.faults.processes import fake_compiler
+
+    marker = tmp_path / "began"
+    compiler = fake_compiler(tmp_path, f"echo $$ > {marker}; sleep 60")
+    process = start("search", "walk12", "--runs", "1", CXX=compiler, NLP_GAIT_CACHE=str(tmp_path / "cache"))
+    end = time.monotonic() + 60.0
+    while not (marker.exists() and marker.read_text()) and time.monotonic() < end:
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGINT)
+    _, messages = process.communicate(timeout=30)
+    assert process.returncode == 130 and messages == "nlp-gait: interrupted after 0 of 1 runs\n"
+    gone = subprocess.run(["kill", "-0", marker.read_text().strip()], capture_output=True)
+    assert gone.returncode != 0

@@ -1,0 +1,86 @@
+"""Robots with other masses, lengths and soles."""
+
+from __future__ import annotations
+
+import pytest
+
+from nlp_gait.errors import InputError, RobotDataError, UnknownNameError
+from nlp_gait.robots import load_robot
+from nlp_gait.robots.perturbation import perturbed, perturbed_name, quantities, split_name
+
+NAO = load_robot("nao-v5")
+
+
+def test_masses_and_inertias_scale() -> None:
+    heavy = perturbed(NAO, {"mass": 1.1, "LThigh.mass": 2.0})
+    assert heavy.links["RTibia"].mass_kg == pytest.approx(1.1 * NAO.links["RTibia"].mass_kg)
+    assert heavy.links["LThigh"].mass_kg == pytest.approx(2.2 * NAO.links["LThigh"].mass_kg)
+    own, other = (robot.links["LThigh"].inertia_com_kgm2 for robot in (NAO, heavy))
+    assert other == pytest.approx([2.2 * value for value in own])
+    assert heavy.links["LThigh"].com_m == NAO.links["LThigh"].com_m
+
+
+def test_both_legs_get_longer() -> None:
+    tall = perturbed(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
+    for side in "LR":
+        assert tall.joints[f"{side}KneePitch"].origin_m == pytest.approx((0.0, 0.0, -0.101))
+        assert tall.joints[f"{side}AnklePitch"].origin_m == pytest.approx((0.0, 0.0, -0.1009))
+
+
+def test_a_shifted_sole_keeps_its_size_and_shape() -> None:
+    shifted = perturbed(NAO, {"sole_x_m": 0.002, "sole_y_m": -0.001})
+    for side, foot in NAO.feet.items():
+        other = shifted.feet[side]
+        assert other.front_m + other.back_m == pytest.approx(foot.front_m + foot.back_m)
+        assert (other.front_m, other.left_m) == pytest.approx((foot.front_m + 0.002, foot.left_m - 0.001))
+        moves = {
+            (round(a - c, 9), round(b - d, 9))
+            for (a, b), (c, d) in zip(other.sole_polygon_m, foot.sole_polygon_m, strict=True)
+        }
+        assert moves == {(0.002, -0.001)}
+
+
+def test_a_longer_sole_reaches_further_on_one_side() -> None:
+    longer = perturbed(NAO, {"sole_front_m": 0.01}).feet["left"]
+    foot = NAO.feet["left"]
+    assert longer.front_m == pytest.approx(foot.front_m + 0.01) and longer.back_m == foot.back_m
+    assert min(x for x, _ in longer.sole_polygon_m) == min(x for x, _ in foot.sole_polygon_m)
+    assert max(x for x, _ in longer.sole_polygon_m) > max(x for x, _ in foot.sole_polygon_m)
+
+
+def test_a_name_carries_the_changes() -> None:
+    changes = {"mass": 1.05, "thigh_m": 1 / 3000}
+    name = perturbed_name("nao-v5", changes)
+    assert split_name(name) == ("nao-v5", changes)
+    robot = load_robot(name)
+    assert robot.name == name
+    assert robot.mass_kg == pytest.approx(1.05 * NAO.mass_kg)
+    assert split_name("nao-v5") == ("nao-v5", {})
+    assert split_name("my@robots/nao.json") == ("my@robots/nao.json", {})
+
+
+def test_every_quantity_can_be_changed() -> None:
+    for name in quantities(NAO):
+        value = 1.01 if name.endswith("mass") else 1e-3
+        assert perturbed(NAO, {name: value}) is not NAO
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "said"),
+    [
+        ({"weight": 1.1}, UnknownNameError, "quantity of robot nao-v5"),
+        ({"LTigh.mass": 1.1}, UnknownNameError, "LThigh.mass"),
+        ({"mass": 0.0}, RobotDataError, "mass_kg must be > 0"),
+        ({"mass": float("nan")}, InputError, "finite"),
+        ({"thigh_m": -0.2}, InputError, "leaves nothing"),
+        ({"sole_x_m": 0.2}, RobotDataError, "back_m must be > 0"),
+    ],
+)
+def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        perturbed(NAO, changes)
+
+
+def test_a_name_with_nonsense_behind_the_mark_says_what_it_takes() -> None:
+    with pytest.raises(InputError, match="NAME=NUMBER"):
+        load_robot("nao-v5@heavier")
