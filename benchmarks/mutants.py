@@ -128,7 +128,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("modules", nargs="+", help="files or folders, relative to the root of the tree")
     parser.add_argument("--tests", nargs="+", required=True)
+    parser.add_argument("--again", type=Path, help="output of an earlier run: try its survivors only")
     arguments = parser.parse_args()
+    wanted = set(arguments.again.read_text().splitlines()) if arguments.again else None
     import casadi  # noqa: F401  # once, for all forks
     import pytest  # noqa: F401
     import scipy.stats  # noqa: F401
@@ -150,11 +152,14 @@ def main() -> None:
         for path in paths:
             original = path.read_text(encoding="utf-8")
             for line, change, text in mutants(original):
+                name = f"{path}:{line}: {change}"
+                if wanted is not None and name not in wanted:
+                    continue
                 path.write_text(text, encoding="utf-8")
                 total += 1
                 if survives(arguments.tests):
                     survivors += 1
-                    print(f"{path}:{line}: {change}", flush=True)
+                    print(name, flush=True)
             path.write_text(original, encoding="utf-8")
         print(f"{total} mutants, {total - survivors} killed, {survivors} survived")
     if survivors:

@@ -86,7 +86,8 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
     """
     point = problem.check_x(x)
     cost, violation, rows, indexes = _values(problem, point)
-    factor = math.ceil(DENSE_INTERVALS / int(problem.options.get("intervals", DENSE_INTERVALS)))
+    parts = int(problem.options.get("intervals", DENSE_INTERVALS)) * int(problem.options.get("samples_per_interval", 1))
+    factor = math.ceil(DENSE_INTERVALS / parts)
     dense = problem.dense(factor)
     dense_rows, dense_indexes = _values(dense, point)[2:] if dense is not None else ((), None)
     objective = problem.objective
@@ -102,7 +103,7 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
         feasible=violation <= FEASIBILITY_TOLERANCE,
         dense=dense_indexes,
         dense_violations=_worst(dense_rows),
-        dense_intervals=None if dense is None else factor * int(problem.options["intervals"]),
+        dense_intervals=None if dense is None else factor * parts,
     )
 
 

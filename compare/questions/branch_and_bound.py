@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 
 BATCH = 512
+# Relative to the target: a natural enclosure wider than this is not worth a gradient.
+WIDE = 1.0
+# Part of an edge that must go for a box to count as smaller.
+LEAST_SHRINKAGE = 0.1
 # Widens the few sums taken here, in NumPy, by far more than they can be rounded.
 ROUNDING = 1e-12
 
@@ -117,26 +122,67 @@ def certify(
 
 
 def _assessed(enclosure: Enclosure, boxes: Array, target: float) -> tuple[Array, Array, Array]:
-    """Lower bound of the cost (P,), how much each variable moves it (P, n), and the boxes, of those that must be kept."""
+    """Lower bound of the cost (P,), how much each variable matters (P, n), and the boxes, of those that must be kept."""
     cost, rows = enclosure.values(boxes)
     kept = (cost[:, 0] < target) & _may_be_feasible(enclosure, rows)
-    boxes, lowest = boxes[kept], cost[kept, 0]
-    if not len(boxes):
-        return lowest, np.empty(boxes.shape[:2]), boxes
-    middle = boxes.mean(axis=-1)
-    reach = np.maximum(boxes[..., 1] - middle, middle - boxes[..., 0])
-    at_middle, rows_at_middle = enclosure.values(np.stack([middle, middle], axis=-1))
-    gradient, jacobian = enclosure.slopes(boxes)
-    with np.errstate(invalid="ignore"):  # an unbounded slope of a variable that does not move: no statement
-        smear = np.abs(gradient).max(axis=-1) * reach
-        spread = (np.abs(jacobian).max(axis=-1) * reach[:, None, :]).sum(axis=-1)
-    lowest = np.fmax(lowest, _down(at_middle[:, 0] - smear.sum(axis=-1)))
-    shifted = np.stack([rows_at_middle[..., 0] - spread, rows_at_middle[..., 1] + spread], axis=-1)
-    kept = (lowest < target) & _may_be_feasible(enclosure, shifted)
-    # An unbounded slope says nothing about where to split: the relative width decides.
-    width = reach / enclosure.problem.scale
-    smear = np.where(np.isfinite(smear).all(axis=-1, keepdims=True), smear, width)
+    boxes, cost, rows = boxes[kept], cost[kept], rows[kept]
+    boxes, shrunk, smear = _contracted(enclosure, boxes)
+    kept = (boxes[..., 0] <= boxes[..., 1]).all(axis=-1)
+    boxes, cost, smear, shrunk = boxes[kept], cost[kept], smear[kept], shrunk[kept]
+    if shrunk.any():
+        cost[shrunk] = enclosure.values(boxes[shrunk])[0]
+    lowest = cost[:, 0].copy()
+    # The mean-value form pays only where the natural extension is good already.
+    fine = cost[:, 1] - cost[:, 0] < WIDE * abs(target)
+    if fine.any():
+        middle, reach = _middle_and_reach(boxes[fine])
+        slope = np.abs(enclosure.gradient(boxes[fine])).max(axis=-1)
+        with np.errstate(invalid="ignore"):  # an unbounded slope along an edge of no length
+            moves = np.where(reach > 0.0, slope * reach, 0.0)
+        at_middle = enclosure.values(np.stack([middle, middle], axis=-1))[0]
+        lowest[fine] = np.fmax(lowest[fine], _down(at_middle[:, 0] - moves.sum(axis=-1)))
+        smear[fine] = np.where(np.isfinite(moves).all(axis=-1, keepdims=True), moves, smear[fine])
+    kept = lowest < target
     return lowest[kept], smear[kept], boxes[kept]
+
+
+def _contracted(enclosure: Enclosure, boxes: Array) -> tuple[Array, np.ndarray[Any, np.dtype[np.bool_]], Array]:
+    """Boxes without the slabs in which a row's mean-value form is out of bounds; which shrank; and how rows move (P, n)."""
+    middle, reach = _middle_and_reach(boxes)
+    rows = enclosure.values(np.stack([middle, middle], axis=-1))[1]
+    jacobian = enclosure.jacobian(boxes)
+    slack = FEASIBILITY_TOLERANCE * enclosure.scales
+    moves = np.abs(jacobian).max(axis=-1) * reach[:, None, :]
+    total = moves.sum(axis=-1, keepdims=True)
+    lower, upper = boxes[..., 0].copy(), boxes[..., 1].copy()
+    # Both one-sided forms as row <= 0: J (x - c) <= room, where the other variables take at most total - own.
+    for sign, room in (
+        (1.0, enclosure.upper + slack - rows[..., 0]),
+        (-1.0, rows[..., 1] - enclosure.lower + slack),
+    ):
+        available = _up(room[..., None] + total - moves)
+        slopes = np.sort(sign * jacobian, axis=-1)
+        least, most = slopes[..., 0], slopes[..., 1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            farthest = available / np.where((available > 0.0) == (least > 0.0), least, most)
+        rising = np.where((least > 0.0) & np.isfinite(farthest), farthest, np.inf)
+        falling = np.where((most < 0.0) & np.isfinite(farthest), farthest, -np.inf)
+        upper = np.minimum(upper, _up(middle + rising.min(axis=1)))
+        lower = np.maximum(lower, _down(middle + falling.max(axis=1)))
+    straddling = np.minimum(np.abs(rows[..., 0] - enclosure.upper), np.abs(rows[..., 1] - enclosure.lower)) <= total[..., 0]
+    smear = (moves * straddling[..., None]).max(axis=1)
+    width = reach / enclosure.problem.scale
+    smear = np.where(smear.max(axis=-1, keepdims=True) > 0.0, smear, width)
+    shrunk = ((upper - lower) < (1.0 - LEAST_SHRINKAGE) * 2.0 * reach).any(axis=-1)
+    contracted = np.stack([lower, upper], axis=-1)
+    return np.where(shrunk[:, None, None] | (lower > upper).any(axis=-1)[:, None, None], contracted, boxes), shrunk, smear
+
+
+def _middle_and_reach(boxes: Array) -> tuple[Array, Array]:
+    """(P, n) middle, and no less than the distance of both ends from it."""
+    middle = boxes.mean(axis=-1)
+    reach = np.maximum(boxes[..., 1] - middle, middle - boxes[..., 0]) * (1.0 + ROUNDING)
+    return middle, reach
 
 
 def _may_be_feasible(enclosure: Enclosure, rows: Array) -> Array:
@@ -147,8 +193,13 @@ def _may_be_feasible(enclosure: Enclosure, rows: Array) -> Array:
     return possible
 
 
+def _up(values: Array) -> Array:
+    return -_down(-values)
+
+
 def _down(values: Array) -> Array:
-    lowered: Array = values - ROUNDING * (1.0 + np.abs(values))
+    with np.errstate(over="ignore", invalid="ignore"):
+        lowered: Array = np.where(np.isfinite(values), values - ROUNDING * (1.0 + np.abs(values)), values)
     return lowered
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.questions.pareto_criteria import REWARD, Criterion, rewarding
 from nlp_gait.backends.continuation import Attempt, Continuation, best_end
-from nlp_gait.backends.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem
@@ -106,7 +106,7 @@ def pareto_front(
     for order, path_seed in ((sorted({*grid, *found}), seed), (sorted({*grid, *found}, reverse=True), seed + 1)):
         walk(order, path_seed)
     while len(found) < points:
-        at, neighbours = _largest_gap(found, criterion, free)
+        at, neighbours = _largest_gap(found)
         limited = criterion.limited(free, at)
         for end in neighbours:
             x0 = np.clip(end.x, limited.lower, limited.upper)
@@ -119,6 +119,16 @@ def pareto_front(
     walk(sorted(found, reverse=True), seed + 1)
     path = Continuation(settings=settings, solves=4 * points)
     return nondominated([p for at in sorted(found) if (p := _point(path, free, criterion, at, found[at])) is not None])
+
+
+def point_at(free: GaitProblem, criterion: Criterion, least: float, x0: Array) -> FrontPoint | None:
+    """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
+    limited = criterion.limited(free, least)
+    x0 = np.clip(x0, limited.lower, limited.upper)
+    settings = IpoptSettings()
+    end = ipopt_for(free, settings, 4 * LEAST_POINTS).run(limited, x0)
+    path = Continuation(settings=settings, solves=4 * LEAST_POINTS)
+    return _point(path, free, criterion, least, [Attempt(x0, end)])
 
 
 def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
@@ -159,9 +169,7 @@ def _at(problem: GaitProblem, criterion: Criterion, x: Array) -> FrontPoint:
     )
 
 
-def _largest_gap(
-    found: dict[float, list[Attempt]], criterion: Criterion, free: GaitProblem
-) -> tuple[float, list]:
+def _largest_gap(found: dict[float, list[Attempt]]) -> tuple[float, list[End]]:
     """Middle of the longest gap between neighbours that were solved, and their ends."""
     solved = [(at, end) for at in sorted(found) if (end := best_end(found[at])) is not None]
     at = np.array([a for a, _ in solved])

@@ -42,7 +42,9 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
         _engine_costs(cost, good)
         bad = [gait.at for gait in gaits if not gait.found.feasible]
         if bad:
-            cost.plot(bad, np.full(len(bad), 0.03), "x", color="0.4", label="infeasible", transform=cost.get_xaxis_transform())
+            cost.plot(
+                bad, np.full(len(bad), 0.03), "x", color="0.4", label="infeasible", transform=cost.get_xaxis_transform()
+            )
         cost.set_ylabel("cost of transport\nP / (m g v)")
         cost.set_ylim(bottom=0.0)
         cost.legend()
@@ -68,7 +70,9 @@ def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
         axes.plot(*zip(*points, strict=True), "s--", color=ENGINE, label="physics engine")
     fallen = [gait.at for gait in gaits if gait.walk is not None and gait.walk.measurements.fallen]
     if fallen:
-        axes.plot(fallen, np.full(len(fallen), 0.1), "v", color=RIGHT, label="falls", transform=axes.get_xaxis_transform())
+        axes.plot(
+            fallen, np.full(len(fallen), 0.1), "v", color=RIGHT, label="falls", transform=axes.get_xaxis_transform()
+        )
 
 
 def cycle_figure(result: Result) -> Figure:
@@ -87,7 +91,9 @@ def cycle_figure(result: Result) -> Figure:
             above.plot(path[:, 0], path[:, 1], color=colour)
         above.plot(1000.0 * hip[:, 0], 1000.0 * hip[:, 1], color=HIP)
         lowest = hip[:, 2].min()
-        side.plot(1000.0 * hip[:, 0], 1000.0 * (hip[:, 2] - lowest), color=HIP, label=f"hip less {1000.0 * lowest:.1f} mm")
+        side.plot(
+            1000.0 * hip[:, 0], 1000.0 * (hip[:, 2] - lowest), color=HIP, label=f"hip less {1000.0 * lowest:.1f} mm"
+        )
         at = np.searchsorted(t, np.minimum(switches, t[-1]))
         above.plot(1000.0 * hip[at, 0], 1000.0 * hip[at, 1], "o", color=HIP, label="switch")
         zmp = 1000.0 * arrays.arrays["zmp"]
@@ -97,8 +103,8 @@ def cycle_figure(result: Result) -> Figure:
         side.legend(ncols=3)
         above.legend(ncols=2, loc="lower right")
         for k, axis in enumerate("xyz"):
-            shown = hip[:, k] - (hip[0, k] if axis != "y" else 0.0)
-            place.plot(t, 1000.0 * shown, color=(LEFT, RIGHT, "#009E73")[k], label=axis if axis == "y" else f"{axis} less its start")
+            shown = 1000.0 * (hip[:, k] - hip[0, k])
+            place.plot(t, shown, color=LEG_COLOURS[k], label=f"{axis} less its start")
         place.set_ylabel("hip [mm]")
         place.legend(ncols=3)
         for name, colour in zip(LEG, LEG_COLOURS, strict=True):

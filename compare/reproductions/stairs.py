@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from compare.reproductions import stairs_runs
+from compare.reproductions import stairs_replay, stairs_runs
 from compare.reproductions.resume import Steps, fingerprint
 from compare.reproductions.stairs_figures import write_figures
 from compare.reproductions.stairs_paper import TABLE_4
@@ -21,6 +21,7 @@ from compare.reproductions.stairs_runs import (
     TRACK_EVALUATIONS,
     TRACK_SETTINGS,
     TRACK_START,
+    best_track,
     complete,
     loaded,
     on_stair,
@@ -29,19 +30,23 @@ from compare.reproductions.stairs_runs import (
 )
 from compare.storage import writable_folder
 
+# Told of by ``reproduce``: in each case the ideal and its replay, two plans, their differences, the printed scheme, the network,
+# every search on plan and track, and IPOPT on the track; once the other stairs, the network's rules, and the writing.
+STEPS = len(TABLE_4) * (9 + 2 * len(ALGORITHMS)) + 3
+
 
 def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     """Write tables (Markdown, CSV), figures (PNG, SVG) and ``report.md``.
 
     Args:
         out: folder; results of finished steps are kept in ``out/steps`` and used again.
-        progress: told about each step.
+        progress: told about each step, ``STEPS`` times.
 
     Raises:
         OutputError: the folder cannot be written to.
     """
     folder = writable_folder(out)
-    steps = Steps(folder, progress, code=(stairs_runs,))
+    steps = Steps(folder, progress, code=(stairs_runs, stairs_replay))
     cases = {case: _case(steps, case) for case in TABLE_4}
     stairs = [fingerprint(loaded(name)) for name in ("stairs-plan", "stairs-ideal")]
     other = steps("other-stairs", {"problems": stairs}, stairs_runs.other_stairs)
@@ -56,6 +61,12 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
             f"track-ipopt-{case}",
             fingerprint(track),
             partial(stairs_runs.by_ipopt, track, 1, x0=TRACK_START, settings=TRACK_SETTINGS),
+        )
+        best = best_track(found)
+        found["learned"] = steps(
+            f"learned-{case}",
+            {**fingerprint(track), "x": best},
+            partial(stairs_runs.with_network, case, _plan(found), best),
         )
     progress("figures, tables and report")
     write_figures(folder, cases, network)
@@ -78,6 +89,11 @@ def _case(steps: Steps, case: int) -> dict[str, Any]:
         "jerk": steps(f"jerk-ipopt-{case}", fingerprint(jerk), partial(stairs_runs.by_ipopt, jerk, JERK_STARTS)),
         "track": {},
     }
+    found["replay"] = steps(
+        f"replay-{case}",
+        {**fingerprint(ideal), "x": found["ideal"]["x"]},
+        partial(stairs_runs.replayed, case, list(found["ideal"]["x"].values())),
+    )
     best = _plan(found)
     track = track_problem(case, best)
     for name in ALGORITHMS:

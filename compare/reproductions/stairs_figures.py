@@ -11,7 +11,7 @@ import numpy as np
 from compare.figures import legend_below, new_figure, save, style
 from compare.reproductions.stairs_motion import Leg, first_step, two_steps
 from compare.reproductions.stairs_paper import TABLE_4
-from compare.reproductions.stairs_runs import complete, plan_problem, tracked
+from compare.reproductions.stairs_runs import best_track, complete, plan_problem, tracked
 from nlp_gait.problems.gait_problem import Array
 from nlp_gait.problems.stairs import SETBACK
 from nlp_gait.problems.stairs_robot import load_biped
@@ -30,7 +30,7 @@ def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]], network:
     """Write every figure as PNG and SVG."""
     plans = {case: complete(case, found["plan"]["ipopt"]["x"]) for case, found in cases.items()}
     drawn = {case: _planned(case, plan) for case, plan in plans.items()}
-    followed = {case: tracked(case, plans[case], _best_track(found)) for case, found in cases.items()}
+    followed = {case: tracked(case, plans[case], best_track(found)) for case, found in cases.items()}
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
     step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
     with style():
@@ -54,12 +54,6 @@ def _planned(case: int, plan: Mapping[str, float]) -> Mapping[str, Array]:
     if problem is None or problem.signals is None:
         raise TypeError("the planner has samples and signals")
     return problem.signals(np.array([plan[name] for name in problem.names]), problem.p).arrays
-
-
-def _best_track(found: Mapping[str, Any]) -> list[float]:
-    """Gains and torso pitch of the best feasible run of any solver."""
-    runs = [run for run in found["track"].values() if run["feasible"]] or list(found["track"].values())
-    return list(min(runs, key=lambda run: run["objective"])["x"].values())
 
 
 def _two_step_times(plan: Mapping[str, float]) -> Array:

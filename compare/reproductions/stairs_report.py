@@ -9,13 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from compare.reproductions.stairs_case_tables import (
+    Cases,
+    differences_table,
+    ideal_table,
+    jerk_table,
+    learned_table,
+    printed_table,
+    replay_table,
+)
 from compare.reproductions.stairs_paper import TABLE_3, TABLE_4
 from compare.reproductions.stairs_runs import PLAN_EVALUATIONS, TRACK_EVALUATIONS
 from compare.reproductions.tables import Cell, write_table
 from nlp_gait.files import write_text
 from nlp_gait.problems.stairs_governing import GOVERNING_VARIABLES
 
-Cases = Mapping[int, Mapping[str, Any]]
 MATCH = 1e-3  # a start that ends within this of the best is counted as having found it (relative)
 
 
@@ -24,15 +32,17 @@ def write_report(folder: Path, cases: Cases, network: Mapping[str, Any], other: 
     template = (resources.files("compare.reproductions") / "stairs_report.md").read_text(encoding="utf-8")
     tables = {
         "table_3": _table_3(folder, cases),
-        "jerk": _jerk(folder, cases),
+        "jerk": jerk_table(folder, cases),
         "plans": _plans(folder, cases),
         "table_4": _table_4(folder, cases),
         "tracks": _tracks(folder, cases),
-        "printed": _printed(folder, cases),
-        "ideal": _ideal(folder, cases),
+        "printed": printed_table(folder, cases),
+        "ideal": ideal_table(folder, cases),
+        "replay": replay_table(folder, cases),
         "other": _other(folder, other),
         "network": _network(folder, network),
-        "differences": _differences(folder, cases),
+        "learned": learned_table(folder, cases),
+        "differences": differences_table(folder, cases),
     }
     values = {name: text.strip() for name, text in tables.items()}
     text = template.format(**values, plan_evaluations=PLAN_EVALUATIONS, track_evaluations=TRACK_EVALUATIONS)
@@ -124,83 +134,6 @@ def _best(runs: Mapping[str, Any]) -> Mapping[str, Any]:
     return best
 
 
-def _tracks(folder: Path, cases: Cases) -> str:
-    columns = {
-        "case": "d",
-        "solver": "",
-        "cost": ".6f",
-        "feasible": "",
-        "energy [J]": ".2f",
-        "ideal's energy [J]": ".2f",
-        "ZMP margin [m]": ".4f",
-        "largest error [rad]": ".4f",
-        "K_p": ".3f",
-        "K_d": ".3f",
-        "torso [rad]": ".4f",
-    }
-    rows: list[list[Cell]] = []
-    for case, found in cases.items():
-        for solver, run in found["track"].items():
-            indexes = run["indexes"]
-            rows.append(
-                [
-                    case,
-                    solver,
-                    run["objective"],
-                    "yes" if run["feasible"] else "no",
-                    indexes["energy_J"],
-                    found["ideal"]["indexes"]["energy_J"],
-                    indexes["zmp_margin_min_m"],
-                    indexes["largest_error_rad"],
-                    *run["x"].values(),
-                ]
-            )
-    return write_table(folder / "tracks", columns, rows)
-
-
-def _printed(folder: Path, cases: Cases) -> str:
-    columns = {
-        "case": "d",
-        "explicit: quanta of 0.01 s before divergence": ".0f",
-        "implicit: largest error [rad]": ".3f",
-        "implicit, gravity compensated [rad]": ".3f",
-    }
-    keys = ("explicit_quanta", "implicit_largest_error_rad", "compensated_largest_error_rad")
-    rows: list[list[Cell]] = [[case, *(found["printed"][key] for key in keys)] for case, found in cases.items()]
-    return write_table(folder / "printed-scheme", columns, rows)
-
-
-def _ideal(folder: Path, cases: Cases) -> str:
-    columns = {
-        "case": "d",
-        "effort": ".4f",
-        "all starts": "",
-        "energy [J]": ".2f",
-        "plan's energy [J]": ".2f",
-        "peak torque [N m]": ".2f",
-        "torso [rad]": ".4f",
-        "time a start [s]": ".1f",
-    }
-    rows: list[list[Cell]] = []
-    for case, found in cases.items():
-        run, indexes = found["ideal"], found["ideal"]["indexes"]
-        starts = ", ".join(f"{s['objective']:.3f}" if s["success"] else "failed" for s in run["starts"])
-        time_s = float(np.mean([start["time_s"] for start in run["starts"]]))
-        plan = found["plan"]["ipopt"]["objective"]
-        peak, torso = indexes["peak_torque_Nm"], indexes["torso_pitch_rad"]
-        rows.append([case, run["objective"], starts, indexes["energy_J"], plan, peak, torso, time_s])
-    return write_table(folder / "ideal", columns, rows)
-
-
-def _jerk(folder: Path, cases: Cases) -> str:
-    columns = {"case": "d", "paper [rad/s^3]": ".1f", "least peak jerk [rad/s^3]": ".1f", "at energy [J]": ".1f"}
-    rows: list[list[Cell]] = [
-        [case, TABLE_4[case].jerk, found["jerk"]["objective"], found["jerk"]["indexes"]["energy_J"]]
-        for case, found in cases.items()
-    ]
-    return write_table(folder / "jerk", columns, rows)
-
-
 def _other(folder: Path, other: Sequence[Mapping[str, Any]]) -> str:
     columns = {"tread [m]": ".3f", "rise [m]": ".3f", "plan": "", "ideal": ""}
     rows: list[list[Cell]] = []
@@ -239,20 +172,29 @@ def _network(folder: Path, network: Mapping[str, Any]) -> str:
     return write_table(folder / "network", columns, rows)
 
 
-def _differences(folder: Path, cases: Cases) -> str:
+def _tracks(folder: Path, cases: Cases) -> str:
     columns = {
         "case": "d",
-        "acceleration, paper [rad/s^2]": ".2f",
-        "plan of least energy [rad/s^2]": ".2f",
-        "plan of least jerk [rad/s^2]": ".2f",
-        "jerk, paper [rad/s^3]": ".1f",
-        "plan of least energy [rad/s^3]": ".1f",
-        "plan of least jerk [rad/s^3]": ".1f",
+        "solver": "",
+        "cost": ".6f",
+        "feasible": "",
+        "energy [J]": ".2f",
+        "ideal's energy [J]": ".2f",
+        "gap [J]": ".2f",
+        "ZMP margin [m]": ".4f",
+        "largest error [rad]": ".4f",
+        "K_p [N m/rad]": ".3f",
+        "K_d [N m s/rad]": ".3f",
+        "torso [rad]": ".4f",
     }
-    rows: list[list[Cell]] = []
-    for case, found in cases.items():
-        row: list[Cell] = [case]
-        for name in ("acceleration", "jerk"):
-            row += [getattr(TABLE_4[case], name), *(ours[name] for ours in found["differences"].values())]
-        rows.append(row)
-    return write_table(folder / "differences", columns, rows)
+
+    def row(case: int, solver: str) -> list[Cell]:
+        run, ideal = cases[case]["track"][solver], cases[case]["ideal"]["indexes"]["energy_J"]
+        own = run["indexes"]
+        energies: list[Cell] = [own["energy_J"], ideal, own["energy_J"] - ideal]
+        judged: list[Cell] = [run["objective"], "yes" if run["feasible"] else "no"]
+        return [case, solver, *judged, *energies, own["zmp_margin_min_m"], own["largest_error_rad"], *run["x"].values()]
+
+    return write_table(
+        folder / "tracks", columns, [row(case, solver) for case in cases for solver in cases[case]["track"]]
+    )

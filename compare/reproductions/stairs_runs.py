@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from compare.judge import evaluate
 from compare.reproductions.stairs_motion import swing_leg
 from compare.reproductions.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
+from compare.reproductions.stairs_replay import FEEDBACK, OPEN_LOOP, replay
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
 from metaheuristics.interface import Algorithm
 from nlp_gait import IpoptSettings, compile_objective, load, solve
 from nlp_gait.problems.gait_problem import Array, GaitProblem
+from nlp_gait.problems.stairs import PAPER_TIMES
+from nlp_gait.problems.stairs_learned_path import LEGS
 from nlp_gait.problems.stairs_network import NetworkSettings, network_angles
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.problems.stairs_track import PLAN
+from nlp_gait.problems.stairs_track_model import InverseKinematics
+from nlp_gait.symbolic.planar_biped import LINKS
 
 STARTS = 20  # of IPOPT on the planner
 IDEAL_STARTS = 3
@@ -37,6 +42,7 @@ TRACK_SETTINGS = IpoptSettings(time_limit_s=1200.0)
 # Stairs that the paper did not try: tread and rise of one step [m]; the last one is impossible.
 OTHER_STAIRS = ((0.30, 0.10), (0.30, 0.13), (0.28, 0.17), (0.26, 0.20), (0.254, 0.50))
 IMPOSSIBLE_RISE_M = 0.5
+LOST_RAD = 0.1  # a replayed pose that is so far from the planned one has lost it
 
 
 @cache
@@ -154,6 +160,12 @@ def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
     return found
 
 
+def best_track(found: Mapping[str, Any]) -> list[float]:
+    """Gains and torso pitch of the best run of any solver, a feasible one if there is one."""
+    runs = found["track"].values()
+    return list(min(runs, key=lambda run: (not run["feasible"], run["objective"]))["x"].values())
+
+
 def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
     """Time histories of the closed loop with given gains and torso pitch."""
     problem = track_problem(case, plan)
@@ -171,6 +183,35 @@ def printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
         "explicit_quanta": evaluate_indexes(explicit, x)["quanta_before_divergence"],
         "implicit_largest_error_rad": evaluate_indexes(implicit, x)["largest_error_rad"],
         "compensated_largest_error_rad": evaluate_indexes(compensated, x)["largest_error_rad"],
+    }
+
+
+def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[str, float]:
+    """A tracked step whose desired leg angles come from the network, against the closed form: cost and angles."""
+    problems = {kind: track_problem(case, plan, inverse_kinematics=kind) for kind in get_args(InverseKinematics)}
+    found: dict[str, float] = {}
+    angles = []
+    for kind, problem in problems.items():
+        verdict = evaluate(problem, x)
+        found |= {f"{kind} cost": verdict.objective["value"], f"{kind} feasible": float(verdict.feasible)}
+        angles.append(problem.signals(np.array(x), problem.p).arrays["q_desired"])  # type: ignore[misc]
+    error = np.abs(angles[0] - angles[1])[:, [LINKS.index(link) for leg in LEGS for link in leg]]
+    return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
+
+
+def replayed(case: int, x: list[float]) -> dict[str, float]:
+    """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
+    problem = on_stair(loaded("stairs-ideal"), case)
+    arrays = problem.signals(np.array(x), problem.p).arrays  # type: ignore[misc]
+    _, followed = replay(arrays, FEEDBACK)
+    time, fallen = replay(arrays, OPEN_LOOP)
+    off = np.maximum.accumulate(np.abs(fallen).max(axis=1))
+    return {
+        "feedback_end_rad": float(np.abs(followed[-1]).max()),
+        "open_loop_t1_rad": float(off[time <= PAPER_TIMES[0]][-1]),
+        "open_loop_t2_rad": float(off[time <= PAPER_TIMES[1]][-1]),
+        "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]),
+        "open_loop_end_rad": float(np.abs(fallen[-1]).max()),
     }
 
 

@@ -36,13 +36,17 @@ TURN_RAD = math.radians(8.0)  # the largest that the paper allows
 TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
 ZMP_FIGURES = {"fig12-13": 0.15, "fig14-15": 1.0, "fig16-17": 0.1}
 
+STEPS = (
+    2 * 3 * len(TABLE_3) + 6
+)  # three solvers at each lambda under both normalisations, and six more, the writing included
+
 
 def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
     """Write tables (Markdown, CSV), figures (PNG, SVG), joint trajectories (CSV) and ``report.md``.
 
     Args:
         out: folder; results of finished steps are kept in ``out/steps`` and used again.
-        progress: told about each step.
+        progress: told about each step, ``STEPS`` times.
 
     Raises:
         OutputError: the folder cannot be written to.

@@ -21,6 +21,7 @@ from nlp_gait.problems.gait_problem import Array, GaitProblem
 LOG = logging.getLogger("nlp_gait")
 # Of a wrong library, not of rounding: compiled and interpreted values agree to some 1e-12.
 CHECK_TOLERANCE = 1e-6
+CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
 # A second thread takes part once it has this much to do; handing over the work costs some 0.05 ms.
 LEAST_THREAD_TIME_S = 3e-4
@@ -171,19 +172,21 @@ def _native(problem: GaitProblem, kernel: Kernel, compiler: Compiler, lanes: int
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
-    """The native kernel, if it computes at one point what the virtual machine does.
+    """The native kernel, if it computes what the virtual machine does, at most points at least.
+
+    Not at all of them: where rounding decides a jump, as in the quantised drive of a tracked step, both may be right.
 
     Raises:
         CompilerError: it does not: the compiler is broken, or not for this machine.
     """
-    x = np.random.default_rng(0).uniform(problem.lower, problem.upper)
+    X = np.random.default_rng(0).uniform(problem.lower, problem.upper, (CHECK_POINTS, len(problem.names)))
     lower, upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
-    f, violation, g = np.empty(1), np.empty(1), np.empty((1, len(lower)))
-    native(x[None], np.array(problem.p), lower, upper, f, violation, g)
-    cost, rows = (np.array(value).ravel() for value in kernel.function(x, problem.p))
-    expected, found = np.append(rows, cost), np.append(g, f)
-    scale = np.nanmax(np.abs(expected), initial=1.0, where=np.isfinite(expected))
-    if not np.allclose(found / scale, expected / scale, rtol=0.0, atol=CHECK_TOLERANCE, equal_nan=True):
+    f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(lower)))
+    native(X, np.array(problem.p), lower, upper, f, violation, g)
+    found = np.column_stack([f, g])
+    expected = np.array([np.concatenate([np.array(v).ravel() for v in kernel.function(x, problem.p)]) for x in X])
+    alike = np.isclose(found, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
+    if 2 * np.count_nonzero(alike) <= CHECK_POINTS:
         raise CompilerError(
             f"{native.library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
         )

@@ -47,10 +47,12 @@ class Compiler:
         """Compile one C++ file into a shared library.
 
         Raises:
-            CompilerError: the compiler fails or does not end in time.
+            CompilerError: the compiler fails, does not end in time, or leaves no library.
         """
         command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
         _run(command, TIME_LIMIT_S)
+        if not library.is_file():
+            raise CompilerError(f"{Path(self.command[0]).name} ended as if all were well, but wrote no library")
 
 
 def find_compiler() -> Compiler:

@@ -45,7 +45,7 @@ class Enclosure:
         source = _source(kernel.function)
         loaded, self.library = load_library(source, find_compiler(), FLAGS, SYMBOLS)
         self._enclose = loaded.nlp_gait_enclose
-        self._enclose.argtypes = [_POINTER, _INTEGER, _POINTER, _POINTER, _POINTER, ctypes.c_int, _POINTER]
+        self._enclose.argtypes = [ctypes.c_int, _POINTER, _INTEGER, _INTEGER, _INTEGER, *[_POINTER] * 4]
         loaded.nlp_gait_enclosure_bytes.restype = _INTEGER
         self._memory = np.empty(-(-int(loaded.nlp_gait_enclosure_bytes()) // 8))
         self._p = np.array(problem.p, dtype=float)
@@ -59,46 +59,53 @@ class Enclosure:
         Returns:
             (P, 2) of the cost, which is to be minimised, and (P, m, 2) of the rows.
         """
-        cost, rows = self._call(boxes, slopes=False)
+        cost, rows = self._call(0, boxes, 1, len(self.lower))
         return cost[:, 0], rows
 
-    def slopes(self, boxes: Array) -> tuple[Array, Array]:
-        """Enclosures of the derivatives: (P, n, 2) of the cost and (P, m, n, 2) of the rows."""
-        gradient, jacobian = self._call(boxes, slopes=True)
-        count, n = boxes.shape[:2]
-        return gradient, jacobian.reshape(count, n, len(self.lower), 2).transpose(0, 2, 1, 3)
+    def gradient(self, boxes: Array) -> Array:
+        """Enclosures (P, n, 2) of the cost's derivatives over boxes (P, n, 2)."""
+        return self._call(1, boxes, boxes.shape[1], 0)[0]
 
-    def _call(self, boxes: Array, slopes: bool) -> tuple[Array, Array]:
+    def jacobian(self, boxes: Array) -> Array:
+        """Enclosures (P, m, n, 2) of the rows' derivatives over boxes (P, n, 2)."""
+        count, n = boxes.shape[:2]
+        by_column = self._call(2, boxes, n * len(self.lower), 0)[0]
+        return by_column.reshape(count, n, len(self.lower), 2).transpose(0, 2, 1, 3)
+
+    def _call(self, which: int, boxes: Array, first: int, second: int) -> tuple[Array, Array]:
+        """Outputs (P, first, 2) and (P, second, 2) of one of the compiled functions."""
         boxes = np.require(boxes, dtype=np.float64, requirements=("C", "A"))
-        ones = boxes.shape[1] if slopes else 1
-        first, second = np.empty((len(boxes), ones, 2)), np.empty((len(boxes), ones * len(self.lower), 2))
-        pointers = (array.ctypes.data for array in (self._p, first, second))
-        if self._enclose(boxes.ctypes.data, len(boxes), *pointers, int(slopes), self._memory.ctypes.data):
+        outputs = np.empty((len(boxes), first, 2)), np.empty((len(boxes), second, 2))
+        pointers = (array.ctypes.data for array in (self._p, *outputs, self._memory))
+        if self._enclose(which, boxes.ctypes.data, len(boxes), first, second, *pointers):
             raise RuntimeError("the compiled enclosure reported a failure")
-        return first, second
+        return outputs
 
 
 def _source(kernel: ca.Function) -> str:
     """C++ source of the kernel (x, p) to cost and g, and of its derivatives, over intervals."""
     x, p = kernel.mx_in()
     cost, g = kernel.call([x, p], True, False)
-    slopes = [ca.densify(ca.jacobian(value, x)) for value in (cost, g)]
     generator = ca.CodeGenerator("enclosure", {"casadi_real": "Interval"})
-    generator.add(ca.Function("range", [x, p], [ca.densify(cost), ca.densify(g)]))
-    generator.add(ca.Function("slope", [x, p], slopes))
+    for name, outputs in (
+        ("values", [cost, g]),
+        ("gradient", [ca.jacobian(cost, x)]),
+        ("jacobian", [ca.jacobian(g, x)]),
+    ):
+        generator.add(ca.Function(name, [x, p], [ca.densify(output) for output in outputs]))
     generated = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
     # A square is not the product of two independent intervals.
     generated = re.sub(r"\bcasadi_real casadi_sq\(.*", "", generated)
     generated = re.sub(r"\bcasadi_sq\(", "squared(", generated)
     native = files("nlp_gait.backends") / "native"
-    sizes = {"VARIABLES": x.shape[0], "PARAMETERS": p.shape[0], "ROWS": g.shape[0]}
     return "\n".join(
         [
             "#include <initializer_list>",
             (native / "intervals.hpp").read_text(encoding="utf-8"),
             "#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of intervals.hpp",
             generated,
-            *(f"#define {name} {size}" for name, size in sizes.items()),
+            f"#define VARIABLES {x.shape[0]}",
+            f"#define PARAMETERS {p.shape[0]}",
             (native / "enclosures.hpp").read_text(encoding="utf-8"),
         ]
     )

@@ -6,13 +6,14 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.derivatives import WORTHWHILE_STARTS, compiled_nlp
+from nlp_gait.backends.derivatives import WORTHWHILE_STARTS, compiled_nlp, one_direction_at_a_time
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
@@ -160,7 +161,7 @@ class Ipopt:
         create_s: time to generate derivatives and solvers, and to compile them [s].
     """
 
-    def __init__(self, model: NlpModel, settings: IpoptSettings) -> None:
+    def __init__(self, model: NlpModel, settings: IpoptSettings, *, long_derivatives: bool = False) -> None:
         started = time.perf_counter()
         self.linear_solver = linear_solver(settings.linear_solver)
         self._time_limit_s = settings.time_limit_s
@@ -178,9 +179,11 @@ class Ipopt:
         }
         self.model = model
         self.compiled = bool(settings.compiled)
-        nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
+        one_by_one = self.compiled and long_derivatives
+        with one_direction_at_a_time() if one_by_one else nullcontext():
+            nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
         if self.compiled:
-            nlp, ready = compiled_nlp(self._cold, model.nlp)
+            nlp, ready = compiled_nlp(self._cold, model.nlp, optimise=one_by_one)
             options |= ready
             self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
         derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
@@ -275,10 +278,15 @@ def ipopt_for(problem: GaitProblem, settings: IpoptSettings, solves: int = 1) ->
     Raises:
         CompilerError: compiled functions are demanded, and there is no compiler or it fails.
     """
-    compiled = solves >= WORTHWHILE_STARTS if settings.compiled is None else settings.compiled
+    worthwhile = problem.long_derivatives or solves >= WORTHWHILE_STARTS
+    compiled = worthwhile if settings.compiled is None else settings.compiled
     chosen = replace(settings, hessian=settings.hessian or problem.hessian, compiled=compiled)
+
+    def make() -> Ipopt:
+        return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
+
     try:
-        return problem.built(f"ipopt {chosen}", lambda: Ipopt(nlp_model(problem), chosen))
+        return problem.built(f"ipopt {chosen}", make)
     except CompilerError as error:
         if settings.compiled:
             raise

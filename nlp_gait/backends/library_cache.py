@@ -17,7 +17,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -75,6 +75,7 @@ def _stored(built: Path, key: str) -> Path:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
                 copy = Path(landing) / name
                 shutil.copyfile(built, copy)
+                copy.chmod(0o600)  # whatever the user's mask is
                 os.replace(copy, folder / name)  # never written in place: another library of that name may be in use
             return folder / name
         except OSError as error:
@@ -96,7 +97,7 @@ def cache_folder() -> Path:
     base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "nlp-gait"
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        reason = _distrust(base)
+        reason = _distrust(base, stat.S_ISDIR)
     except (OSError, RuntimeError) as error:
         reason = str(error)
     if reason is None:
@@ -106,13 +107,13 @@ def cache_folder() -> Path:
     return folder
 
 
-def _distrust(folder: Path) -> str | None:
-    """Why code from this folder must not be run, or None."""
-    status = folder.lstat()
+def _distrust(path: Path, kind: Callable[[int], bool]) -> str | None:
+    """Why code from this folder or file must not be run, or None; ``kind`` tells from the mode what it should be."""
+    status = path.lstat()
     if stat.S_ISLNK(status.st_mode):
         return "it is a link"
-    if not stat.S_ISDIR(status.st_mode):
-        return "it is not a folder"
+    if not kind(status.st_mode):
+        return "it is of another kind"
     if hasattr(os, "getuid"):
         if status.st_uid != os.getuid():
             return "it belongs to another user"
@@ -148,7 +149,7 @@ def _key(source: str, compiler: Compiler, flags: Sequence[str]) -> str:
 def _load(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
     """The library if it is whole and has the functions; else None, and the file is removed if it can be."""
     try:
-        if not library.is_symlink() and library.stem.endswith(_digest(library)):
+        if _distrust(library, stat.S_ISREG) is None and library.stem.endswith(_digest(library)):
             loaded = ctypes.CDLL(str(library))
             for symbol in symbols:
                 getattr(loaded, symbol)

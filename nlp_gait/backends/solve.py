@@ -132,7 +132,10 @@ def solution_of(
 
 
 def _active(problem: GaitProblem, ipopt: Ipopt, end: End) -> tuple[ActiveConstraint, ...]:
-    """Bounds with a price: minus the multiplier is the change of the cost per unit of the bound."""
+    """Bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
+
+    Equations of the problem always hold and are left out; a variable that is fixed has a price.
+    """
     model = ipopt.model
     lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
     names = (*model.row_names, *(f"bounds[{name}]" for name in problem.names))
@@ -145,6 +148,8 @@ def _active(problem: GaitProblem, ipopt: Ipopt, end: End) -> tuple[ActiveConstra
     for i in np.argsort(-weights, kind="stable"):
         if weights[i] < PRICE_TOLERANCE:
             break
+        if i < len(lower) and lower[i] == upper[i]:
+            continue
         at_upper = slopes[i] < 0  # a higher upper bound lowers the cost, a higher lower bound raises it
         found.append(
             ActiveConstraint(

@@ -16,6 +16,8 @@ from nlp_gait.cli.compare import compare
 from nlp_gait.cli.evaluate import evaluate
 from nlp_gait.cli.export import export
 from nlp_gait.cli.list import list_problems
+from nlp_gait.cli.motions import motions
+from nlp_gait.cli.motors import motors
 from nlp_gait.cli.prices import prices
 from nlp_gait.cli.report import report
 from nlp_gait.cli.reproduce import reproduce
@@ -41,6 +43,8 @@ app.command("report")(report)
 app.command("sweep")(sweep)
 app.command("reproduce")(reproduce)
 app.command("prices")(prices)
+app.command("motions")(motions)
+app.command("motors")(motors)
 app.command("walk")(walk)
 app.command("simulate")(simulate)
 app.command("export")(export)

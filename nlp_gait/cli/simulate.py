@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @command
 def simulate(
     result: ResultFile,
+    steps: Annotated[int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
     frames_per_s: Annotated[
@@ -67,7 +68,7 @@ def simulate(
         fail("--viewer and --video exclude each other; film it in a second run")
     target = None if video is None else output_file(check_video_path(video))
     folder = None if out is None else writable_folder(out)
-    plan = plan_of(load_result(result))
+    plan = plan_of(load_result(result), steps)
     drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
     if target is not None:
         trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)

@@ -35,7 +35,9 @@ from nlp_gait.cli.common import (
 @command
 def solve(
     problem: ProblemName,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts within the bounds.")] = 20,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Random starts within the bounds (default: 20, fewer where each takes long).")
+    ] = None,
     seed: Seed = 0,
     x0: Annotated[str | None, typer.Option("--x0", help="First start, separated by commas.")] = None,
     robot: Robot = None,
@@ -62,6 +64,7 @@ def solve(
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
     first = None if x0 is None else loaded.check_x(parse_numbers(x0))
     settings = nlp_gait.IpoptSettings(linear_solver=linear_solver)
+    starts = loaded.starts if starts is None else starts
     stopped = ""
     with progress_bar("IPOPT starts", starts) as advance:
         try:

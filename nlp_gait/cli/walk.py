@@ -27,12 +27,14 @@ from nlp_gait.cli.common import (
 
 if TYPE_CHECKING:
     from compare.questions.walk import Gait
+    from nlp_gait.simulation.walking import Walk
 
 
 @command
 def walk(
     over: Annotated[
-        str, typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,...")
+        str,
+        typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,..."),
     ] = "speed_m_s=0.01:0.1:10",
     steps: Annotated[
         int, typer.Option(min=0, max=1000, help="Play so many steps of each gait in MuJoCo (extra sim); 0 plays none.")
@@ -106,9 +108,12 @@ def _print(gaits: Sequence[Gait]) -> None:
         if not gait.found.feasible:
             stdout.print(f"{name} = {gait.at:g}: {gait.found.status}", soft_wrap=True)
     walks = [(gait, gait.walk) for gait in gaits if gait.walk is not None]
-    if not walks:
-        return
-    header = (name, "fate", "walked", "of", "drift", "heading", "tilt", "tracking", "mechanical power", "model", "energy")
+    if walks:
+        _print_walks(name, walks)
+
+
+def _print_walks(name: str, walks: Sequence[tuple[Gait, Walk]]) -> None:
+    measured = ("fate", "walked", "of", "drift", "heading", "tilt", "tracking", "mechanical power", "model", "energy")
     table = []
     for gait, walk in walks:
         found = walk.measurements
@@ -129,4 +134,4 @@ def _print(gaits: Sequence[Gait]) -> None:
                 "-" if walk.energy_J_per_m is None else f"{walk.energy_J_per_m:.1f} J/m",
             )
         )
-    print_table(f"{walks[0][1].steps} steps in the physics engine, open loop", header, table)
+    print_table(f"{walks[0][1].steps} steps in the physics engine, open loop", (name, *measured), table)

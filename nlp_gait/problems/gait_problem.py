@@ -157,6 +157,8 @@ class GaitProblem:
         start: a start point (n,) for gradient methods from the parameter vector and a generator; None means uniform
             within the bounds.
         hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
+        long_derivatives: True where one solve by a gradient method pays for compiling its derivatives.
+        starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
         searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
     """
@@ -172,6 +174,8 @@ class GaitProblem:
     signals: Callable[[Array, Array], Signals] | None = None
     start: Callable[[Array, np.random.Generator], Array] | None = None
     hessian: Literal["exact", "limited-memory"] = "exact"
+    long_derivatives: bool = False
+    starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
     _built: dict[str, Any] = field(default_factory=dict, repr=False)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+import numpy as np
+
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem, Objective, Signals
 from nlp_gait.problems.nao import nao
@@ -18,7 +20,7 @@ from nlp_gait.problems.nao_cycle_motion import (
     double_support_planner,
     single_support_planner,
 )
-from nlp_gait.problems.nao_cycle_rows import WalkingCycle, joined
+from nlp_gait.problems.nao_cycle_rows import WalkingCycle, joined, start_at_speed
 from nlp_gait.problems.nao_dsp import TorsoShare, double_support_loads
 from nlp_gait.problems.nao_phase import Phase
 from nlp_gait.problems.nao_ssp import single_support_loads
@@ -66,6 +68,10 @@ def nao_cycle(
     def signals(x: Array, p: Array) -> Signals:
         return joined(cycle.signals(problem.symbols(), x, p))
 
+    def start(p: Array, rng: np.random.Generator) -> Array:
+        names = (parameter.name for parameter in problem.parameters)
+        return start_at_speed(problem.names, dict(zip(names, p.tolist(), strict=True)), rng)
+
     problem = GaitProblem(
         name="nao-cycle",
         title=f"NAO, walking cycle: least {OBJECTIVES[objective].name.replace('_', ' ')}",
@@ -76,6 +82,7 @@ def nao_cycle(
         assemble=cycle.assemble,
         refine=refine,
         signals=signals,
+        start=start if cycle.at_given_speed else None,
     )
     return problem
 

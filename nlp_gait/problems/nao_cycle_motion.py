@@ -90,18 +90,28 @@ def cycle_variables(robot: Robot) -> tuple[Variable, ...]:
             ("hip_vx", "m/s", vx.lower, vx.upper, "sagittal velocity"),
             ("hip_vy", "m/s", vy.lower, vy.upper, "lateral velocity"),
             ("hip_vz", "m/s", vz.lower, vz.upper, "vertical velocity"),
-            ("arm_swing", "rad", -LARGEST_SWING, LARGEST_SWING, "left shoulder pitch beyond the middle, right one short of it"),
+            (
+                "arm_swing",
+                "rad",
+                -LARGEST_SWING,
+                LARGEST_SWING,
+                "left shoulder pitch beyond the middle, right one short of it",
+            ),
             ("arm_rate", "rad/s", -LARGEST_RATE, LARGEST_RATE, "rate of the arms' swing"),
         )
         for name, unit, lower, upper, what in rows:
             suffix = {"m": "m", "m/s": "m_s", "rad": "rad", "rad/s": "rad_s"}[unit]
             found.append(
-                Variable(name=f"{name}_{switch}_{suffix}", unit=unit, lower=lower, upper=upper, description=f"{what}, {at}")
+                Variable(
+                    name=f"{name}_{switch}_{suffix}", unit=unit, lower=lower, upper=upper, description=f"{what}, {at}"
+                )
             )
     low, high = (round(share * length, 3) for share in STEP_SHARES)
     return (
         *found,
-        Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="highest point of the swing foot"),
+        Variable(
+            name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="highest point of the swing foot"
+        ),
         Variable(name=TIMES["ssp"], unit="s", lower=0.4, upper=4.0, description="from lift-off to touch-down"),
         Variable(name=TIMES["dsp"], unit="s", lower=0.2, upper=2.0, description="from touch-down to the next lift-off"),
         Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot"),
@@ -112,7 +122,9 @@ def cycle_from(x: SX) -> Cycle:
     """Cycle of the decision variables (20,)."""
     first, second = (State(s[:3], s[3:6], s[6], s[7]) for s in (x[:8], x[8:16]))
     lift, single, double, step = vertsplit(x[16:])
-    return Cycle(first, second, lift, fmax(single, LEAST_DURATION), fmax(double, LEAST_DURATION), fmax(step, LEAST_STEP))
+    return Cycle(
+        first, second, lift, fmax(single, LEAST_DURATION), fmax(double, LEAST_DURATION), fmax(step, LEAST_STEP)
+    )
 
 
 def single_support_planner(robot: Robot) -> Planner:

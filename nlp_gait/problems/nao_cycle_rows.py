@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -97,7 +98,7 @@ class WalkingCycle:
         step = point[SPEED] * (point[TIMES["ssp"]] + point[TIMES["dsp"]])
         return replace(point, x=ca.vertcat(point.x, step), positions=self._positions(point))
 
-    def _positions(self, point: Point) -> Mapping[str, tuple[str, int]]:
+    def _positions(self, point: Point) -> Mapping[str, tuple[Literal["x", "p"], int]]:
         return {**point.positions, STEP: ("x", len(self.variables) - 1)}
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
@@ -123,9 +124,7 @@ class WalkingCycle:
         times = {name: ca.fmax(motion[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(motion[STEP], LEAST_STEP)
         energy = parts["ssp"].objective * times["ssp"] + parts["dsp"].objective * times["dsp"]
-        rows = [
-            replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints
-        ]
+        rows = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
         indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
@@ -187,6 +186,21 @@ class WalkingCycle:
         single, double = (phase.signals(full, values, p) for phase in self.phases.values())
         later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
         return {"ssp": single, "dsp": Signals(joints=double.joints, arrays=later)}
+
+
+def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Start point within the bounds whose times fit a step within its bounds, as far as their own bounds allow.
+
+    Args:
+        names: of the decision variables.
+        values: of the parameters, with speed and bounds.
+        rng: random generator.
+    """
+    x = rng.uniform(*(np.array([values[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
+    times = [names.index(time) for time in TIMES.values()]
+    step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
+    x[times] *= step / (values[SPEED] * x[times].sum())
+    return np.asarray(x)
 
 
 def joined(phases: Mapping[str, Signals]) -> Signals:

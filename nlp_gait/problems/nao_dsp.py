@@ -24,7 +24,6 @@ from nlp_gait.problems.nao import (
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_motion import (
-    Criterion,
     Splines,
     Trajectory,
     arm_motions,
@@ -32,8 +31,9 @@ from nlp_gait.problems.nao_motion import (
     hip_on_spline,
     motion_options,
     samples_in_interval,
-    with_motion,
 )
+from nlp_gait.problems.nao_motion_limits import Criterion, with_motion
+from nlp_gait.problems.nao_motors import motor_options, with_motors
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
@@ -70,6 +70,7 @@ def nao_dsp(
     samples_per_interval: int = 0,
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
+    motors: str = "",
 ) -> GaitProblem:
     """Double support of NAO.
 
@@ -84,6 +85,7 @@ def nao_dsp(
             cubics, 4 with splines, which would else bend between the samples.
         trajectory: of hip and arms: the paper's cubics, or more coefficients on top of them.
         objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
+        motors: what of the real motors is taken into account, separated by commas, see ``nao_motors``; nothing by default.
     """
     if torso_share not in get_args(TorsoShare):
         raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
@@ -121,13 +123,14 @@ def nao_dsp(
             "torso_share": torso_share,
             "step_length_m": step_length_m,
             **motion_options(trajectory, objective, samples),
+            **motor_options(motors),
         },
     )
 
     def arms(x: SX, s: SX) -> Mapping[str, Motion]:
         return arm_motions(x, splines, ARM_SWING, _duration(x), s)
 
-    return with_motion(problem, phase, splines, objective, arms)
+    return with_motors(with_motion(problem, phase, splines, objective, arms), phase, motors)
 
 
 class Box(NamedTuple, Generic[Side]):

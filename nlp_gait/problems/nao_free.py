@@ -101,7 +101,7 @@ class FreeMotion:
             a, b = start[name], end[name]
             hermite = cubic(a.position, b.position, a.velocity, b.velocity, duration, phase)
             moved[name] = plus(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
-        return start | moved
+        return {**start, **moved}
 
     def plan(self, x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
         """Motion of the whole robot."""
@@ -151,9 +151,9 @@ class FreeMotion:
         motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
         motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T)
         values = motion.map(n)(ca.repmat(point.x, 1, n), ca.repmat(point["reach_margin"], 1, n), table)
-        tied = _tied(values, ops)
-        torque, zmp, heights, sides = (_tied(part, ops) for part in self._instant.map(n)(tied))
-        q, qd = (self._by_joint(part) for part in ca.vertsplit(tied, len(CURVES))[:2])
+        motions = tied(values, ops)
+        torque, zmp, heights, sides = (tied(part, ops) for part in self._instant.map(n)(motions))
+        q, qd = (self._by_joint(part) for part in ca.vertsplit(motions, len(CURVES))[:2])
         samples = Samples(
             planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
             reach=ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
@@ -192,7 +192,8 @@ def free_splines(trajectory: Trajectory, first: int) -> Splines:
     return Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"), first=first)
 
 
-def _tied(values: MX, ops: Nonsmooth) -> MX:
+def tied(values: MX, ops: Nonsmooth) -> MX:
+    """A matrix of which each entry is a variable of its own to a solver (see ``Nonsmooth.tie``)."""
     return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
 
 
@@ -206,9 +207,10 @@ def joint_coefficients(signals: Signals, spans: int) -> Array:
     if spans == 0:
         return np.zeros(0)
     t, q, qd = (signals.arrays[name] for name in ("t", "q", "qd"))
-    phases = t / t[-1]
-    ends = [DM(row) for row in (q[0], q[-1], qd[0], qd[-1])]
-    straight = np.array(ca.evalf(ca.horzcat(*(cubic(*ends, t[-1], s).position for s in phases.tolist()))))
+    phases, s = t / t[-1], SX.sym("s")
+    start, end, v0, v1 = (SX(DM(row)) for row in (q[0], q[-1], qd[0], qd[-1]))
+    hermite = ca.Function("hermite", [s], [cubic(start, end, v0, v1, SX(float(t[-1])), s).position])
+    straight = np.array(hermite.map(len(phases))(DM(phases).T).full())
     columns = dict(zip(signals.joints, fitted(q - straight.T, spans, phases).T, strict=True))
     columns[YAW_PITCH] = np.mean([columns[name] for name in YAW_PITCHES], axis=0)
     return np.concatenate([columns[curve] for curve in CURVES])

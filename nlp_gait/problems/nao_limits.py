@@ -142,7 +142,7 @@ def assemble_phase(
     constraints = (
         Constraint(
             name="joint_angle",
-            labels=_labels(PLANNED_JOINTS, at_samples),
+            labels=labels(PLANNED_JOINTS, at_samples),
             unit="rad",
             scale=ANGLE_SCALE,
             value=ca.vec(samples.planned),
@@ -151,7 +151,7 @@ def assemble_phase(
         ),
         Constraint(
             name="reach",
-            labels=_labels(("left leg", "right leg"), at_samples),
+            labels=labels(("left leg", "right leg"), at_samples),
             unit="1",
             scale=REACH_SCALE,
             value=ca.vec(samples.reach),
@@ -160,7 +160,7 @@ def assemble_phase(
         ),
         Constraint(
             name="torque_change",
-            labels=_labels(JOINTS, [str(k) for k in range(n - step)]),
+            labels=labels(JOINTS, [str(k) for k in range(n - step)]),
             unit="Nm",
             scale=TORQUE_SCALE,
             value=ca.vec(change),
@@ -202,14 +202,19 @@ def assemble_phase(
 
 def _mean_power(point: Point, ops: Nonsmooth, samples: Samples) -> MX:
     """Mean electrical power by the trapezoidal rule [W] (eq. 32)."""
-    n = samples.torque.shape[1]
-    weights = np.full(n, 1.0 / (n - 1))
-    weights[[0, -1]] /= 2
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
     heat = point["heat_loss_W_per_Nm2"] * ca.sum1(samples.torque**2)
-    return (ca.sum1(mechanical) + heat) @ DM(weights)
+    return time_mean(ca.sum1(mechanical) + heat)
 
 
-def _labels(rows: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
+def time_mean(values: MX) -> MX:
+    """Means of rows (m, N + 1) over equidistant samples by the trapezoidal rule."""
+    n = values.shape[1]
+    weights = np.full(n, 1.0 / (n - 1))
+    weights[[0, -1]] /= 2
+    return values @ DM(weights)
+
+
+def labels(rows: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
     """Labels of a column-major matrix."""
     return tuple(f"{row}, {column}" for column in columns for row in rows)

@@ -123,10 +123,14 @@ class Phase:
         torque, moving_torque, zmp = self._dynamics().map(self.steps + 1)(q, qd, qdd, hip, world)
         return Samples(planned, reach, torque, qd * moving_torque, zmp)
 
+    def motions(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX, MX]:
+        """Angles of the joints that move, and both derivatives, (m, N + 1) each [rad, rad/s, rad/s^2]."""
+        q, qd, qdd, *_ = self._mapped(self._kinematics(ops), point)
+        return (q, qd, qdd) if self.derivatives == "analytic" else (q, *self._differences(q, point))
+
     def accelerations(self, point: Point, ops: Nonsmooth) -> MX:
         """(m, N + 1) of the joints that move [rad/s^2]."""
-        q, _, qdd, *_ = self._mapped(self._kinematics(ops), point)
-        return qdd if self.derivatives == "analytic" else self._differences(q, point)[1]
+        return self.motions(point, ops)[2]
 
     def sample(self, ops: Nonsmooth) -> ca.Function:
         """One sample with analytic derivatives: (x, margin, phase) to the fields of ``Samples``."""
@@ -186,7 +190,7 @@ class Phase:
         return ca.Function("kinematics", inputs, [*motion, plan.hip, planned, plan.reach, world])
 
     def _dynamics(self) -> ca.Function:
-        """One sample: torques, those of the moving joints, and ZMP, from given angles and derivatives, hip, and com with both feet."""
+        """One sample: torques, those of the moving joints, and ZMP, from angles and derivatives, hip, and com with feet."""
         _, plan = self._symbolic_plan(Exact())
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         hip, world = SX.sym("hip", 3), SX.sym("world", 9)

@@ -18,8 +18,6 @@ from nlp_gait.problems.nao import (
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
 from nlp_gait.problems.nao_motion import (
-    Criterion,
-    Heights,
     Splines,
     Trajectory,
     arm_motions,
@@ -27,8 +25,9 @@ from nlp_gait.problems.nao_motion import (
     hip_on_spline,
     motion_options,
     samples_in_interval,
-    with_motion,
 )
+from nlp_gait.problems.nao_motion_limits import Criterion, Heights, with_motion
+from nlp_gait.problems.nao_motors import motor_options, with_motors
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
@@ -65,6 +64,7 @@ def nao_ssp(
     samples_per_interval: int = 0,
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
+    motors: str = "",
 ) -> GaitProblem:
     """Single support of NAO.
 
@@ -78,6 +78,7 @@ def nao_ssp(
             cubics, 4 with splines, which would else bend between the samples.
         trajectory: of hip, swing foot and arms: the paper's cubics, or more coefficients on top of them.
         objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
+        motors: what of the real motors is taken into account, separated by commas, see ``nao_motors``; nothing by default.
     """
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
@@ -112,9 +113,10 @@ def nao_ssp(
             "rotational_inertia": rotational_inertia,
             "step_length_m": step_length_m,
             **motion_options(trajectory, objective, samples),
+            **motor_options(motors),
         },
     )
-    return with_motion(
+    moved = with_motion(
         problem,
         phase,
         splines,
@@ -122,6 +124,7 @@ def nao_ssp(
         arms=lambda x, s: arm_motions(x, splines, ARM_SWING, single_support_duration(x), s),
         foot=Heights(lambda x, s: _swing(x, stance, splines, 0.0, s).position[2], "swing_height_m"),
     )
+    return with_motors(moved, phase, motors)
 
 
 class Stance(NamedTuple):
@@ -176,7 +179,9 @@ def _swing(x: SX, stance: Stance, splines: Splines, ankle_height: float, phase: 
     """Motion of the right ankle (3,) [m]: the paper's, and the splines on it."""
     duration = single_support_duration(x)
     more = splines.motions(x, duration, phase)
-    swing = swing_foot(*map(SX, stance.swing_x), stance.swing_y, ankle_height, x[7], duration, phase)
+    swing = swing_foot(
+        SX(stance.swing_x[0]), SX(stance.swing_x[1]), stance.swing_y, ankle_height, x[7], duration, phase
+    )
     return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
 
 

@@ -16,7 +16,8 @@ from nlp_gait.problems.nao import nao
 from nlp_gait.problems.nao_free import OTHERS, FreeMotion, FreeSamples, free_splines, joint_coefficients
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables
 from nlp_gait.problems.nao_limits import assemble_phase, phase_problem
-from nlp_gait.problems.nao_motion import SPANS, SPLINE_SAMPLES, Splines, Trajectory, limit_rows
+from nlp_gait.problems.nao_motion import SPANS, SPLINE_SAMPLES, Splines, Trajectory
+from nlp_gait.problems.nao_motion_limits import HEIGHT_SCALE, limit_rows
 from nlp_gait.problems.nao_phase import Phase
 from nlp_gait.problems.nao_ssp import (
     OWN_VARIABLES,
@@ -32,7 +33,6 @@ from nlp_gait.problems.nao_ssp import (
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-HEIGHT_SCALE = 0.01  # a foot 10 mm too low counts like 1 rad of a joint
 FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
 
 

@@ -131,6 +131,14 @@ GIVEN_PARAMETERS = (  # Table III
         maximum=0.5,
     ),
 )
+REACH_MARGIN = Parameter(
+    name="reach_margin",
+    unit="1",
+    default=0.005,
+    description="knees keep 1 - cos(knee) above this: 0.1 rad",
+    minimum=1e-6,
+    maximum=0.5,
+)
 # In the order of StairPlan's fields.
 GOVERNING = (*(variable.name for variable in GOVERNING_VARIABLES), *(parameter.name for parameter in GIVEN_PARAMETERS))
 

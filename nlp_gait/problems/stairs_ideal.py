@@ -114,6 +114,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         assemble=model.assemble,
         signals=signals,
         start=start,
+        starts=3,
         searchable=False,
     )
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, NamedTuple, get_args
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array
+from nlp_gait.symbolic.leg_network import network_error
 
 Rule = Literal["gradient", "adam"]
 # Decay rates of Adam's two moments and its guard against division by zero (Kingma, Ba 2015).
@@ -47,6 +51,13 @@ class NetworkSettings:
         if not (self.rate > 0.0 and self.tolerance_m2 > 0.0):
             raise InputError(f"rate and tolerance_m2 must be > 0, got {self.rate}, {self.tolerance_m2}")
 
+    @property
+    def first_weights(self) -> Array:
+        """(4 h,) as ``leg_network.network_error`` takes them: normally distributed."""
+        rng = np.random.default_rng(self.seed)
+        inner, outer = rng.standard_normal((self.hidden, 2)), rng.standard_normal((2, self.hidden))
+        return np.concatenate([inner.ravel(order="F"), outer.ravel(order="F")])
+
 
 class NetworkPath(NamedTuple):
     """Result for m poses.
@@ -79,36 +90,27 @@ def network_angles(
         Bhardwaj et al., Algorithm 1 and eqs. (27)-(30).
     """
     settings = settings or NetworkSettings()
-    rng = np.random.default_rng(settings.seed)
-    weights = [rng.standard_normal((settings.hidden, 2)), rng.standard_normal((2, settings.hidden))]
+    training = _training(settings.hidden, thigh, shank)
+    weights = settings.first_weights
     step = _Adam(settings.rate) if settings.rule == "adam" else _Gradient(settings.rate)
     rows = []
     for target in hip_to_ankle:
         started = time.perf_counter()
         for iteration in range(settings.iterations + 1):
-            angles, error, gradients = _forward(weights, target, thigh, shank)
-            if error <= settings.tolerance_m2 or iteration == settings.iterations:
+            angles, error, gradient = training(weights, target)
+            if float(error) <= settings.tolerance_m2 or iteration == settings.iterations:
                 break
-            weights = [w - change for w, change in zip(weights, step(gradients), strict=True)]  # (eq. 30)
-        rows.append((angles, error, iteration, time.perf_counter() - started))
+            weights = weights - step(np.array(gradient).ravel())  # (eq. 30)
+        rows.append((np.array(angles).ravel(), float(error), iteration, time.perf_counter() - started))
     return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _forward(weights: list[Array], target: Array, thigh: float, shank: float) -> tuple[Array, float, list[Array]]:
-    """Absolute angles (2,), squared error (eq. 29), and its gradients by the weights."""
-    inner, outer = weights
-    hidden = 1.0 / (1.0 + np.exp(-(inner @ target)))
-    hip, knee = outer @ hidden
-    both = hip + knee
-    x = thigh * np.cos(hip) + shank * np.cos(both)  # (eq. 27)
-    z = -thigh * np.sin(hip) - shank * np.sin(both)  # (eq. 28)
-    ex, ez = x - target[0], z - target[1]
-    by_both = 2.0 * shank * (-ex * np.sin(both) - ez * np.cos(both))
-    by_hip = by_both + 2.0 * thigh * (-ex * np.sin(hip) - ez * np.cos(hip))
-    by_output = np.array([by_hip, by_both])
-    by_hidden = (outer.T @ by_output) * hidden * (1.0 - hidden)
-    gradients = [np.outer(by_hidden, target), np.outer(by_output, hidden)]
-    return np.array([hip, both]), float(ex * ex + ez * ez), gradients
+@cache
+def _training(nodes: int, thigh: float, shank: float) -> ca.Function:
+    """(weights, target) to the angles, the error and its gradient by the weights."""
+    weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
+    angles, error = network_error(weights, target, thigh, shank)
+    return ca.Function("training", [weights, target], ca.cse([angles, error, ca.gradient(error, weights)]))
 
 
 class _Gradient:
@@ -117,8 +119,8 @@ class _Gradient:
     def __init__(self, rate: float) -> None:
         self._rate = rate
 
-    def __call__(self, gradients: list[Array]) -> list[Array]:
-        return [self._rate * gradient for gradient in gradients]
+    def __call__(self, gradient: Array) -> Array:
+        return self._rate * gradient
 
 
 class _Adam:
@@ -127,19 +129,13 @@ class _Adam:
     def __init__(self, rate: float) -> None:
         self._rate = rate
         self._steps = 0
-        self._moments: list[tuple[Array, Array]] = []
+        self._first: Array | float = 0.0
+        self._second: Array | float = 0.0
 
-    def __call__(self, gradients: list[Array]) -> list[Array]:
+    def __call__(self, gradient: Array) -> Array:
         self._steps += 1
-        if not self._moments:
-            self._moments = [(np.zeros_like(g), np.zeros_like(g)) for g in gradients]
         a, b = ADAM_DECAY
-        self._moments = [
-            (a * first + (1 - a) * g, b * second + (1 - b) * g * g)
-            for (first, second), g in zip(self._moments, gradients, strict=True)
-        ]
-        unbiased_a, unbiased_b = 1 - a**self._steps, 1 - b**self._steps
-        return [
-            self._rate * (first / unbiased_a) / (np.sqrt(second / unbiased_b) + ADAM_GUARD)
-            for first, second in self._moments
-        ]
+        self._first = a * self._first + (1 - a) * gradient
+        self._second = b * self._second + (1 - b) * gradient**2
+        first, second = self._first / (1 - a**self._steps), self._second / (1 - b**self._steps)
+        return self._rate * first / (np.sqrt(second) + ADAM_GUARD)

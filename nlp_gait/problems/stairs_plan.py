@@ -20,7 +20,7 @@ from nlp_gait.problems.gait_problem import (
     Variable,
 )
 from nlp_gait.problems.stairs import STAIR_PARAMETERS, joint_signals
-from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES
+from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs_plan_rows import clearance_rows, ground_rows, phase_rows, posture_rows
 from nlp_gait.problems.stairs_plan_samples import PlannedStep, Samples
 from nlp_gait.problems.stairs_robot import load_biped
@@ -52,14 +52,7 @@ SCATTER = 0.1
 PARAMETERS = (
     *STAIR_PARAMETERS,
     *GIVEN_PARAMETERS,
-    Parameter(
-        name="reach_margin",
-        unit="1",
-        default=0.005,
-        description="knees keep 1 - cos(knee) above this: 0.1 rad",
-        minimum=1e-6,
-        maximum=0.5,
-    ),
+    REACH_MARGIN,
     Parameter(
         name="zmp_margin_m",
         unit="m",

@@ -21,10 +21,10 @@ from nlp_gait.problems.gait_problem import (
     Variable,
 )
 from nlp_gait.problems.stairs import STAIR_PARAMETERS, within
-from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES
+from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs_layout import labels
 from nlp_gait.problems.stairs_robot import load_biped
-from nlp_gait.problems.stairs_track_model import QUANTUM, ClosedLoop, N, Rollout, Scheme
+from nlp_gait.problems.stairs_track_model import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.planar_biped import LINKS
 
@@ -64,14 +64,7 @@ PARAMETERS = (
         if v.name != TORSO_PITCH
     ),
     *GIVEN_PARAMETERS,
-    Parameter(
-        name="reach_margin",
-        unit="1",
-        default=0.005,
-        description="desired knees keep 1 - cos(knee) above this",
-        minimum=1e-6,
-        maximum=0.5,
-    ),
+    REACH_MARGIN,
     Parameter(
         name="tracking_tolerance_rad",
         unit="rad",
@@ -106,7 +99,13 @@ PARAMETERS = (
 )
 
 
-def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", duration_s: float = 3.5) -> GaitProblem:
+def stairs_track(
+    *,
+    gains: Gains = "scalar",
+    scheme: Scheme = "implicit",
+    inverse_kinematics: InverseKinematics = "closed-form",
+    duration_s: float = 3.5,
+) -> GaitProblem:
     """Closed loop over one planned step.
 
     The plan is given by parameters; its torso pitch is a variable. The stance ankle is the base.
@@ -114,6 +113,8 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
     Args:
         gains: one K_p and K_d for all links as in the paper, or one for each link.
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
+        inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
+            quantum's pose within each evaluation (which makes one many times slower).
         duration_s: of the rollout, in whole quanta of 0.01 s.
 
     Raises:
@@ -122,13 +123,22 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
     Source:
         Bhardwaj et al., sections VII to X.
     """
-    for option, value, allowed in (("gains", gains, get_args(Gains)), ("scheme", scheme, get_args(Scheme))):
+    for option, value, allowed in (
+        ("gains", gains, get_args(Gains)),
+        ("scheme", scheme, get_args(Scheme)),
+        ("inverse_kinematics", inverse_kinematics, get_args(InverseKinematics)),
+    ):
         if value not in allowed:
             raise InputError(f"{option} must be one of {', '.join(allowed)}, got {value!r}")
     if not QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
     suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
-    loop = ClosedLoop(quanta=round(duration_s / QUANTUM), scheme=scheme, gains=len(suffixes))
+    loop = ClosedLoop(
+        quanta=round(duration_s / QUANTUM),
+        scheme=scheme,
+        gains=len(suffixes),
+        inverse_kinematics=inverse_kinematics,
+    )
     variables = (
         *_gain_variables("kp", "N m/rad", "K_p", suffixes),
         *_gain_variables("kd", "N m s/rad", "K_d", suffixes),
@@ -165,13 +175,19 @@ def stairs_track(*, gains: Gains = "scalar", scheme: Scheme = "implicit", durati
     problem = GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
-        options={"gains": gains, "scheme": scheme, "duration_s": duration_s},
+        options={
+            "gains": gains,
+            "scheme": scheme,
+            "inverse_kinematics": inverse_kinematics,
+            "duration_s": duration_s,
+        },
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
         assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
         start=start,
-        hessian="limited-memory",  # as many iterations as with the exact one, each at a fifth of its time
+        starts=2,
+        long_derivatives=True,
         signals=signals,
     )
     return problem

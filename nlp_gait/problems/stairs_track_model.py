@@ -14,6 +14,7 @@ from casadi import DM, MX, SX
 from nlp_gait.problems.gait_problem import Point
 from nlp_gait.problems.stairs import GRAVITY, SETBACK, stair_of
 from nlp_gait.problems.stairs_governing import GOVERNING, governing, plan_of
+from nlp_gait.problems.stairs_learned_path import learned
 from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -31,6 +32,7 @@ from nlp_gait.symbolic.stair_posture import posture
 from nlp_gait.symbolic.stair_profile import Stair, stair_height
 
 Scheme = Literal["implicit", "explicit"]
+InverseKinematics = Literal["closed-form", "network"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
@@ -66,11 +68,13 @@ class ClosedLoop:
         quanta: number of steps of the rollout.
         scheme: of the quantised dynamics.
         gains: number of different K_p, and of different K_d: 1 or one for each link.
+        inverse_kinematics: where the desired angles of both legs come from.
     """
 
     quanta: int
     scheme: Scheme
     gains: int
+    inverse_kinematics: InverseKinematics = "closed-form"
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
         """States, torques and ZMP.
@@ -85,6 +89,8 @@ class ClosedLoop:
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
         desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        if self.inverse_kinematics == "network":
+            desired = learned(desired)
         constants = ca.vertcat(
             size,
             *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),

@@ -20,6 +20,7 @@ MOTOR = ("make", "gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_to
 FOOT = ("link", "ankle_height_m", "front_m", "back_m", "left_m", "right_m", "sole_polygon_m")
 SIDES = ("left", "right")
 LONGEST_NAME = 100
+LARGEST_NUMBER = 1e9  # in the unit of its field: beyond what any robot has, and its squares stay finite
 
 
 def check_keys(raw: Mapping[str, Any], source: str) -> None:

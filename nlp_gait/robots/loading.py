@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from nlp_gait.errors import RobotDataError, unknown
 from nlp_gait.files import read_json
-from nlp_gait.robots.fields import check_keys
+from nlp_gait.robots.fields import LARGEST_NUMBER, check_keys
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.perturbation import perturbed, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot
@@ -22,7 +22,6 @@ from nlp_gait.robots.urdf import urdf_record
 
 SCHEMA = 1
 LONGEST_CHAIN = 8  # of robots that extend each other
-LARGEST_NUMBER = 1e9  # in the unit of its field; beyond what any robot has, and squares of it stay finite
 
 T = TypeVar("T")
 

@@ -78,6 +78,30 @@ class Motor:
             if not getattr(self, name) > 0.0:
                 raise RobotDataError(f"motor {self.make!r}: {name} must be > 0, got {getattr(self, name)}")
 
+    @property
+    def stall_torque_Nm(self) -> float:
+        """At the joint, the gear without loss [Nm]."""
+        return self.gear_ratio * self.stall_torque_mNm / 1000.0
+
+    @property
+    def continuous_torque_Nm(self) -> float:
+        """At the joint, the gear without loss [Nm]."""
+        return self.gear_ratio * self.continuous_torque_mNm / 1000.0
+
+    @property
+    def no_load_rad_s(self) -> float:
+        """At the joint [rad/s]."""
+        return self.no_load_rpm * 2.0 * math.pi / 60.0 / self.gear_ratio
+
+    @property
+    def heat_W_per_Nm2(self) -> float:
+        """Heat of the winding for each squared torque at the joint, R / (k_t gear)^2 [W/(Nm)^2].
+
+        With torque k_t I, stall torque k_t V / R and no-load speed V / k_t that is no-load speed / stall torque, at the joint:
+        the voltage V drops out. Friction, and the winding's growing resistance when it is warm, are left out.
+        """
+        return self.no_load_rad_s / self.stall_torque_Nm
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:

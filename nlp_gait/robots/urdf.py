@@ -6,6 +6,7 @@ The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
+from nlp_gait.robots.fields import LARGEST_NUMBER
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -141,6 +143,8 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
         return 0.0, frame[:3, 3], np.zeros((3, 3))
     if inertial.mass is None or inertial.inertia is None:
         raise RobotDataError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
+    if not _sound([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
+        raise RobotDataError(f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}")
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
@@ -163,6 +167,8 @@ def _joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> di
         raise RobotDataError(
             f"joint {joint.name!r}: <limit> must give effort and velocity, and lower and upper if revolute"
         )
+    if not _sound(joint.axis or ()):
+        raise RobotDataError(f"joint {joint.name!r}: <axis> must hold finite numbers within {LARGEST_NUMBER:g}, got {joint.axis}")
     frame, parent = frames[joint.child], carriers[joint.parent]
     limits = [limit.lower, limit.upper] if joint.type == "revolute" else [-math.pi, math.pi]
     return {
@@ -181,12 +187,17 @@ def _pose(origin: Any, owner: str) -> Array:
     pose = np.eye(4)
     if origin is None:
         return pose
-    if not np.isfinite([*(origin.rpy or ()), *(origin.xyz or ())]).all():
+    if not _sound([*(origin.rpy or ()), *(origin.xyz or ())]):
         raise RobotDataError(f"{owner}: <origin> must hold finite numbers, got xyz {origin.xyz}, rpy {origin.rpy}")
     roll, pitch, yaw = origin.rpy or (0.0, 0.0, 0.0)
     pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
     pose[:3, 3] = origin.xyz or (0.0, 0.0, 0.0)
     return pose
+
+
+def _sound(numbers: Sequence[float]) -> bool:
+    """Whether all are finite, and no larger than a robot's are."""
+    return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
 
 
 def _turn(axis: int, angle: float) -> Array:

@@ -54,11 +54,11 @@ class Drive:
             return joint.torque_limit_Nm
         if self.torque_limits == "stall":
             return stall_torque(joint)
-        return joint.motor.gear_ratio * joint.motor.continuous_torque_mNm / 1000.0
+        return joint.motor.continuous_torque_Nm
 
 
 def stall_torque(joint: Joint) -> float:
     """Torque of a joint with its motor at stall and a gear without loss [Nm]; the stated limit if no motor is known."""
     if joint.motor is None:
         return joint.torque_limit_Nm
-    return joint.motor.gear_ratio * joint.motor.stall_torque_mNm / 1000.0
+    return joint.motor.stall_torque_Nm

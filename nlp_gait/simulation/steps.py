@@ -31,9 +31,7 @@ def walk(cycle: Signals, robot: Robot, steps: int) -> Signals:
     parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
     return Signals(
         joints=cycle.joints,
-        arrays={
-            name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]
-        },
+        arrays={name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]},
     )
 
 
@@ -62,10 +60,8 @@ def _moved(signals: Signals, distance: float, delay: float) -> dict[str, Array]:
     """Arrays with all positions moved forward [m] and all times delayed [s]."""
     arrays = {}
     for name, array in signals.arrays.items():
-        shift = np.zeros(array.shape[1:])
-        if name == "t":
-            shift = np.float64(delay)
-        elif name not in JOINT_ARRAYS:
-            shift[0] = distance
-        arrays[name] = array + shift
+        if name in JOINT_ARRAYS:
+            arrays[name] = array
+        else:
+            arrays[name] = array + (delay if name == "t" else distance * np.eye(1, array.shape[1])[0])
     return arrays

@@ -70,7 +70,7 @@ def _walked(base: V, along: Callable[[str], V]) -> dict[str, V]:
 
 
 def _couplings(rods: Mapping[str, Rod]) -> np.ndarray:
-    """(9, 9) masses times arms [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, u the directions."""
+    """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
     arms = _walked(np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)])
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
     return middles.T @ np.diag([rods[link].mass for link in LINKS]) @ middles
@@ -99,7 +99,9 @@ def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angle
     middles = centres(points(rods, angles, SX(2, 1)))
     kinetic, potential, couplings = SX(0), SX(0), _couplings(rods)
     for i, link in enumerate(LINKS):
-        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])  # (eqs. 36, 37)
+        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + 0.5 * couplings[i, i] * ca.sumsqr(
+            velocities[i]
+        )  # (eqs. 36, 37)
         for j in range(i):
             if couplings[i, j] != 0.0:
                 kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])

@@ -11,7 +11,6 @@ from casadi import SX
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, implicit_equations
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
 
-
 # A link that turns by a radian within a quantum is not resolved by it: there this power of its turn brakes it as much as its
 # own inertia. At the rates of a gait, a tenth of that, the brake is 1e-8 of the inertia.
 BRAKE_POWER = 8

@@ -22,6 +22,8 @@ _NEWTON_STEPS = 6
 _LEAST_CYCLOID_ARGUMENT = 1e-15
 # Keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2].
 _LEAST_ROOT_SQUARED = 1e-6
+# Time passes t3 only in plans whose knots are out of order; by more than this it does not drive the hip further [s].
+_LATEST = 1.0
 
 
 class StairPlan(NamedTuple):
@@ -175,7 +177,7 @@ def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX) -> SX:
     fading = ca.exp(-rate * plan.t3)
     ahead = (end - start * fading) / (1 - fading**2)
     behind = (start - end * fading) / (1 - fading**2)
-    x = particular(t) + ahead * ca.exp(rate * (t - plan.t3)) + behind * ca.exp(-rate * t)
+    x = particular(t) + ahead * ca.exp(rate * ca.fmin(t - plan.t3, _LATEST)) + behind * ca.exp(-rate * t)
 
     arc = 2 * ca.atan2(stair.rise, stair.tread)
     radius = stair.tread / ca.sin(arc)

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from compare.statistics.distribution import band, ecdf, performance_profile
+from compare.statistics.distribution import ECDF_TARGETS, band, ecdf, performance_profile
 from compare.statistics.intervals import bootstrap_interval
-from compare.statistics.run_length import Weighting, curve, expected_running_time, relative_gap
+from compare.statistics.rank_sum_normal import rank_sum_normal
+from compare.statistics.run_length import (
+    TARGETS,
+    Curve,
+    Weighting,
+    best_known,
+    curve,
+    expected_running_time,
+    relative_gap,
+)
 from compare.statistics.tests import a12, holm, rank_sum, signed_rank
 from nlp_gait.problems.gait_problem import Objective
 from tests.compare.records import record
@@ -145,3 +155,140 @@ def test_bootstrap_interval() -> None:
     assert bootstrap_interval([[3.0]], lambda x: float(x[0])) == (3.0, 3.0)
     low, high = bootstrap_interval([[1.0, math.inf]], lambda x: float(np.max(x)))
     assert (low, high) == (1.0, math.inf)
+
+
+def test_targets_are_what_the_documentation_says() -> None:
+    assert TARGETS == (1e-2, 1e-3, 1e-4, 1e-6)
+    assert (len(ECDF_TARGETS), ECDF_TARGETS[0], ECDF_TARGETS[-1]) == (31, 1.0, pytest.approx(1e-6))
+    assert np.diff(np.log10(ECDF_TARGETS)) == pytest.approx(np.full(30, -0.2))
+
+
+def test_default_weights_are_one_evaluation_each() -> None:
+    """A kind of call without a weight of its own is charged, not forgotten."""
+    weights = Weighting(f=None, g=None).of_kind(2)  # type: ignore[arg-type]
+    assert weights == {"f": 1.0, "g": 1.0, "gradient": 3.0, "jacobian": 3.0, "hessian": 6.0}
+
+
+def test_best_known_is_the_best_that_the_judge_accepts() -> None:
+    records = [
+        record("pso", run, [(10, value)], feasible=run != 2) for run, value in enumerate((12.0, 11.0, 9.0, 13.0))
+    ]
+    assert best_known(records, POWER) == 11.0
+    assert best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
+    assert math.isnan(best_known(records[2:3], POWER)) and math.isnan(best_known([], POWER))
+
+
+def test_total_cost_of_a_run() -> None:
+    found = curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
+    assert (found.total(), found.total("seconds")) == (30.0, pytest.approx(0.3))
+    nothing = np.empty(0)
+    failed = Curve(evaluations=nothing, seconds=nothing, gap=nothing)
+    assert (failed.total(), failed.total("seconds"), failed.reached(1.0)) == (0.0, 0.0, math.inf)
+    assert found.evaluations.dtype == found.gap.dtype == found.seconds.dtype == float
+
+
+def test_a_history_of_nothing_feasible_is_a_curve_without_a_gap() -> None:
+    empty = curve(record("pso", 0, [(10, None), (20, None)]), POWER, 10.0, Weighting())
+    assert np.isposinf(empty.gap).all()
+
+
+def test_statistics_are_frozen_and_take_keywords_only() -> None:
+    found = curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())
+    test = rank_sum_normal([1.0], [2.0])
+    for value, name in ((Weighting(), "f"), (found, "gap"), (test, "z")):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, name, 0.0)
+        with pytest.raises(TypeError):
+            type(value)(1.0)
+    assert found != curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())  # by identity: arrays have no truth
+    assert not hasattr(test, "__dict__")
+
+
+def test_unequal_lengths_are_refused() -> None:
+    with pytest.raises(ValueError, match="zip"):
+        expected_running_time([1.0, 2.0], [1.0])
+    with pytest.raises(ValueError, match="zip"):
+        band([np.array([1.0])], [np.array([1.0])] * 2, np.array([1.0]))
+
+
+def test_the_share_of_no_pairs_is_empty() -> None:
+    at, share = ecdf(np.array([]))
+    assert at.size == share.size == 0
+    one, half = ecdf(np.array([1.0])), ecdf(np.array([1.0, np.inf]))
+    assert (one[1].tolist(), half[1].tolist()) == ([1.0], [0.5])
+
+
+def test_performance_profile_takes_whole_numbers_and_each_instance_has_its_own_cheapest() -> None:
+    profile = performance_profile({"a": [1, 100], "b": [2, 50]})
+    assert [v.tolist() for v in profile["a"]] == [[1.0, 2.0], [0.5, 1.0]]
+    assert [v.tolist() for v in profile["b"]] == [[1.0, 2.0], [0.5, 1.0]]
+
+
+def test_band_of_four_and_five_runs_takes_the_lower_middle() -> None:
+    for count, middle in ((4, 2.0), (5, 3.0), (6, 3.0)):
+        gaps = [np.array([float(run)]) for run in range(1, count + 1)]
+        assert band([np.array([1.0])] * count, gaps, np.array([1.0]))[1].tolist() == [middle]
+
+
+def test_a_run_without_a_feasible_point_is_worse_than_any_difference() -> None:
+    """Its rank among the differences is the last, whatever the sign and the size of the costs."""
+    for shift in (-50.0, 0.0, 50.0):
+        a = [shift + value for value in (0.0, 1.0, 2.0, 3.0, 4.0)]
+        b = [shift + value for value in (5.0, 3.0, 4.5, 6.25, 4.125)]
+        # Ranks of the finite differences by size; the infeasible run of a outranks them all with the other sign: W = 6.
+        assert signed_rank([*a, math.inf], [*b, shift]) == pytest.approx(wilcoxon_p(6, 6))
+        # A pair that differs by the whole spread still ranks below it.
+        assert signed_rank([shift, shift, math.inf], [shift + 9.0, shift + 1.0, shift]) == pytest.approx(
+            wilcoxon_p(3, 3)
+        )
+
+
+def wilcoxon_p(rank_total: int, n: int) -> float:
+    """Two-sided p-value of a rank total of the rarer sign, by counting all sign patterns of n ranks."""
+    totals = [sum(rank for rank in range(1, n + 1) if pattern >> (rank - 1) & 1) for pattern in range(2**n)]
+    tail = sum(total <= min(rank_total, n * (n + 1) // 2 - rank_total) for total in totals) / 2**n
+    return min(1.0, 2.0 * tail)
+
+
+def test_rank_sum_of_values_that_are_equal_but_for_one() -> None:
+    assert rank_sum([1.0, 1.0, 1.0], [1.0, 1.0, 2.0]) == pytest.approx(
+        0.5, abs=0.02
+    )  # of 6 places of the 2, 3 are in b
+    assert rank_sum([2.0, 1.0], [1.0, 1.0]) < 1.0
+
+
+def test_rank_sum_is_two_sided() -> None:
+    """Of 70 arrangements of 4 and 4, one at either end."""
+    first, second = [1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]
+    assert rank_sum(first, second) == rank_sum(second, first) == pytest.approx(2 / 70)
+
+
+def test_holm_takes_whole_numbers_and_keeps_the_order_of_ties() -> None:
+    assert holm([1, 0]).tolist() == [1.0, 0.0]
+    assert holm([0.02] * 40).tolist() == pytest.approx([0.8] * 40)
+
+
+def test_an_infeasible_run_is_worse_among_costs_that_hardly_differ() -> None:
+    # Two differences of one sign: 2 of the 4 sign patterns are as extreme.
+    assert signed_rank([1.0, math.inf, 1.2], [1.0, 1.0, 1.1]) == pytest.approx(0.5)
+    assert signed_rank([1.1, 1.0, 1.0], [1.2, math.inf, 1.0]) == pytest.approx(0.5)
+
+
+def test_rank_sum_by_the_normal_approximation_of_equal_values() -> None:
+    assert rank_sum_normal([1.0, 1.0], [1.0]).p_less == 0.5
+
+
+def test_bootstrap_interval_is_a_quantile_of_the_resamples() -> None:
+    seen: list[float] = []
+
+    def count(x: np.ndarray) -> float:
+        assert x.dtype == float and len(x) == 3
+        seen.append(float(len(seen)))
+        return seen[-1]
+
+    assert bootstrap_interval([[1, 2, 3]], count) == (50.0, 1950.0)  # 2.5 % and 97.5 % of 2000
+    assert len(seen) == 2000
+    seen.clear()
+    assert bootstrap_interval([[1, 2, 3]], count, level=1.0) == (0.0, 1999.0)
+    sample = list(range(30))
+    assert bootstrap_interval([sample], np.mean) == bootstrap_interval([sample], np.mean)

@@ -202,7 +202,7 @@ def same_study(raw: Mapping[str, Any], settings: StudySettings) -> None:
         elif key == "schema":
             same(value, 1, key)
         else:
-            same(value, plain[key], key)
+            same(value, plain.get(key), key)
 
 
 def same_robot(raw: Mapping[str, Any], robot: Robot) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
+from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.symbolic.contact import (
     CREEP_SPEED,
     YIELD_DEPTH,
@@ -16,6 +17,9 @@ from nlp_gait.symbolic.contact import (
     implicit_equations,
     solve_definite,
 )
+from nlp_gait.symbolic.lagrange import equations_of_motion
+from nlp_gait.symbolic.planar_biped import LINKS, centres, points
+from nlp_gait.symbolic.quantised import Controller, State, after, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6
@@ -40,6 +44,44 @@ def test_a_dropped_mass_comes_to_rest_on_its_spring(mass: float) -> None:
     assert np.abs(path[2:, -50:]).max() < 1e-6
     yielding = YIELD_DEPTH * np.arctanh(mass * GRAVITY / STIFFNESS / YIELD_DEPTH)
     assert path[1, -1] == pytest.approx(-yielding, abs=1e-4)
+
+
+HELD = np.array([1.2, 1.9, 1.2, 1.9, 1.4, 0.0, 0.0, 0.0, 0.0])  # both feet side by side, flat
+TOUCHING = ("T", "S", "A", "T'", "S'", "A'")  # toe, sole and ankle of both feet
+DROP_M, HOLD = 0.05, (2000.0, 200.0)  # how high above the ground, gains that hold every link's angle
+AT_REST = 1e-6  # [m/s], [rad/s]
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in TOUCHING), TOUCHING], ids="".join)
+def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> None:
+    """On each contact point alone, and on all six; its weight is what the springs then carry."""
+    rods = load_biped().rods
+    q, v = SX.sym("q", 11), SX.sym("v", 11)  # stance ankle and nine angles: nothing is fixed
+    found = points(rods, q[2:], q[:2])
+    middles = centres(found)
+    kinetic, potential = SX(0), SX(0)
+    for i, link in enumerate(LINKS):
+        rod = rods[link]
+        kinetic += (rod.mass * ca.sumsqr(ca.jtimes(middles[link], q, v)) + rod.inertia * v[2 + i] ** 2) / 2
+        potential += rod.mass * GRAVITY * middles[link][1]
+    motion = equations_of_motion(kinetic, potential, q, v)
+    contacts = [
+        Contact(found[name][1], ca.jacobian(found[name][1], q).T, ca.jacobian(found[name][0], q).T) for name in names
+    ]
+    kp, kd = (SX([0.0, 0.0, *[gain] * 9]) for gain in HOLD)
+    control = Controller(kp, kd, SX(0))
+    aim = State(SX([0.0, 0.0, *HELD]), SX(11, 1))
+    ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
+    equations = implicit_quantum(motion, State(q, v), control, aim, contacts, ground, SX(11, 1), QUANTUM)
+    following = after(State(q, v), solve_definite(*equations), QUANTUM)
+    step = ca.Function("step", [ca.vertcat(q, v)], [ca.cse(ca.vertcat(*following))])
+    heights = ca.Function("heights", [q], [ca.vertcat(*(contact.height for contact in contacts))])
+    start = np.concatenate([[0.0, DROP_M], HELD, np.zeros(11)])
+    path = np.array(step.mapaccum(600)(start))
+    assert np.abs(path[11:, -50:]).max() < AT_REST
+    depth = -np.array(heights(path[:11, -1])).ravel()
+    carried = STIFFNESS * YIELD_DEPTH * np.tanh(np.maximum(depth, 0.0) / YIELD_DEPTH)
+    assert carried.sum() == pytest.approx(load_biped().mass_kg * GRAVITY, rel=0.05)
 
 
 def test_friction_slows_a_sliding_mass_and_holds_it() -> None:

@@ -1,0 +1,87 @@
+"""A full disk: one sentence, exit status 1, what was finished is whole and what was computed is printed."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from compare.record import read_record
+from tests.faults.processes import ROOT, in_own_mounts
+
+FULL = Path("/dev/full")
+
+
+def limited(kilobytes: int, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command line with a limit on the size of every file that it writes."""
+    limit = kilobytes * 1024
+    return subprocess.run(
+        [sys.executable, "-m", "nlp_gait", *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )
+
+
+def test_a_study_keeps_its_finished_runs_and_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    study = "walk12 --algorithms pso --runs 30 --evaluations 500 --starts 0 --jobs 1"
+    script = (
+        'mkdir "$2/small"; mount -t tmpfs -o size=48k none "$2/small"; '
+        f'"$1" -m nlp_gait compare {study} --out "$2/small/study" || code=$?; '
+        'cp -r "$2/small/study" "$2/kept"; exit $code'
+    )
+    done = in_own_mounts(script, str(tmp_path))
+    records = sorted(tmp_path.glob("kept/records/*/*.json"))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith("nlp-gait: cannot write ") and "No space left on device" in done.stderr
+    assert f"the {len(records)} runs before it are kept" in done.stderr
+    assert 3 < len(records) < 30 and all(read_record(path) for path in records)
+    assert not list(tmp_path.rglob("*.tmp*"))
+    before = {path: path.read_bytes() for path in records}
+    again = subprocess.run(
+        [sys.executable, "-m", "nlp_gait", "compare", "--resume", "--out", str(tmp_path / "kept"), "--jobs", "1"],
+        cwd=ROOT,
+    )
+    assert again.returncode == 0 and {path: path.read_bytes() for path in records} == before
+    assert len(list(tmp_path.glob("kept/records/*/*.json"))) == 30
+
+
+@pytest.mark.parametrize(
+    ("arguments", "printed"),
+    [
+        (("solve", "walk12", "--starts", "9", "--out", "{out}/best.json"), "walk12: f 0.97"),
+        (
+            ("sweep", "walk12", "--over", "step_length_m=0.1:0.12:2", "--starts", "1", "--out", "{out}"),
+            "walk12 by ipopt",
+        ),
+    ],
+    ids=["solve", "sweep"],
+)
+def test_what_was_computed_is_printed_though_it_cannot_be_written(
+    arguments: tuple[str, ...], printed: str, tmp_path: Path
+) -> None:
+    done = limited(2, *(argument.replace("{out}", str(tmp_path)) for argument in arguments))
+    assert done.returncode == 1 and printed in done.stdout
+    assert done.stderr.count("\n") == 1 and done.stderr.startswith("nlp-gait: cannot write ")
+    assert "File too large" in done.stderr
+    assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv"] == []
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_output_that_cannot_be_written_is_said(options: tuple[str, ...]) -> None:
+    with FULL.open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "nlp_gait", "evaluate", "walk12", "--x", "0.1,0.1,0.01,0.01", *options],
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")

@@ -1,0 +1,37 @@
+"""Mutated command lines end with status 0, 1 or 2 and a sentence; `python -m benchmarks.fuzz` tries more."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.commands import ended, mutated_line, workplace
+
+LINES = 120
+# Each once ended in a traceback, a hang, or an answer to another question.
+KEPT = (
+    ("report", "9" * 400),
+    ("report", "absent", "--gradient-weight", "nan"),
+    ("search", "nao-dsp", "--runs", "1000000000000", "--evaluations", "60"),
+    ("solve", "nao-ssp", "--intervals", "1000000000"),
+    ("evaluate", "nao-dsp", "--x", "1", "--set", "self=1"),
+    ("sweep", "walk12", "--over", "lambda=0:1:1000000000"),
+    ("export", "pipe.json", "--format", "csv"),
+    ("export", "result.json", "--format", "csv", "--out", "pipe.json"),
+    ("evaluate", "nao-dsp", "--x", "\ud800"),
+)
+
+
+@pytest.mark.parametrize("line", KEPT, ids=lambda line: " ".join(line)[:60].encode("ascii", "replace").decode())
+def test_lines_that_once_did_harm(line: tuple[str, ...], tmp_path: Path) -> None:
+    with workplace(tmp_path):
+        assert ended(line) == "refused"
+
+
+def test_mutated_lines(tmp_path: Path) -> None:
+    rng = random.Random(0)
+    with workplace(tmp_path):
+        for line in [mutated_line(rng) for _ in range(LINES)]:
+            assert ended(line) in ("accepted", "refused"), (line, ended(line))

@@ -1,0 +1,152 @@
+"""A user's own words on the terminal, in reports and in figures: shown, never obeyed."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+
+from compare.figures import inline_svg, new_figure, style, svg_text
+from compare.manifest import Manifest, Session
+from compare.report.writing import document_of, html, markdown_page
+from compare.settings import SolverSpec, StudySettings
+from compare.task import ProblemSpec
+from nlp_gait.cli import common
+from nlp_gait.cli.common import PlainConsole, harmless
+from nlp_gait.robots import load_robot
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import free_model
+from tests.compare.records import study
+
+SCRIPT = "<script>alert(1)</script>"
+QUOTED = "\"><img src=x onerror='alert(1)'>"
+MARKED = f"{SCRIPT}{QUOTED}[link](javascript:alert(1)) | `x` \x1b[31m"
+
+
+class Page(HTMLParser):
+    """Tags and attributes of a page, and its text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str | None]] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += attrs
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def hostile_report() -> tuple[Page, str]:
+    """Report of a study in which every text that a user or a file can bring in holds markup."""
+    records = []
+    for record in study():
+        definition = json.loads(json.dumps(record.definition))
+        definition["problem"] = {"name": "walk", "options": {"robot": f"{MARKED}.json"}, "parameters": {MARKED: 1.0}}
+        records.append(
+            replace(
+                record,
+                definition=definition,
+                settings={"kind": MARKED, MARKED: 1},
+                status=MARKED,
+                verdict=replace(record.verdict, violated=(MARKED,), indexes={MARKED: 1.0}),
+                active_constraints=tuple(replace(a, name=MARKED, unit=MARKED) for a in record.active_constraints),
+            )
+        )
+    session = Session(
+        command=f"nlp-gait compare --out '{MARKED}'",
+        started=MARKED,
+        machine={"processor": MARKED, MARKED: "x"},
+        versions={MARKED: MARKED},
+        kernel=MARKED,
+        jobs=MARKED,
+    )
+    settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(algorithm=MARKED),))
+    document = document_of(records, Manifest(settings=settings, sessions=(session,)))
+    page = Page()
+    page.feed(html(document, ["<svg ></svg>"] * sum(len(section.figures) for section in document.sections)))
+    return page, markdown_page(document)
+
+
+def test_a_report_shows_markup_and_does_not_obey_it() -> None:
+    page, markdown = hostile_report()
+    assert page.tags.count("script") == 1  # the page's own, which sorts tables
+    assert "img" not in page.tags
+    assert not [name for name, _ in page.attributes if name.startswith("on")]
+    assert not [value for _, value in page.attributes if value and "javascript:" in value]
+    assert SCRIPT in page.text and QUOTED in page.text
+    outside_of_figures = [line for line in markdown.splitlines() if not line.startswith("![")]
+    assert not [line for line in outside_of_figures if re.search(r"<script|<img|(?<!\\)\]\(", line)]
+    assert r"\[link\](javascript" in markdown
+
+
+def test_text_in_figures_is_escaped() -> None:
+    with style():
+        figure = new_figure()
+        figure.subplots().set_xlabel(f"{SCRIPT} {QUOTED}")
+        svg = svg_text(figure)
+    root = ElementTree.fromstring(svg)
+    assert not [element for element in root.iter() if element.tag.endswith(("script", "img"))]
+    page = Page()
+    page.feed(inline_svg(svg, "f1", "figure 1"))
+    assert "script" not in page.tags and "img" not in page.tags and SCRIPT in page.text
+
+
+def test_names_of_robots_are_escaped_in_models() -> None:
+    robot = replace(load_robot("nao-v5"), name=f"{QUOTED}{SCRIPT}&")
+    root = ElementTree.fromstring(free_model(robot, {}, Drive(), 9.81))
+    assert root.get("model") == f"{QUOTED}{SCRIPT}&"
+    assert not list(root.iter("script"))
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("[red]x[/red] [/]", "[red]x[/red] [/]"),
+        ("\x1b]0;title\x07\x1b[2J", r"\x1b]0;title\x07\x1b[2J"),
+        ("a\rb\x08", r"a\rb\x08"),
+        ("\u202eevil", r"\u202eevil"),
+        ("half \ud800", r"half \ud800"),
+        ("gr\u00f6\u00dfer 10\u207b\u2076\n", "gr\u00f6\u00dfer 10\u207b\u2076\n"),
+    ],
+)
+def test_the_terminal_shows_control_characters_and_markup(text: str, shown: str) -> None:
+    assert harmless(text) == shown
+    out = io.StringIO()
+    console = PlainConsole(file=out, markup=False, highlight=False, force_terminal=True, width=200)
+    console.print(text, soft_wrap=True, end="")
+    assert out.getvalue() == shown
+
+
+def test_tables_and_errors_show_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    out = io.StringIO()
+    console: Console = PlainConsole(file=out, markup=False, highlight=False, width=200)
+    monkeypatch.setattr(common, "stdout", console)
+    monkeypatch.setattr(common, "stderr", console)
+    common.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
+    with pytest.raises(common.typer.Exit):
+        common.fail("no file 'a\x1b[31m\nb'")
+    text = out.getvalue()
+    assert "\x1b" not in text and "\x07" not in text
+    for part in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"):
+        assert part in text
+    assert text.endswith("nlp-gait: no file 'a\\x1b[31m b'\n")
+
+
+def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
+    out = io.StringIO()
+    monkeypatch.setattr(common, "stderr", PlainConsole(file=out, force_terminal=True, width=200))
+    with common.progress_bar("[/] runs\x1b[2J", 2) as advance:
+        advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
+    assert "[/] runs" in out.getvalue() and "\x1b[2J" not in out.getvalue()
+    assert "torque_change[LKneePitch, 3]" in out.getvalue()

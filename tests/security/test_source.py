@@ -1,0 +1,92 @@
+"""What the packages' source must not hold: code that is made from data, and shells that are given a user's words."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("nlp_gait", "metaheuristics", "compare")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+# Modules that turn data into objects or code.
+BANNED_MODULES = ("pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal", "yaml", "jsonpickle", "joblib.numpy_pickle")
+BANNED_CALLS = ("eval", "exec", "compile", "__import__", "os.system", "os.popen", "os.execv", "pty.spawn", "joblib.load", "tempfile.mktemp")
+
+
+def dotted(node: ast.expr) -> str:
+    """``a.b.c`` of a name or an attribute; empty for anything else."""
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        stem = dotted(node.value)
+        return f"{stem}.{node.attr}" if stem else ""
+    return ""
+
+
+def faults(text: str) -> Iterator[str]:
+    """What is banned in a source, with its line."""
+    for node in ast.walk(ast.parse(text)):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
+        for name in names:
+            if any(name == banned or name.startswith(f"{banned}.") for banned in BANNED_MODULES):
+                yield f"line {node.lineno}: import of {name}"  # type: ignore[attr-defined]
+        if not isinstance(node, ast.Call):
+            continue
+        called = dotted(node.func)
+        if called in BANNED_CALLS:
+            yield f"line {node.lineno}: call of {called}"
+        for keyword in node.keywords:
+            given = keyword.value.value if isinstance(keyword.value, ast.Constant) else None
+            if keyword.arg == "shell" and given is not False:
+                yield f"line {node.lineno}: a shell"
+            if keyword.arg == "allow_pickle" and given is not False:
+                yield f"line {node.lineno}: allow_pickle"
+        if called.startswith("subprocess.") and node.args and isinstance(node.args[0], (ast.Constant, ast.JoinedStr)):
+            yield f"line {node.lineno}: a command as one text"
+
+
+def loads_arrays(text: str) -> Iterator[int]:
+    """Lines that read NumPy archives without saying that they hold no objects."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call) and dotted(node.func) == "np.load":
+            if not any(keyword.arg == "allow_pickle" for keyword in node.keywords):
+                yield node.lineno
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_no_code_is_made_from_data(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert not list(faults(text))
+    assert not list(loads_arrays(text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import pickle",
+        "from yaml import load",
+        "from joblib import numpy_pickle",
+        "eval('1')",
+        "exec(text)",
+        "os.system(f'c++ {name}')",
+        "subprocess.run(command, shell=True)",
+        "subprocess.run(command, shell=chosen)",
+        "subprocess.run('c++ source.cpp')",
+        "np.load(path, allow_pickle=True)",
+    ],
+)
+def test_the_scan_finds(text: str) -> None:
+    """The test above stands on it."""
+    assert list(faults(text))
+
+
+def test_the_scan_knows_what_is_allowed() -> None:
+    assert not list(faults("subprocess.run([compiler, name], shell=False)\nmodel.eval(1)\nre.compile('a')"))
+    assert list(loads_arrays("np.load(path)")) and not list(loads_arrays("np.load(path, allow_pickle=False)"))

@@ -1,0 +1,95 @@
+"""Files that are written: by this process alone, under their own name, through no link."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from compare.figures import save
+from nlp_gait.errors import OutputError
+from nlp_gait.export.signals import write_npz
+from nlp_gait.export.video import write_video
+from nlp_gait.files import new_file, write_text
+from nlp_gait.problems.gait_problem import Signals
+
+
+def test_a_link_is_replaced_not_followed(tmp_path: Path) -> None:
+    theirs = tmp_path / "theirs.txt"
+    theirs.write_text("untouched")
+    link = tmp_path / "ours.txt"
+    link.symlink_to(theirs)
+    write_text(link, "new")
+    assert theirs.read_text() == "untouched"
+    assert not link.is_symlink() and link.read_text() == "new"
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".gif", ".png"])
+def test_no_writer_follows_a_link(tmp_path: Path, suffix: str) -> None:
+    theirs, link = tmp_path / "theirs", tmp_path / f"ours{suffix}"
+    theirs.write_text("untouched")
+    link.symlink_to(theirs)
+    if suffix == ".npz":
+        write_npz(link, Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}))
+    elif suffix == ".gif":
+        write_video(link, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0)
+    else:
+        save(Figure(figsize=(1, 1)), link.with_suffix(""))
+    assert theirs.read_text() == "untouched"
+    assert not link.is_symlink() and link.stat().st_size > 0
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_dangling_link_makes_no_file_elsewhere(tmp_path: Path) -> None:
+    link = tmp_path / "ours.txt"
+    link.symlink_to(tmp_path / "nowhere")
+    write_text(link, "new")
+    assert not (tmp_path / "nowhere").exists() and link.read_text() == "new"
+
+
+def test_the_temporary_file_is_new_and_cannot_be_guessed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flags: list[int] = []
+    opened = os.open
+
+    def watched(path: object, how: int, *rest: int) -> int:
+        flags.append(how)
+        return opened(path, how, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(os, "open", watched)
+    names = set()
+    for _ in range(2):
+        with new_file(tmp_path / "a.txt") as temporary:
+            names.add(temporary.name)
+    assert len(names) == 2
+    assert all(how & os.O_EXCL and how & os.O_CREAT for how in flags)
+
+
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600)])
+def test_files_have_the_permissions_that_the_user_gives(tmp_path: Path, mask: int, mode: int) -> None:
+    before = os.umask(mask)
+    try:
+        write_text(tmp_path / "a.txt", "x")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == mode
+
+
+def test_a_device_a_pipe_or_a_folder_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "device").symlink_to("/dev/null")
+    for name in ("pipe", "folder", "device"):
+        with pytest.raises(OutputError, match=rf"cannot write .*{name}': it is (no regular file|a folder)"):
+            write_text(tmp_path / name, "x")
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode) and (tmp_path / "device").is_symlink()
+
+
+def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(OutputError, match="cannot write"):
+        write_text(tmp_path / "a.txt", "half a character: \ud800")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"] and (tmp_path / "a.txt").read_text() == "old"

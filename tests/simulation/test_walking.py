@@ -1,0 +1,104 @@
+"""Walks of several steps: mirrored exactly, and played in the engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.errors import InputError
+from nlp_gait.export.result import Result
+from nlp_gait.export.sampled import finely_sampled
+from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.problems.nao import nao
+from nlp_gait.simulation.steps import step_of, walk
+
+pytest.importorskip("mujoco")
+
+from nlp_gait.simulation.drive import Drive  # noqa: E402
+from nlp_gait.simulation.plan import plan_of  # noqa: E402
+from nlp_gait.simulation.playback import play  # noqa: E402
+from nlp_gait.simulation.walking import measure_walk  # noqa: E402
+
+# The least energy per metre, 19.149 J/m, to five digits; hip at lift-off, arms, hip at touch-down, arms, swing, times, step.
+CHEAPEST = (0.0019, 0.02108, 0.31, 0.09951, 0.09805, -0.01255, 0.0, 0.0)
+CHEAPEST += (0.04492, 0.0234, 0.30827, 0.09796, -0.05736, 0.02148, 0.0, 0.0, 0.015, 0.4, 0.56565, 0.07619)
+# The cycle's own numbers are continuous to rounding, and so are those of a walk.
+CONTINUITY = 1e-8
+# Samples 1 ms apart and third derivatives of 1e3 rad/s^3: 1e-9 * 1e3 / 12, with a margin.
+THIRD_ORDER = 1e-6
+STEPS = 10
+
+
+@pytest.fixture(scope="module")
+def cycle() -> Result:
+    problem = nlp_gait.load("nao-cycle")
+    return Result(problem=problem, x=problem.check_x(CHEAPEST))
+
+
+@pytest.fixture(scope="module")
+def signals(cycle: Result) -> Signals:
+    return finely_sampled(cycle)
+
+
+def jumps(values: Array, slopes: Array, t: Array) -> Array:
+    """What a trapezoid of the slopes does not explain of each change: of third order in the time between samples."""
+    return np.asarray(np.diff(values, axis=0) - np.diff(t)[:, None] * (slopes[1:] + slopes[:-1]) / 2)
+
+
+def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
+    arrays = walk(signals, nao("nao-v5", True), 4).arrays
+    t = arrays["t"]
+    assert (np.diff(t) > 0.0).all()
+    assert t[-1] == pytest.approx(4 * signals.arrays["t"][-1])
+    assert np.abs(jumps(arrays["q"], arrays["qd"], t)).max() < THIRD_ORDER
+    for name in ("hip", "left_foot", "right_foot"):
+        assert np.abs(np.diff(arrays[name], axis=0)).max() < 2e-3  # 0.4 m/s of a foot for 1 ms
+
+
+def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals: Signals) -> None:
+    arrays = walk(signals, nao("nao-v5", True), 3).arrays
+    n, step = len(signals.arrays["t"]) - 1, step_of(signals)
+    assert step == pytest.approx(0.07619)
+    np.testing.assert_allclose(arrays["q"][2 * n :], arrays["q"][: n + 1], atol=CONTINUITY)
+    np.testing.assert_allclose(arrays["hip"][n : 2 * n + 1, 1], -arrays["hip"][: n + 1, 1], atol=CONTINUITY)
+    np.testing.assert_allclose(arrays["left_foot"][-1] - arrays["left_foot"][0], (2 * step, 0, 0), atol=CONTINUITY)
+    np.testing.assert_allclose(arrays["right_foot"][-1] - arrays["right_foot"][0], (4 * step, 0, 0), atol=CONTINUITY)
+
+
+def test_ten_steps_are_walked_without_a_fall(cycle: Result) -> None:
+    plan = plan_of(cycle, STEPS)
+    trace = play(plan)
+    found = measure_walk(plan, trace, Drive(), STEPS)
+    assert trace.t[-1] == pytest.approx(plan.duration_s + 1.0, abs=0.002)
+    assert not found.measurements.fallen and found.steps_done == STEPS
+    assert found.planned_m == pytest.approx(STEPS * 0.07619)
+    assert found.walked_m is not None and found.drift_m is not None and found.heading_deg is not None
+    assert 0.8 * found.planned_m < found.walked_m < found.planned_m
+    assert abs(found.drift_m) < 0.05 and abs(found.heading_deg) < 5.0
+    assert found.measurements.largest_tilt_deg < 5.0
+    predicted = found.measurements.predicted.total_W * plan.duration_s / found.planned_m
+    assert predicted == pytest.approx(19.15, rel=0.01)
+    assert found.energy_J_per_m is not None and found.energy_J_per_m > predicted
+
+
+def test_a_fall_leaves_no_distance(cycle: Result) -> None:
+    swaying = Result(problem=cycle.problem, x=cycle.x.copy())
+    swaying.x[cycle.problem.variable_index("hip_vy_lift_off_m_s")] = 1.5  # over the edge of the foot
+    plan = plan_of(swaying, 2)
+    found = measure_walk(plan, play(plan), Drive(), 2)
+    assert found.measurements.fallen and found.steps_done <= 2
+    assert (found.walked_m, found.drift_m, found.heading_deg, found.energy_J_per_m) == (None, None, None, None)
+
+
+@pytest.mark.parametrize("steps", [0, -1, True, 1.0])
+def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int) -> None:
+    with pytest.raises(InputError, match="steps must be a whole number >= 1"):
+        walk(signals, nao("nao-v5", True), steps)
+
+
+def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(
+        InputError, match="only gaits of 'nao-cycle' can be played for several steps, got one of 'nao-ssp'"
+    ):
+        plan_of(gait("ssp optimum"), 2)
