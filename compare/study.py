@@ -136,7 +136,9 @@ def read_records(folder: Path) -> list[RunRecord]:
     try:
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     except (OSError, ValueError) as error:
-        raise InputError(f"folder {str(folder)!r} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise InputError(
+            f"folder {str(folder)!r} cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from error
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
     return [_named_alike(path, read_record(path)) for path in paths]

@@ -18,6 +18,8 @@ from nlp_gait.backends.solution import Solution
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import GaitProblem
 
+MOST_POINTS = 10_000  # of an axis
+
 
 @dataclass(frozen=True, kw_only=True)
 class Axis:
@@ -62,6 +64,8 @@ def parse_axis(text: str) -> Axis:
     try:
         if ":" in values:
             low, high, count = values.split(":")
+            if int(count) > MOST_POINTS:
+                raise InputError(f"--over takes at most {MOST_POINTS} points an axis, got {text!r}")
             numbers = np.linspace(float(low), float(high), int(count)).tolist()
         else:
             numbers = [float(value) for value in values.split(",")]

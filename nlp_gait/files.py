@@ -199,4 +199,3 @@ def _check_leaf(where: str, value: Any) -> None:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
-

@@ -21,6 +21,8 @@ from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
 BATCH = 512
 # Relative to the target: a natural enclosure wider than this is not worth a gradient.
 WIDE = 1.0
@@ -36,7 +38,7 @@ class Certificate:
 
     Attributes:
         objective: exact value of the incumbent, in the problem's sense.
-        bound: no x that the judge calls feasible has a better objective than this.
+        bound: no x within the variables' bounds that the judge calls feasible has a better objective than this.
         tolerance: relative distance of both that was asked for.
         closed: that distance was reached.
         boxes: enclosed.
@@ -124,10 +126,10 @@ def certify(
 def _assessed(enclosure: Enclosure, boxes: Array, target: float) -> tuple[Array, Array, Array]:
     """Lower bound of the cost (P,), how much each variable matters (P, n), and the boxes, of those that must be kept."""
     cost, rows = enclosure.values(boxes)
-    kept = (cost[:, 0] < target) & _may_be_feasible(enclosure, rows)
-    boxes, cost, rows = boxes[kept], cost[kept], rows[kept]
-    boxes, shrunk, smear = _contracted(enclosure, boxes)
-    kept = (boxes[..., 0] <= boxes[..., 1]).all(axis=-1)
+    kept: Flags = (cost[:, 0] < target) & _may_be_feasible(enclosure, rows)
+    cost = cost[kept]
+    boxes, shrunk, smear = _contracted(enclosure, boxes[kept])
+    kept = ~np.any(boxes[..., 0] > boxes[..., 1], axis=-1)
     boxes, cost, smear, shrunk = boxes[kept], cost[kept], smear[kept], shrunk[kept]
     if shrunk.any():
         cost[shrunk] = enclosure.values(boxes[shrunk])[0]
@@ -136,9 +138,7 @@ def _assessed(enclosure: Enclosure, boxes: Array, target: float) -> tuple[Array,
     fine = cost[:, 1] - cost[:, 0] < WIDE * abs(target)
     if fine.any():
         middle, reach = _middle_and_reach(boxes[fine])
-        slope = np.abs(enclosure.gradient(boxes[fine])).max(axis=-1)
-        with np.errstate(invalid="ignore"):  # an unbounded slope along an edge of no length
-            moves = np.where(reach > 0.0, slope * reach, 0.0)
+        moves = _moves(enclosure.gradient(boxes[fine]), reach)
         at_middle = enclosure.values(np.stack([middle, middle], axis=-1))[0]
         lowest[fine] = np.fmax(lowest[fine], _down(at_middle[:, 0] - moves.sum(axis=-1)))
         smear[fine] = np.where(np.isfinite(moves).all(axis=-1, keepdims=True), moves, smear[fine])
@@ -146,13 +146,13 @@ def _assessed(enclosure: Enclosure, boxes: Array, target: float) -> tuple[Array,
     return lowest[kept], smear[kept], boxes[kept]
 
 
-def _contracted(enclosure: Enclosure, boxes: Array) -> tuple[Array, np.ndarray[Any, np.dtype[np.bool_]], Array]:
+def _contracted(enclosure: Enclosure, boxes: Array) -> tuple[Array, Flags, Array]:
     """Boxes without the slabs in which a row's mean-value form is out of bounds; which shrank; and how rows move (P, n)."""
     middle, reach = _middle_and_reach(boxes)
     rows = enclosure.values(np.stack([middle, middle], axis=-1))[1]
     jacobian = enclosure.jacobian(boxes)
     slack = FEASIBILITY_TOLERANCE * enclosure.scales
-    moves = np.abs(jacobian).max(axis=-1) * reach[:, None, :]
+    moves = _moves(jacobian, reach[:, None, :])
     total = moves.sum(axis=-1, keepdims=True)
     lower, upper = boxes[..., 0].copy(), boxes[..., 1].copy()
     # Both one-sided forms as row <= 0: J (x - c) <= room, where the other variables take at most total - own.
@@ -169,13 +169,25 @@ def _contracted(enclosure: Enclosure, boxes: Array) -> tuple[Array, np.ndarray[A
         falling = np.where((most < 0.0) & np.isfinite(farthest), farthest, -np.inf)
         upper = np.minimum(upper, _up(middle + rising.min(axis=1)))
         lower = np.maximum(lower, _down(middle + falling.max(axis=1)))
-    straddling = np.minimum(np.abs(rows[..., 0] - enclosure.upper), np.abs(rows[..., 1] - enclosure.lower)) <= total[..., 0]
+    straddling = (
+        np.minimum(np.abs(rows[..., 0] - enclosure.upper), np.abs(rows[..., 1] - enclosure.lower)) <= total[..., 0]
+    )
     smear = (moves * straddling[..., None]).max(axis=1)
     width = reach / enclosure.problem.scale
     smear = np.where(smear.max(axis=-1, keepdims=True) > 0.0, smear, width)
-    shrunk = ((upper - lower) < (1.0 - LEAST_SHRINKAGE) * 2.0 * reach).any(axis=-1)
-    contracted = np.stack([lower, upper], axis=-1)
-    return np.where(shrunk[:, None, None] | (lower > upper).any(axis=-1)[:, None, None], contracted, boxes), shrunk, smear
+    # An empty edge shrank too.
+    shrunk: Flags = np.any((upper - lower) < (1.0 - LEAST_SHRINKAGE) * 2.0 * reach, axis=-1)
+    shrunk |= np.any(lower > upper, axis=-1)
+    contracted: Array = np.where(shrunk[:, None, None], np.stack([lower, upper], axis=-1), boxes)
+    return contracted, shrunk, smear
+
+
+def _moves(slopes: Array, reach: Array) -> Array:
+    """How far a function can move along each edge: slopes (..., n, 2), reach (..., n)."""
+    with np.errstate(invalid="ignore"):  # an unbounded slope along an edge of no length
+        steep = np.abs(slopes).max(axis=-1) * reach
+    moves: Array = np.where(reach > 0.0, steep, 0.0)
+    return moves
 
 
 def _middle_and_reach(boxes: Array) -> tuple[Array, Array]:
@@ -185,11 +197,11 @@ def _middle_and_reach(boxes: Array) -> tuple[Array, Array]:
     return middle, reach
 
 
-def _may_be_feasible(enclosure: Enclosure, rows: Array) -> Array:
+def _may_be_feasible(enclosure: Enclosure, rows: Array) -> Flags:
     """(P,) whether each row's enclosure (P, m, 2) meets its bounds, widened by the judge's tolerance."""
     slack = FEASIBILITY_TOLERANCE * enclosure.scales
     outside = (_down(rows[..., 0]) > enclosure.upper + slack) | (-_down(-rows[..., 1]) < enclosure.lower - slack)
-    possible: Array = ~outside.any(axis=-1)
+    possible: Flags = ~np.any(outside, axis=-1)
     return possible
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def multistart(
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
-        rows += steps(f"starts-{first}", inputs, lambda k=k, count=count: _batch(problem, ipopt, seed, k, count))
+        rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ipopt, seed, k, count))
         progress(count, f"{len(rows)} starts")
     x, objective, success, status, time_s = zip(*rows, strict=True)
     return Ends(

@@ -14,6 +14,8 @@ from metaheuristics.interface import Array
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.problems.gait_problem import GaitProblem
 
+MOST_CHALLENGES = 1000
+
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
@@ -40,10 +42,11 @@ class Quality:
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """The points of all runs that no other betters, each beside the least power at its own criterion.
+    """The points of all runs that no other betters, those nearest to the front beside the least power at their own criterion.
 
     Attributes:
-        points: how many.
+        points: how many no other betters.
+        solved: how many of these were solved for.
         infeasible: of these, by the judge's exact functions.
         least_excess: smallest power above the least one found at an equal criterion, relative; negative if a point betters it.
         median_excess: likewise.
@@ -52,6 +55,7 @@ class Challenge:
     """
 
     points: int
+    solved: int
     infeasible: int
     least_excess: float
     median_excess: float
@@ -95,27 +99,33 @@ def challenge(
     criterion: Criterion,
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
+    most: int = MOST_CHALLENGES,
     progress: Callable[[str], None] = lambda note: None,
 ) -> Challenge:
-    """Solve for the least power at the criterion of each point, from the point itself and from the front's nearest point.
+    """Solve for the least power at the criterion of points, from the point itself and from the front's nearest point.
+
+    Of more points than ``most``, those are taken that lie lowest over the front's straight pieces.
 
     Args:
         free: the problem without a demand on the criterion.
         criterion: beside power.
         front: the true one, as far as it is known.
         points: of searches.
+        most: solved at most for so many.
         progress: told the point.
     """
     exact = exact_model(free)
+    values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
+    lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:most]
     solved: list[FrontPoint] = []
     excess: list[float] = []
     infeasible = moved = 0
-    for point in points:
+    for point in lowest:
         power, violation = (float(v) for v in exact.function(np.array(point.x), free.p)[:2])
         if not violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue
-        near = min(front, key=lambda p, at=point.value: abs(p.value - at))
+        near = front[int(np.argmin(np.abs(values - point.value)))]
         at = min(point.value, front[-1].value)
         of_front, of_search = (point_at(free, criterion, at, np.array(start.x)) for start in (near, point))
         candidates = [p for p in (of_front, of_search) if p is not None]
@@ -129,6 +139,7 @@ def challenge(
         progress(f"{criterion.name} {point.value:.5g} {criterion.unit}")
     return Challenge(
         points=len(points),
+        solved=len(solved),
         infeasible=infeasible,
         least_excess=min(excess, default=np.inf),
         median_excess=float(np.median(excess)) if excess else np.inf,

@@ -148,9 +148,7 @@ class Speed:
     def price(self, solution: Solution) -> float:
         """See ``Criterion``: dP/dv = dP/dT dT/dv with T = way / v."""
         per_second = sum(
-            a.price
-            for a in solution.active_constraints
-            if a.name == f"bounds[{self.duration}]" and a.side == "upper"
+            a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
         )
         return -per_second * solution.x[self.duration] ** 2 / self.way_m
 

@@ -19,8 +19,8 @@ LARGEST_TRADE_OFF = 1000.0
 LEAST_POINTS = 5
 # Random starts are tried at every third point of the first, evenly spaced ones.
 CHECK_EVERY = 3
-# A point this much cheaper than the front, relative to it, changes the front.
-BETTER = 1e-6
+# Planned at least, for IPOPT: functions are worth compiling.
+SOLVES = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,9 +76,9 @@ def pareto_front(
     if points < LEAST_POINTS:
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
     free = criterion.freed(problem)
-    low, high = _ends(free, criterion, starts, seed)
+    low, high = front_ends(free, criterion, starts, seed)
     settings = IpoptSettings()
-    ipopt = ipopt_for(free, settings, 4 * points)
+    ipopt = ipopt_for(free, settings, SOLVES)
     rng = np.random.default_rng(seed)
     found: dict[float, list[Attempt]] = {}
 
@@ -88,23 +88,24 @@ def pareto_front(
         found.setdefault(at, []).append(Attempt(x0, ipopt.run(limited, x0)))
 
     def walk(order: Sequence[float], path_seed: int) -> None:
-        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=4 * points)
+        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=SOLVES)
         for at in order:
             limited = criterion.limited(free, at)
             found[at] = found.get(at, []) + path.run(limited, found.get(at, []))
             progress(f"{criterion.name} {at:.5g} {criterion.unit}")
 
     grid = np.linspace(low.value, high.value, max(LEAST_POINTS, points // 2)).tolist()
-    for end, at in ((low, grid[0]), (high, grid[-1])):
-        attempt(at, np.array(end.x))
+    for point, at in ((low, grid[0]), (high, grid[-1])):
+        attempt(at, np.array(point.x))
     for at in grid[::CHECK_EVERY]:
         for _ in range(starts):
             attempt(at, criterion.limited(free, at).start_point(rng))
         progress(f"random starts at {criterion.name} {at:.5g} {criterion.unit}")
     for at, x0 in extra:
         attempt(at, x0)
-    for order, path_seed in ((sorted({*grid, *found}), seed), (sorted({*grid, *found}, reverse=True), seed + 1)):
-        walk(order, path_seed)
+    known = sorted({*grid, *found})
+    walk(known, seed)
+    walk(known[::-1], seed + 1)
     while len(found) < points:
         at, neighbours = _largest_gap(found)
         limited = criterion.limited(free, at)
@@ -117,7 +118,7 @@ def pareto_front(
         progress(f"{criterion.name} {at:.5g} {criterion.unit}")
     walk(sorted(found), seed)
     walk(sorted(found, reverse=True), seed + 1)
-    path = Continuation(settings=settings, solves=4 * points)
+    path = Continuation(settings=settings, solves=SOLVES)
     return nondominated([p for at in sorted(found) if (p := _point(path, free, criterion, at, found[at])) is not None])
 
 
@@ -126,8 +127,8 @@ def point_at(free: GaitProblem, criterion: Criterion, least: float, x0: Array) -
     limited = criterion.limited(free, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
     settings = IpoptSettings()
-    end = ipopt_for(free, settings, 4 * LEAST_POINTS).run(limited, x0)
-    path = Continuation(settings=settings, solves=4 * LEAST_POINTS)
+    end = ipopt_for(free, settings, SOLVES).run(limited, x0)
+    path = Continuation(settings=settings, solves=SOLVES)
     return _point(path, free, criterion, least, [Attempt(x0, end)])
 
 
@@ -140,7 +141,7 @@ def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     return kept[::-1]
 
 
-def _ends(free: GaitProblem, criterion: Criterion, starts: int, seed: int) -> tuple[FrontPoint, FrontPoint]:
+def front_ends(free: GaitProblem, criterion: Criterion, starts: int, seed: int) -> tuple[FrontPoint, FrontPoint]:
     """Least power, and the point beyond which the criterion is too dear."""
     solution = solve(free, starts=2 * starts, seed=seed)
     if not solution.success:

@@ -119,9 +119,7 @@ def search_fronts(
             for budget, snapshot in zip(budgets, kept, strict=True):
                 values, powers = scale.back(np.array(snapshot["F"]).reshape(-1, 2))
                 X = np.array(snapshot["X"]).reshape(-1, len(problem.names))
-                fronts.append(
-                    SearchFront(algorithm=name, run=run, budget=budget, values=values, powers=powers, X=X)
-                )
+                fronts.append(SearchFront(algorithm=name, run=run, budget=budget, values=values, powers=powers, X=X))
             progress(f"{name}, run {run}")
     return fronts
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from compare.questions.price import STANDS, Price, Prices
 from compare.questions.steps import LENGTH, MASS, NaturalStep, natural_step
 from compare.task import ProblemSpec
 from nlp_gait.backends.continuation import Continuation, best_end
@@ -22,102 +24,12 @@ from nlp_gait.robots.perturbation import perturbed_name, quantities, split_name
 
 # A limit whose natural step changes the optimum by less than this share of it costs nothing.
 FREE = 1e-9
-# A variable that moves by less than this share of its range over a natural step stands still.
-STANDS = 1e-9
 # The check solves again this share of a natural step away, less where x* turns before, down to the smaller one.
 CHECK_SHARE, LEAST_CHECK_SHARE = 1e-3, 1e-6
 # Derivative and difference quotient agree to this, relative: where x* turns on the way the quotient is in between.
 AGREEMENT = 1e-4
 # Half-width of the central differences over rebuilt models: masses enter the objective almost linearly.
 MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
-
-
-@dataclass(frozen=True, kw_only=True)
-class Price:
-    """What a change of one quantity does to the optimum.
-
-    Attributes:
-        name: of the parameter, or of the robot's quantity.
-        unit: of the quantity; ``"1"`` for a factor.
-        value: its current value, 0 for what is added to a length.
-        slope: change of the optimal objective for each unit.
-        step: natural step [unit], and how it is said.
-        words: for example ``"1 mm"``.
-        reach: change downwards and upwards up to which x* moves along one line.
-        x: change of x* for each unit, by variable name; None where dependent bounds contradict each other.
-        resolved: the objective's slope by solving again a little lower and higher; None if that was not asked for.
-        x_error: largest difference of ``x`` and what solving again gives, in units of the largest entry; None without one.
-        one_step: change of the objective by solving again a natural step lower and higher; None where it failed.
-    """
-
-    name: str
-    unit: str
-    value: float
-    slope: float
-    step: float
-    words: str
-    reach: tuple[float, float]
-    x: Mapping[str, float] | None
-    resolved: float | None = None
-    x_error: float | None = None
-    one_step: tuple[float | None, float | None] | None = None
-
-    @property
-    def per_step(self) -> float:
-        """Change of the objective over a natural step, by the slope."""
-        return self.slope * self.step
-
-    @property
-    def error(self) -> float | None:
-        """Relative difference of the slope and what solving again gives."""
-        if self.resolved is None:
-            return None
-        return abs(self.resolved - self.slope) / max(abs(self.slope), abs(self.resolved))
-
-    def furthest(self, ranges: Mapping[str, float]) -> tuple[str, float] | None:
-        """The variable that moves furthest in units of its range, and by how much in its own unit over a natural step.
-
-        None if there is no derivative, or nothing moves.
-        """
-        moves = self.x or {}
-        name = max(moves, key=lambda variable: abs(moves[variable]) / ranges[variable], default="")
-        still = not name or abs(moves[name] * self.step) < STANDS * ranges[name]
-        return None if still else (name, moves[name] * self.step)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Prices:
-    """Answer for one problem.
-
-    Attributes:
-        problem: its name.
-        objective_name: and ``unit`` of it.
-        unit: of the objective.
-        sense: in which it is optimised.
-        objective: at the optimum.
-        x: by variable name.
-        limits: parameters with a price, dearest step first.
-        free: number of parameters without one.
-        robot: quantities of the robot, largest change first; empty if the problem has no robot to choose.
-        weak: bounds that hold without a price, or nearly hold: beyond them a derivative is one-sided.
-        dependent: active rows that follow from others.
-        residual: by which the first-order conditions are missed.
-        reason: why there are no derivatives; None if there are.
-    """
-
-    problem: str
-    objective_name: str
-    unit: str
-    sense: str
-    objective: float
-    x: Mapping[str, float]
-    limits: tuple[Price, ...]
-    free: int
-    robot: tuple[Price, ...]
-    weak: tuple[str, ...]
-    dependent: int
-    residual: float
-    reason: str | None
 
 
 class Solved(NamedTuple):
@@ -168,17 +80,17 @@ def prices(
     note("solving")
     base = solved(problem, starts, seed)
     found = base.optimum
-    limits: list[Price] = []
+    limits, free = list[Price](), 0
     robot: list[Price] = []
     if found.reason is None:
-        limits = _ranked(_parameter_prices(found))
-        limits = [price for price in limits if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
-        limits = [_checked(base, price, note, lambda d, p=price: _moved(problem, p, d)) for price in limits]
+        every = _ranked(_parameter_prices(found))
+        limits = [price for price in every if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
+        free = len(every) - len(limits)
+        limits = [_checked(base, price, note, partial(_moved, problem, price)) for price in limits]
         if isinstance(problem.options.get("robot"), str):
             robot = _ranked(_robot_prices(spec, found, note))
             robot[:checks] = [
-                _checked(base, price, note, lambda d, p=price: _with_robot(spec, p.name, p.value + d))
-                for price in robot[:checks]
+                _checked(base, price, note, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
             ]
     return Prices(
         problem=problem.name,
@@ -188,7 +100,7 @@ def prices(
         objective=found.objective,
         x=problem.by_name(found.x),
         limits=tuple(limits),
-        free=len(problem.parameters) - len(limits),
+        free=free,
         robot=tuple(robot),
         weak=found.weak,
         dependent=found.dependent,
@@ -209,11 +121,19 @@ def robot_changes(spec: ProblemSpec) -> Iterator[tuple[str, float, float, Natura
 
 
 def _parameter_prices(found: Optimum) -> list[Price]:
+    """Prices of all parameters; both bounds of a fixed variable are one, under the variable's name."""
     derivatives, problem = parameter_sensitivities(found), found.problem
-    return [
-        _price(problem, derivatives, i, q.name, q.unit, float(value), natural_step(q, float(value)))
-        for i, (q, value) in enumerate(zip(problem.parameters, problem.p, strict=True))
-    ]
+    sides = found.side[-len(problem.names) :]
+    prices = []
+    for i, (q, value) in enumerate(zip(problem.parameters, map(float, problem.p), strict=True)):
+        stem, _, end = q.name.rpartition(".")
+        name = q.name
+        if stem in problem.names and problem.value(f"{stem}.lower") == problem.value(f"{stem}.upper"):
+            if (sides[problem.variable_index(stem)] > 0) != (end == "upper"):
+                continue
+            name = stem
+        prices.append(_price(problem, derivatives, i, name, q.unit, value, natural_step(q, value)))
+    return prices
 
 
 def _robot_prices(spec: ProblemSpec, found: Optimum, note: Callable[[str], None]) -> list[Price]:
@@ -252,10 +172,15 @@ def _ranked(found: Sequence[Price]) -> list[Price]:
 
 def _moved(problem: GaitProblem, price: Price, change: float) -> GaitProblem | None:
     """The problem with a parameter changed, or None where that is not allowed."""
+    ends = [f"{price.name}.{end}" for end in ("lower", "upper")] if price.name in problem.names else [price.name]
     try:
-        return problem.with_values(**{price.name: price.value + change})
+        return problem.with_values(**dict.fromkeys(ends, price.value + change))
     except InputError:
         return None
+
+
+def _with_changed_robot(spec: ProblemSpec, price: Price, change: float) -> GaitProblem:
+    return _with_robot(spec, price.name, price.value + change)
 
 
 def _with_robot(spec: ProblemSpec, quantity: str, value: float) -> GaitProblem:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from compare.figures import new_figure, save, style
 from compare.labels import name_in_words
-from compare.questions.prices import Price, Prices
+from compare.questions.price import Price, Prices
 from nlp_gait.files import write_text
 
 if TYPE_CHECKING:

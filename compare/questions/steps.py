@@ -36,5 +36,7 @@ def natural_step(parameter: Parameter, value: float) -> NaturalStep:
     if parameter.unit in BY_UNIT:
         return BY_UNIT[parameter.unit]
     return (
-        NaturalStep(SHARE * abs(value), f"{100 * SHARE:g} %") if value else NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")
+        NaturalStep(SHARE * abs(value), f"{100 * SHARE:g} %")
+        if value
+        else NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")
     )

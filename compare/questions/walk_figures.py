@@ -50,6 +50,7 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
         cost.legend()
         lengths.plot(at, [1000.0 * gait.indexes["step_length_m"] for gait in good], "o-", color=MODEL)
         lengths.set_ylabel("step\n[mm]")
+        lengths.set_ylim(bottom=0.0)
         for phase, label, colour in (("ssp", "single support", LEFT), ("dsp", "double support", RIGHT)):
             times.plot(at, [gait.found.x[TIMES[phase]] for gait in good], "o-", color=colour, label=label)
         times.set_ylabel("time [s]")
@@ -78,44 +79,39 @@ def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
 def cycle_figure(result: Result) -> Figure:
     """Two steps of a cycle: paths of hip and feet from the side and from above, and the angles of the left leg."""
     robot = nao(str(result.problem.options["robot"]), rotational_inertia=True)
-    arrays = walk(finely_sampled(result), robot, STEPS_SHOWN)
-    t, hip = arrays.arrays["t"], arrays.arrays["hip"]
+    signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
+    arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
     single, double = (float(result.x[result.problem.variable_index(TIMES[phase])]) for phase in ("ssp", "dsp"))
     switches = np.cumsum([0.0] + [single, double] * STEPS_SHOWN)
     with style():
-        figure = new_figure(6.3, 6.4)
-        side, above, place, angles = figure.subplots(4, 1, height_ratios=(1.0, 1.0, 1.2, 1.6))
+        figure = new_figure(6.3, 7.2)
+        side, above, place, angles = figure.subplots(4, 1, height_ratios=(1.0, 1.2, 1.2, 1.6))
+        side.sharex(above)
         for foot, colour in (("left", LEFT), ("right", RIGHT)):
-            path = 1000.0 * arrays.arrays[f"{foot}_foot"]
+            path = 1000.0 * arrays[f"{foot}_foot"]
             side.plot(path[:, 0], path[:, 2], color=colour, label=f"{foot} foot")
             above.plot(path[:, 0], path[:, 1], color=colour)
-        above.plot(1000.0 * hip[:, 0], 1000.0 * hip[:, 1], color=HIP)
-        lowest = hip[:, 2].min()
-        side.plot(
-            1000.0 * hip[:, 0], 1000.0 * (hip[:, 2] - lowest), color=HIP, label=f"hip less {1000.0 * lowest:.1f} mm"
-        )
-        at = np.searchsorted(t, np.minimum(switches, t[-1]))
-        above.plot(1000.0 * hip[at, 0], 1000.0 * hip[at, 1], "o", color=HIP, label="switch")
-        zmp = 1000.0 * arrays.arrays["zmp"]
+        lowest, at = hip[:, 2].min(), np.searchsorted(t, np.minimum(switches, t[-1]))
+        side.plot(hip[:, 0], hip[:, 2] - lowest, color=HIP, label=f"hip less {lowest:.1f} mm")
+        above.plot(hip[:, 0], hip[:, 1], color=HIP, label="hip")
+        above.plot(hip[at, 0], hip[at, 1], "o", color=HIP, label="hip at a switch")
+        zmp = 1000.0 * arrays["zmp"]
         above.plot(zmp[:, 0], zmp[:, 1], color=ENGINE, lw=0.8, label="ZMP")
-        side.set(ylabel="z [mm]", xlabel="x [mm]")
+        side.set_ylabel("z [mm]")
         above.set(ylabel="y [mm]", xlabel="x [mm]")
-        side.legend(ncols=3)
-        above.legend(ncols=2, loc="lower right")
         for k, axis in enumerate("xyz"):
-            shown = 1000.0 * (hip[:, k] - hip[0, k])
-            place.plot(t, shown, color=LEG_COLOURS[k], label=f"{axis} less its start")
-        place.set_ylabel("hip [mm]")
-        place.legend(ncols=3)
+            place.plot(t, hip[:, k] - hip[0, k], color=LEG_COLOURS[k], label=f"hip {axis} less its start")
+        place.set_ylabel("[mm]")
         for name, colour in zip(LEG, LEG_COLOURS, strict=True):
-            column = arrays.joints.index(f"L{name}")
-            angles.plot(t, arrays.arrays["q"][:, column], color=colour, label=f"L{name}")
-        angles.set(ylabel="angle [rad]", xlabel="time [s]")
-        angles.legend(ncols=5, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, 1.22))
+            column = signals.joints.index(f"L{name}")
+            angles.plot(t, arrays["q"][:, column], color=colour, label=f"L{name}")
+        angles.set(ylabel="angle [rad]", xlabel="time [s]; solid: lift-off, dashed: touch-down")
         for axes in (place, angles):
             axes.set_xlim(0.0, t[-1])
             for k, switch in enumerate(switches):
                 axes.axvline(switch, color="#a0a0a0", lw=0.8, ls="-" if k % 2 == 0 else "--")
+        for axes in (side, above, place, angles):
+            axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=1.0)
     return figure
 
 

@@ -8,11 +8,13 @@ from compare.comparison import Comparison
 from compare.convergence import convergence_figure
 from compare.distributions import ecdf_figure, final_gap_figure
 from compare.published import published_rows
+from compare.questions.steps import BY_UNIT
 from compare.record import RunRecord
 from compare.report.document import Figure, Section, Table, table
 from compare.significance import compare_pairs
 from compare.statistics.run_length import TARGETS
 from compare.table import HEADER, SolverSummary, cells, count, summarise
+from nlp_gait.backends.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
 
@@ -144,7 +146,13 @@ def _binding(comparison: Comparison) -> Section | None:
         return None
     record = min(priced, key=lambda item: item[0])[1]
     rows = [
-        (a.name, a.side, f"{a.bound:g} {a.unit}", f"{a.price:.4g} {a.price_unit}")
+        (
+            a.name,
+            a.side,
+            f"{a.bound:g} {a.unit}",
+            f"{a.price:.4g} {a.price_unit}",
+            _for_one_step(a, comparison.objective.unit),
+        )
         for a in record.active_constraints[:SHOWN_CONSTRAINTS]
     ]
     left_out = len(record.active_constraints) - len(rows)
@@ -155,8 +163,16 @@ def _binding(comparison: Comparison) -> Section | None:
             f"At the best optimum of {record.algorithm} (run {record.run}). The price is the change of the optimal "
             f"{comparison.objective.name} for each unit by which the bound is raised; the dearest come first.{note}",
         ),
-        tables=(table(("constraint", "side", "at", "price of raising it"), rows),),
+        tables=(table(("constraint", "side", "at", "price of raising it", "for a step"), rows),),
     )
+
+
+def _for_one_step(active: ActiveConstraint, unit: str) -> str:
+    """For example +0.0237 W for 1 mm."""
+    step = BY_UNIT.get(active.unit)
+    if step is None:
+        return "-"
+    return f"{active.price * step.size:+.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
 def _published(comparison: Comparison) -> Section | None:

@@ -5,6 +5,7 @@ Each process builds a problem once, whatever it computes of it.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +19,7 @@ from compare.judge import evaluate
 from compare.task import ProblemSpec
 from nlp_gait.backends.continuation import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.files import new_file
+from nlp_gait.files import new_file, read_bytes
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 from nlp_gait.problems.nao import PLANNED_JOINTS
 
@@ -123,8 +124,9 @@ def read_points(path: Path) -> tuple[Array, Array]:
     Raises:
         InputError: the archive is damaged.
     """
+    content = io.BytesIO(read_bytes(path, "points"))
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(content, allow_pickle=False) as archive:
             return np.asarray(archive["x"], dtype=float), np.asarray(archive["power_W"], dtype=float)
     except Exception as error:
         # NumPy and zipfile raise a dozen kinds of errors on damaged archives.

@@ -170,6 +170,7 @@ def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str)
     panels[-1].set_axis_off()
     for axes in panels[-3:]:
         axes.set_xlabel("time [s]")
+        axes.tick_params(labelbottom=True)  # also where the panel below is empty
     legend_below(figure)
     figure.suptitle("solid: rolled out, dotted: desired", fontsize=8)
     return figure

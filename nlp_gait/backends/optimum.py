@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
-from nlp_gait.backends.kkt import KktFunctions, KktStep, column, kkt_functions, kkt_step
+from nlp_gait.backends.kkt import KktFunctions, column, kkt_functions, kkt_step
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 
@@ -70,9 +71,9 @@ class Optimum:
         return self.problem.objective.sign * float(self.functions.values(self.w, self.parameters)[0])
 
     @property
-    def active(self) -> Array:
+    def active(self) -> np.ndarray[Any, np.dtype[np.intp]]:
         """Indexes of the rows that hold as equations."""
-        return np.flatnonzero(self.side)
+        return np.asarray(np.flatnonzero(self.side))
 
     @cached_property
     def parameters(self) -> Array:

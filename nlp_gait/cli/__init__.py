@@ -1,7 +1,7 @@
 """Command line: ``nlp-gait COMMAND``.
 
-From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce``. From a result
-to a robot: ``simulate | export | animate``.
+From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
+result to a robot: ``simulate | export | animate``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -12,15 +12,18 @@ from __future__ import annotations
 import typer
 
 from nlp_gait.cli.animate import animate
+from nlp_gait.cli.certainty import certainty
 from nlp_gait.cli.compare import compare
 from nlp_gait.cli.evaluate import evaluate
 from nlp_gait.cli.export import export
 from nlp_gait.cli.list import list_problems
 from nlp_gait.cli.motions import motions
 from nlp_gait.cli.motors import motors
+from nlp_gait.cli.pareto import pareto
 from nlp_gait.cli.prices import prices
 from nlp_gait.cli.report import report
 from nlp_gait.cli.reproduce import reproduce
+from nlp_gait.cli.robust import robust
 from nlp_gait.cli.search import search
 from nlp_gait.cli.simulate import simulate
 from nlp_gait.cli.solve import solve
@@ -43,8 +46,11 @@ app.command("report")(report)
 app.command("sweep")(sweep)
 app.command("reproduce")(reproduce)
 app.command("prices")(prices)
+app.command("pareto")(pareto)
+app.command("certainty")(certainty)
 app.command("motions")(motions)
 app.command("motors")(motors)
+app.command("robust")(robust)
 app.command("walk")(walk)
 app.command("simulate")(simulate)
 app.command("export")(export)

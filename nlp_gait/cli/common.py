@@ -48,7 +48,7 @@ ResultFile = Annotated[
     Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Worker processes (default: all processors).")]
+Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 # What the system says where output cannot grow.
@@ -57,7 +57,6 @@ NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 LONGEST_SENTENCE = 2000
 # Wide enough for every table where there is no terminal to fit, for example in a pipe or a log.
 PIPE_WIDTH = 160
-
 
 
 class PlainConsole(Console):
@@ -69,7 +68,7 @@ class PlainConsole(Console):
 
 
 def harmless(text: str) -> str:
-    """Text whose control characters, and what is no character at all, stand as escapes like ``\\x1b``."""
+    """Text whose control characters, and what is no character at all, stand as escapes."""
     shown = (sign if sign.isprintable() or sign in "\n\t" else repr(sign)[1:-1] for sign in text)
     return "".join(shown)
 
@@ -117,7 +116,9 @@ def end_interrupted(sentence: str) -> NoReturn:
 def fail(message: str) -> NoReturn:
     """End with status 1 and one sentence."""
     said = " ".join(message.split())
-    stderr.print(f"nlp-gait: {said if len(said) <= LONGEST_SENTENCE else said[:LONGEST_SENTENCE] + ' ...'}", soft_wrap=True)
+    stderr.print(
+        f"nlp-gait: {said if len(said) <= LONGEST_SENTENCE else said[:LONGEST_SENTENCE] + ' ...'}", soft_wrap=True
+    )
     raise typer.Exit(1)
 
 

@@ -60,11 +60,11 @@ def compare(
     algorithms: Annotated[
         str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
     ] = "pso,ga,aco",
-    runs: Annotated[int, typer.Option(min=1, help="Runs of each search algorithm.")] = 11,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search algorithm.")] = 11,
     starts: Annotated[
-        int, typer.Option(min=0, help="Starts of IPOPT and other gradient methods; each is one run.")
+        int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
     ] = 20,
-    evaluations: Annotated[int, typer.Option(min=1, help="Budget of one search run.")] = 10_000,
+    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")] = 10_000,
     handling: Handle = "deb",
     penalty_weight: PenaltyWeight = None,
     target: Target = None,

@@ -30,7 +30,7 @@ from nlp_gait.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from compare.questions.prices import Price, Prices
+    from compare.questions.price import Price, Prices
 
 SHOWN = 12  # rows of the robot's table; all are in the CSV and in --json
 
@@ -84,8 +84,8 @@ def _print(found: Prices, ranges: Mapping[str, float], written: Sequence[Path]) 
         )
         print_table(title, _header(found), [_row(price, ranges) for price in found.robot[:SHOWN]])
     stdout.print(
-        f"First-order conditions hold to {found.residual:.1e}; {found.dependent} of the active rows follow from others. The optimum "
-        "and x* change along a line only as far as the last column says: beyond, another kink or limit takes over."
+        f"First-order conditions hold to {found.residual:.1e}; {found.dependent} of the active rows follow from others. "
+        "x* moves along a line only as far as the last column says: beyond, another kink or limit takes over."
     )
     if found.weak:
         stdout.print(f"Held without a price, so that derivatives may differ to both sides: {', '.join(found.weak)}")
@@ -125,4 +125,4 @@ def _agreement(price: Price) -> str:
 
 
 def _change(value: float | None) -> str:
-    return "infeasible" if value is None else f"{value:+.5f}"
+    return "none" if value is None else f"{value:+.5f}"

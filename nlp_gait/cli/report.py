@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from nlp_gait.cli.common import AsJson, command, print_json, stdout
+from nlp_gait.errors import InputError
 
 
 @command
@@ -28,6 +30,9 @@ def report(
     from compare.report import rebuild_report
     from compare.statistics.run_length import Weighting
 
+    for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
+        if weight is not None and not math.isfinite(weight):
+            raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     written = rebuild_report(folder, weighting)
     if as_json:

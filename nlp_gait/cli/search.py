@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 def search(
     problem: ProblemName,
     algorithm: Annotated[str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...")] = "pso",
-    runs: Annotated[int, typer.Option(min=1, help="Independent runs.")] = 11,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Independent runs.")] = 11,
     seed: Seed = 0,
-    evaluations: Annotated[int, typer.Option(min=1, help="Budget of one run.")] = 10_000,
+    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one run.")] = 10_000,
     handling: Handle = "deb",
     penalty_weight: PenaltyWeight = None,
     target: Target = None,

@@ -23,12 +23,15 @@ from nlp_gait.simulation.mjcf import FRICTION
 if TYPE_CHECKING:
     from nlp_gait.simulation.measurements import Measurements
     from nlp_gait.simulation.robustness import Robustness
+    from nlp_gait.simulation.walking import Walk
 
 
 @command
 def simulate(
     result: ResultFile,
-    steps: Annotated[int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")
+    ] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
     frames_per_s: Annotated[
@@ -62,6 +65,7 @@ def simulate(
     from nlp_gait.simulation.plan import plan_of
     from nlp_gait.simulation.playback import play
     from nlp_gait.simulation.robustness import robustness as sweep
+    from nlp_gait.simulation.walking import measure_walk
 
     mujoco(pictures=video is not None)
     if viewer and video is not None:
@@ -75,8 +79,9 @@ def simulate(
         write_video(target, frames, frames_per_s)
     else:
         trace = (shown if viewer else play)(plan, conditions, drive, sole)
-    report = measure(plan, trace, drive)
-    survival, data = None, report.to_json()
+    walk = None if steps is None else measure_walk(plan, trace, drive, steps)
+    report = measure(plan, trace, drive) if walk is None else walk.measurements
+    survival, data = None, {**report.to_json(), **({} if walk is None else {"walk": walk.course()})}
     if folder is not None:
         write_json(folder / "report.json", {"schema": 1, **without_nan(data)})
         write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
@@ -99,6 +104,8 @@ def simulate(
         print_json(data)
     else:
         _print(report, survival)
+        if walk is not None:
+            _print_course(walk)
 
 
 def _print(report: Measurements, survival: Robustness | None) -> None:
@@ -131,3 +138,14 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
         for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
             listed = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
             stdout.print(f"{title}: {listed}")
+
+
+def _print_course(walk: Walk) -> None:
+    if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
+        stdout.print(f"{walk.steps_done} of {walk.steps} steps done before it fell")
+        return
+    energy = "-" if walk.energy_J_per_m is None else f"{walk.energy_J_per_m:.1f} J/m"
+    stdout.print(
+        f"{walk.steps} steps: walked {1000 * walk.walked_m:.0f} mm of {1000 * walk.planned_m:.0f} mm, "
+        f"{1000 * walk.drift_m:.0f} mm to the left, heading {walk.heading_deg:.1f} degrees to the left; {energy}"
+    )

@@ -36,7 +36,10 @@ from nlp_gait.cli.common import (
 def solve(
     problem: ProblemName,
     starts: Annotated[
-        int | None, typer.Option(min=1, help="Random starts within the bounds (default: 20, fewer where each takes long).")
+        int | None,
+        typer.Option(
+            min=1, max=100_000, help="Random starts within the bounds (default: 20, fewer where each takes long)."
+        ),
     ] = None,
     seed: Seed = 0,
     x0: Annotated[str | None, typer.Option("--x0", help="First start, separated by commas.")] = None,

@@ -26,8 +26,29 @@ RESULT_KEYS = frozenset(
 )
 RECORD_KEYS = frozenset(
     (
-        *("schema", "problem", "algorithm", "run", "seed", "definition", "settings", "status", "success", "x", "objective"),
-        *("violation", "verdict", "evaluations", "failed_evaluations", "iterations", "active_constraints", "history", "time_s"),
+        *(
+            "schema",
+            "problem",
+            "algorithm",
+            "run",
+            "seed",
+            "definition",
+            "settings",
+            "status",
+            "success",
+            "x",
+            "objective",
+        ),
+        *(
+            "violation",
+            "verdict",
+            "evaluations",
+            "failed_evaluations",
+            "iterations",
+            "active_constraints",
+            "history",
+            "time_s",
+        ),
     )
 )
 
@@ -70,7 +91,9 @@ def _result(raw: Any) -> Result:
     for key in raw:
         if key not in (RECORD_KEYS if is_record else RESULT_KEYS):
             raise unknown("key", key, BY_HAND)
-    problem = _problem(_object(_object(raw["definition"], "definition").get("problem"), "problem") if is_record else raw)
+    problem = _problem(
+        _object(_object(raw["definition"], "definition").get("problem"), "problem") if is_record else raw
+    )
     values = _object(raw.get("x"), "x")
     missing = [variable for variable in problem.names if variable not in values]
     if missing:

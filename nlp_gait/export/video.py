@@ -56,7 +56,9 @@ def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
         for frame in frames
     ]
     duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
-    images[0].save(path, format="GIF", save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True)
+    images[0].save(
+        path, format="GIF", save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True
+    )
 
 
 def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
@@ -68,7 +70,9 @@ def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
             even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])  # for the codec
             if writer is None:
                 size = (even.shape[1], even.shape[0])
-                writer = imageio_ffmpeg.write_frames(str(path), size, fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"])
+                writer = imageio_ffmpeg.write_frames(
+                    str(path), size, fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"]
+                )
                 writer.send(None)
             writer.send(even)
     finally:

@@ -128,7 +128,8 @@ def nao_dsp(
     )
 
     def arms(x: SX, s: SX) -> Mapping[str, Motion]:
-        return arm_motions(x, splines, ARM_SWING, _duration(x), s)
+        duration = _duration(x)
+        return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
 
     return with_motors(with_motion(problem, phase, splines, objective, arms), phase, motors)
 
@@ -181,11 +182,12 @@ def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Pla
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
         duration = _duration(x)
-        hip = hip_on_spline(x, splines, hip_x, hip_y, duration, phase)
+        more = splines.motions(x, duration, phase)
+        hip = hip_on_spline(x, more, hip_x, hip_y, duration, phase)
         left, left_reach = leg_joints(robot, "L", hip, ankles["L"], margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, ankles["R"], margin, ops)
         return Plan(
-            joints={**left, **right, **arm_motions(x, splines, ARM_SWING, duration, phase)},
+            joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
             hip=hip.position,
             ankles={side: ankle.position for side, ankle in ankles.items()},
             reach=vertcat(left_reach, right_reach),

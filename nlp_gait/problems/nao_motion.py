@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+import casadi as ca
 import numpy as np
 from casadi import SX
 
@@ -72,9 +73,9 @@ class Splines:
 
     def motions(self, x: SX, duration: SX, phase: SX) -> dict[str, Motion]:
         """What each curve adds to its cubic, from x (n,)."""
-        m = self.count
-        starts = {curve: self.first + m * i for i, curve in enumerate(self.units)}
-        return {curve: spline(x[start : start + m], duration, phase) for curve, start in starts.items()}
+        m, k = self.count, len(self.units)
+        added = spline(ca.reshape(x[self.first : self.first + m * k], m, k), duration, phase)
+        return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
 
     def start(self, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
         """Start point: the papers' variables anywhere within their bounds, coefficients near zero."""
@@ -90,18 +91,21 @@ def hip_and_arm_units(swing: Mapping[str, tuple[float, float]]) -> dict[str, str
 
 
 def hip_on_spline(
-    x: SX, splines: Splines, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
+    x: SX,
+    more: Mapping[str, Motion],
+    along: tuple[float, float],
+    across: tuple[float, float],
+    duration: SX,
+    phase: SX,
 ) -> Motion:
-    """Motion of the torso's origin (3,) [m]: the papers' (see ``nao.hip_motion``), and the splines on it."""
-    more = splines.motions(x, duration, phase)
+    """Motion of the torso's origin (3,) [m]: the papers' (see ``nao.hip_motion``), and what each curve adds."""
     return plus(hip_motion(x[:7], along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
 def arm_motions(
-    x: SX, splines: Splines, swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
+    more: Mapping[str, Motion], swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
 ) -> dict[str, Motion]:
-    """Motions of the arms' joints [rad]: the papers' (see ``nao.arm_joints``), and the splines on them."""
-    more = splines.motions(x, duration, phase)
+    """Motions of the arms' joints [rad]: the papers' (see ``nao.arm_joints``), and what each curve adds."""
     arms = arm_joints(swing, duration, phase)
     return arms | {joint: plus(arms[joint], more[joint]) for joint in swing}
 

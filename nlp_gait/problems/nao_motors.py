@@ -225,21 +225,19 @@ def _motor_rows(phase: Phase, ratings: Sequence[Motor], torque: MX, qd: MX, supp
 def _ankle_rows(moving: Sequence[str], q: MX) -> list[Constraint]:
     """Roll of both ankles within the lines over their pitch [rad]."""
     rows = []
-    for side, sign in (("L", 1.0), ("R", -1.0)):
+    for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
         pitch, roll = (q[moving.index(f"{side}{joint}"), :].T for joint in ("AnklePitch", "AnkleRoll"))
-        samples = tuple(str(k) for k in range(q.shape[1]))
-        for end, column in (("least", 1), ("greatest", 2)):
-            line = sign * ankle_roll(pitch, column)
-            least = (end == "least") == (sign > 0)
+        least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
+        for name, line, lower, upper in (("least", least, MX(0.0), None), ("greatest", greatest, None, MX(0.0))):
             rows.append(
                 Constraint(
-                    name=f"{side}AnkleRoll_{end}",
-                    labels=samples,
+                    name=f"{side}AnkleRoll_{name}",
+                    labels=tuple(str(k) for k in range(q.shape[1])),
                     unit="rad",
                     scale=ANGLE_SCALE,
                     value=roll - line,
-                    lower=MX(0.0) if least else None,
-                    upper=None if least else MX(0.0),
+                    lower=lower,
+                    upper=upper,
                 )
             )
     return rows

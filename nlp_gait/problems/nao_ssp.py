@@ -116,14 +116,15 @@ def nao_ssp(
             **motor_options(motors),
         },
     )
-    moved = with_motion(
-        problem,
-        phase,
-        splines,
-        objective,
-        arms=lambda x, s: arm_motions(x, splines, ARM_SWING, single_support_duration(x), s),
-        foot=Heights(lambda x, s: _swing(x, stance, splines, 0.0, s).position[2], "swing_height_m"),
-    )
+
+    def arms(x: SX, s: SX) -> dict[str, Motion]:
+        duration = single_support_duration(x)
+        return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
+
+    def height(x: SX, s: SX) -> SX:
+        return _swing(x, stance, splines.motions(x, single_support_duration(x), s), 0.0, s).position[2]
+
+    moved = with_motion(problem, phase, splines, objective, arms, Heights(height, "swing_height_m"))
     return with_motors(moved, phase, motors)
 
 
@@ -155,13 +156,14 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
         duration = single_support_duration(x)
-        hip = hip_on_spline(x, splines, stance.hip_x, stance.hip_y, duration, phase)
+        more = splines.motions(x, duration, phase)
+        hip = hip_on_spline(x, more, stance.hip_x, stance.hip_y, duration, phase)
         support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
-        swing = _swing(x, stance, splines, ankle_heights[1], phase)
+        swing = _swing(x, stance, more, ankle_heights[1], phase)
         left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
         return Plan(
-            joints={**left, **right, **arm_motions(x, splines, ARM_SWING, duration, phase)},
+            joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
             hip=hip.position,
             ankles={"L": support.position, "R": swing.position},
             reach=vertcat(left_reach, right_reach),
@@ -175,10 +177,9 @@ def single_support_duration(x: SX) -> SX:
     return fmax(x[8], LEAST_DURATION)
 
 
-def _swing(x: SX, stance: Stance, splines: Splines, ankle_height: float, phase: SX) -> Motion:
-    """Motion of the right ankle (3,) [m]: the paper's, and the splines on it."""
+def _swing(x: SX, stance: Stance, more: Mapping[str, Motion], ankle_height: float, phase: SX) -> Motion:
+    """Motion of the right ankle (3,) [m]: the paper's, and what its curves add."""
     duration = single_support_duration(x)
-    more = splines.motions(x, duration, phase)
     swing = swing_foot(
         SX(stance.swing_x[0]), SX(stance.swing_x[1]), stance.swing_y, ankle_height, x[7], duration, phase
     )

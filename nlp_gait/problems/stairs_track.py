@@ -6,13 +6,10 @@ from typing import Literal, get_args
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import (
     Array,
-    Assembly,
-    Constraint,
     GaitProblem,
     Objective,
     Parameter,
@@ -22,9 +19,8 @@ from nlp_gait.problems.gait_problem import (
 )
 from nlp_gait.problems.stairs import STAIR_PARAMETERS, within
 from nlp_gait.problems.stairs_governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
-from nlp_gait.problems.stairs_layout import labels
-from nlp_gait.problems.stairs_robot import load_biped
 from nlp_gait.problems.stairs_track_model import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
+from nlp_gait.problems.stairs_track_rows import track_rows
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.planar_biped import LINKS
 
@@ -47,7 +43,6 @@ TORSO_PITCH = "torso_pitch_rad"
 # a rollout of a robot that falls has no gradient of use.
 PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
 SCATTER = 0.05
-LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
@@ -184,9 +179,9 @@ def stairs_track(
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
+        assemble=lambda point, ops: track_rows(point, rollout(point, ops), ops),
         start=start,
-        starts=2,
+        starts=1,
         long_derivatives=True,
         signals=signals,
     )
@@ -206,54 +201,3 @@ def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> t
         )
         for suffix in suffixes
     )
-
-
-def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
-    """Mean of (53) over all quanta, and how far the ZMP leaves the supporting polygon."""
-    quanta = loop.state.shape[1]
-    errors = loop.state - loop.desired
-    power = loop.torque * loop.state[N:, :]
-    below, above = _beyond(point, loop.zmp)
-    tolerance = point["tracking_tolerance_rad"]
-    exact = Exact()
-    tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-    outside = ca.sum1(_positive(below, ops) + _positive(above, ops)) / quanta
-    finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
-    return Assembly(
-        objective=tracking + effort + point["zmp_weight"] * outside,
-        constraints=(
-            Constraint(
-                name="tracking",
-                labels=labels(LINKS, range(1, quanta + 1)),
-                unit="rad",
-                scale=0.1,
-                value=ca.vec(errors[:N, :]),
-                lower=-tolerance,
-                upper=tolerance,
-            ),
-        ),
-        indexes={
-            "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
-            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
-            "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
-            "peak_torque_Nm": exact.largest(ca.vec(loop.torque)),
-            "zmp_margin_min_m": -ca.mmax(ca.fmax(below, above)),
-            "quanta_before_divergence": ca.sum2(finite),
-        },
-    )
-
-
-def _beyond(point: Point, zmp: MX) -> tuple[MX, MX]:
-    """Distance by which the ZMP lies behind and ahead of the supporting polygon, (m, 1) each [m]; negative inside.
-
-    It reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
-    """
-    foot = load_biped().foot_m
-    times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)
-    rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
-    return rear - zmp.T, zmp.T - foot
-
-
-def _positive(v: MX, ops: Nonsmooth) -> MX:
-    """Elementwise max(v, 0)."""
-    return (v + ops.abs(v)) / 2

@@ -49,7 +49,9 @@ def check_keys(raw: Mapping[str, Any], source: str) -> None:
 def check_name(name: str, where: str) -> None:
     """Refuse a name that is empty, long, or not printable; raises RobotDataError."""
     if not name or len(name) > LONGEST_NAME or not name.isprintable():
-        raise RobotDataError(f"{where}: a name has 1 to {LONGEST_NAME} printable characters, got {name[:LONGEST_NAME]!r}")
+        raise RobotDataError(
+            f"{where}: a name has 1 to {LONGEST_NAME} printable characters, got {name[:LONGEST_NAME]!r}"
+        )
 
 
 def _objects(group: Any) -> Iterable[tuple[str, Mapping[str, Any]]]:

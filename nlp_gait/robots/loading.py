@@ -139,7 +139,10 @@ def _robot(raw: Mapping[str, Any]) -> Robot:
     return Robot(
         name=name,
         description=_get({"description": "", **raw}, "description", str, owner),
-        sources={key: _get({key: value}, key, str, f"{owner}: sources") for key, value in _group(raw, "sources", name).items()},
+        sources={
+            key: _get({key: value}, key, str, f"{owner}: sources")
+            for key, value in _group(raw, "sources", name).items()
+        },
         root=_get(raw, "root", str, owner),
         links=links,
         joints=joints,

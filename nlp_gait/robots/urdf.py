@@ -144,7 +144,9 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
     if inertial.mass is None or inertial.inertia is None:
         raise RobotDataError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
     if not _sound([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
-        raise RobotDataError(f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}")
+        raise RobotDataError(
+            f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}"
+        )
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
@@ -168,7 +170,9 @@ def _joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> di
             f"joint {joint.name!r}: <limit> must give effort and velocity, and lower and upper if revolute"
         )
     if not _sound(joint.axis or ()):
-        raise RobotDataError(f"joint {joint.name!r}: <axis> must hold finite numbers within {LARGEST_NUMBER:g}, got {joint.axis}")
+        raise RobotDataError(
+            f"joint {joint.name!r}: <axis> must hold finite numbers within {LARGEST_NUMBER:g}, got {joint.axis}"
+        )
     frame, parent = frames[joint.child], carriers[joint.parent]
     limits = [limit.lower, limit.upper] if joint.type == "revolute" else [-math.pi, math.pi]
     return {

@@ -16,7 +16,7 @@ from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.playback import Trace, play
 
 WIDTH, HEIGHT = 480, 480
-AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.1, (0.06, 0.0, 0.24)
+AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.1, (0.06, 0.0, 0.24)  # it follows the torso
 
 
 def filmed(
@@ -39,6 +39,7 @@ def filmed(
         if renderer is None:
             renderer = _renderer(engine, model)
         if count % steps_per_frame == 0:
+            camera.lookat[0] = data.qpos[0]
             renderer.update_scene(data, camera)
             frames.append(renderer.render().copy())
         count += 1
@@ -70,6 +71,7 @@ def shown(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> Trace:
             window, began = viewer.launch_passive(model, data), time.monotonic()
             _aimed(window.cam)
         if window.is_running():  # closed by the user, the simulation goes on without it
+            window.cam.lookat[0] = data.qpos[0]
             window.sync()
             time.sleep(max(0.0, data.time - (time.monotonic() - began)))
 

@@ -52,7 +52,7 @@ class Measurements:
         largest_tilt_deg: of the torso, settling included.
         tracking_rms_rad: planned minus measured angle, over all joints.
         tracking_max_rad: largest.
-        slip_m: largest distance of a supporting sole from where it stood at the start.
+        slip_m: largest distance of a supporting sole from where it stood when its support began.
         landings: by side, of the swinging feet.
         pressure_rms_m: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP.
         pressure_max_m: largest.
@@ -133,7 +133,13 @@ def averaged_pressure(trace: Trace, period_s: float) -> Array:
 
 
 def _slip(plan: Plan, trace: Trace) -> float:
-    moved = [trace.feet[:, SIDES.index(side), :2] for side in plan.supports]
+    feet = {side: trace.feet[:, SIDES.index(side), :2] for side in SIDES}
+    moved = [feet[side] for side in plan.supports]
+    if not moved:  # both feet swing: a support begins and ends
+        for side, path in feet.items():
+            at_rest = np.concatenate([[0], plan.stands(side, trace.t), [0]])
+            starts, ends = (np.flatnonzero(np.diff(at_rest) == change) for change in (1, -1))
+            moved += [path[start:end] for start, end in zip(starts, ends, strict=True)]
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 
 

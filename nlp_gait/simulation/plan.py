@@ -20,6 +20,7 @@ from nlp_gait.simulation.steps import walk
 
 SIDES = ("left", "right")
 CYCLE = "nao-cycle"
+ON_GROUND = 1e-6  # [m]; above the rounding of splines
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 
 
@@ -51,6 +52,10 @@ class Plan:
     def supports(self) -> tuple[str, ...]:
         """Sides whose sole stands still throughout."""
         return tuple(side for side in SIDES if np.ptp(self.signals.arrays[f"{side}_foot"], axis=0).max() < STANDING)
+
+    def stands(self, side: str, times: Array) -> Array:
+        """1 where a sole is planned to stand on the ground, else 0."""
+        return np.asarray(self.at(f"{side}_foot", times)[:, 2] < ON_GROUND, dtype=float)
 
     @cached_property
     def _splines(self) -> dict[str, CubicSpline]:

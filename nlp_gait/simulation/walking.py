@@ -40,6 +40,10 @@ class Walk:
         """Plain dictionaries, lists and numbers."""
         return asdict(self)
 
+    def course(self) -> dict[str, Any]:
+        """The same without the measurements."""
+        return {name: value for name, value in self.to_json().items() if name != "measurements"}
+
 
 def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
     """Numbers of one simulation of so many steps."""

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.symbolic.trajectories import Motion, constant
+from nlp_gait.symbolic.trajectories import Motion
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -29,20 +29,20 @@ def coefficient_count(spans: int) -> int:
 
 
 def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
-    """Spline with zero value and zero velocity at both ends of a phase.
+    """Splines (k,) with zero value and zero velocity at both ends of a phase.
 
     Args:
-        coefficients: (m,) [u]; m = spans + 1, or none for a curve that does not move.
+        coefficients: (m, k) of k curves [u]; m = spans + 1, or 0 for curves that do not move.
         duration: of the phase [s].
         phase: time / duration, in [0, 1].
 
     Source:
         Basis functions of Cox and de Boor on uniform knots with clamped ends; derivatives by de Boor's formula.
     """
-    m = coefficients.shape[0]
+    m, k = coefficients.shape
     if m == 0:
-        return constant(0.0)
-    value, slope, bend = (ca.dot(coefficients, basis(m - 1, phase, order)) for order in range(3))
+        return Motion(SX(k, 1), SX(k, 1), SX(k, 1))
+    value, slope, bend = (coefficients.T @ basis(m - 1, phase, order) for order in range(3))
     return Motion(value, slope / duration, bend / duration**2)
 
 

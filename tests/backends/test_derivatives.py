@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.derivatives import compiled_functions, compiled_nlp
+from nlp_gait.backends.derivatives import compiled_functions, compiled_nlp, one_direction_at_a_time
 
 OPTIONS = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 X, P = MX.sym("x", 2), MX.sym("p")
@@ -32,3 +32,14 @@ def test_a_solver_of_compiled_functions_takes_the_same_path() -> None:
     ends = [solver(x0=[-1.0, 1.0], p=100.0, ubg=1.0) for solver in (interpreted, compiled)]
     assert np.array_equal(np.array(ends[0]["x"]), np.array(ends[1]["x"]))
     assert interpreted.stats()["iter_count"] == compiled.stats()["iter_count"] > 3
+
+
+def test_derivatives_one_direction_at_a_time_are_the_same() -> None:
+    before = ca.GlobalOptions.getMaxNumDir()
+    solvers = [ca.nlpsol("usual", "ipopt", ROSENBROCK, OPTIONS)]
+    with one_direction_at_a_time():
+        assert ca.GlobalOptions.getMaxNumDir() == 1
+        solvers.append(ca.nlpsol("one", "ipopt", ROSENBROCK, OPTIONS))
+    assert ca.GlobalOptions.getMaxNumDir() == before
+    usual, one = (solver.get_function("nlp_hess_l")([0.3, -0.7], 90.0, 1.0, 0.5) for solver in solvers)
+    assert np.array(one) == pytest.approx(np.array(usual), rel=1e-14)

@@ -125,7 +125,9 @@ def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...
         objective, x = slope(problem, near, parameter)
         assert answer.objective[i] == pytest.approx(objective, rel=RESOLVED)
         largest = np.abs(answer.x[:, i] / problem.scale).max()
-        np.testing.assert_allclose(answer.x[:, i] / problem.scale, x / problem.scale, atol=RESOLVED_X * max(largest, 1.0))
+        np.testing.assert_allclose(
+            answer.x[:, i] / problem.scale, x / problem.scale, atol=RESOLVED_X * max(largest, 1.0)
+        )
 
 
 def test_casadis_own_sensitivities_agree() -> None:

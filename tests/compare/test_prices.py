@@ -46,3 +46,12 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
     turn = next(price for price in found.limits if price.name == "turn_rad")
     assert turn.error is None and turn.one_step is not None
     assert turn.one_step[0] is None and turn.one_step[1] == pytest.approx(turn.per_step, rel=0.05)
+
+
+def test_a_fixed_variable_has_one_price() -> None:
+    spec = ProblemSpec(name="walk12", values={"step_length_m.lower": 0.1, "step_length_m.upper": 0.1})
+    found = prices(spec, starts=2)
+    price = next(price for price in found.limits if price.name == "step_length_m")
+    assert price.x is not None and price.x["step_length_m"] == pytest.approx(1.0)
+    assert price.error is not None and price.error < AGREEMENT
+    assert not any(other.name.startswith("step_length_m.") for other in found.limits)

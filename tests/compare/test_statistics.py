@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, fields
 
 import numpy as np
 import pytest
@@ -199,7 +199,7 @@ def test_statistics_are_frozen_and_take_keywords_only() -> None:
         with pytest.raises(FrozenInstanceError):
             setattr(value, name, 0.0)
         with pytest.raises(TypeError):
-            type(value)(1.0)
+            type(value)(*(getattr(value, field.name) for field in fields(value)))
     assert found != curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())  # by identity: arrays have no truth
     assert not hasattr(test, "__dict__")
 
@@ -264,7 +264,7 @@ def test_rank_sum_is_two_sided() -> None:
 
 
 def test_holm_takes_whole_numbers_and_keeps_the_order_of_ties() -> None:
-    assert holm([1, 0]).tolist() == [1.0, 0.0]
+    assert holm([1, 0]).tolist() == [1.0, 0.0] and holm([1, 0]).dtype == float
     assert holm([0.02] * 40).tolist() == pytest.approx([0.8] * 40)
 
 
@@ -272,6 +272,8 @@ def test_an_infeasible_run_is_worse_among_costs_that_hardly_differ() -> None:
     # Two differences of one sign: 2 of the 4 sign patterns are as extreme.
     assert signed_rank([1.0, math.inf, 1.2], [1.0, 1.0, 1.1]) == pytest.approx(0.5)
     assert signed_rank([1.1, 1.0, 1.0], [1.2, math.inf, 1.0]) == pytest.approx(0.5)
+    # Beside the worst of the others it still differs by more than any two of them: ranks 2 and 1 against 3.
+    assert signed_rank([0.0, 0.0, math.inf], [9.0, 1.0, 9.0]) == pytest.approx(1.0)
 
 
 def test_rank_sum_by_the_normal_approximation_of_equal_values() -> None:

@@ -17,8 +17,8 @@ from compare.task import ProblemSpec
 from nlp_gait.cli import app
 from nlp_gait.export.result import load_result
 
-# Fewer samples than the published ten intervals: what is tested here is what is done with the gaits.
-SPEC = ProblemSpec(name="nao-cycle", options={"objective": "power", "intervals": 4})
+# Fewer samples than those of ten intervals: what is tested here is what is done with the gaits.
+SPEC = ProblemSpec(name="nao-cycle", options={"objective": "power", "intervals": 3})
 AXIS = parse_axis("speed_m_s=0.04,0.05")
 
 
@@ -61,7 +61,7 @@ def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait], tmp_path:
 
 def test_the_command_walks(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    arguments = ["walk", "--over", "speed_m_s=0.08", "--starts", "1", "--intervals", "4", "--steps", "2"]
+    arguments = ["walk", "--over", "speed_m_s=0.08", "--starts", "1", "--intervals", "3", "--steps", "2"]
     done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
     (gait,) = json.loads(done.stdout)["gaits"]

@@ -45,6 +45,4 @@ def tried(form: Format, count: int, seed: int, folder: Path) -> Tally:
         ends.append(outcome(lambda: form.read(path)))
         if ends[-1] not in ("accepted", "refused"):
             defects.append((data, ends[-1]))
-    return Tally(
-        name=form.name, accepted=ends.count("accepted"), refused=ends.count("refused"), defects=tuple(defects)
-    )
+    return Tally(name=form.name, accepted=ends.count("accepted"), refused=ends.count("refused"), defects=tuple(defects))

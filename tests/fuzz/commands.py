@@ -63,9 +63,31 @@ HOSTILE = (
     *("intervals=0", "intervals=1e9", "intervals=99999999999", "robot=nao-v7", "step_length_m=inf", "derivatives=x"),
     *("rotational_inertia=maybe", ",,,", "1,2", ",".join(["nan"] * 8), ",".join(["1e308"] * 8), "lambda=0:1:0"),
     *("lambda=0:1:-3", "lambda=0:1:1000000000", "a:b:c", "result.json", "robot.json", "study.toml", "absent", "."),
-    *("pymoo:", "pymoo:XX", "pso,,ga", "out", "loop.json", "folder.json", "pipe.json", "broken.json", "x" * 300 + ".json"),
+    *(
+        "pymoo:",
+        "pymoo:XX",
+        "pso,,ga",
+        "out",
+        "loop.json",
+        "folder.json",
+        "pipe.json",
+        "broken.json",
+        "x" * 300 + ".json",
+    ),
 )
-OPTIONS = ("--json", "--robot", "--set", "--fix", "--option", "--intervals", "--seed", "--x", "--nothing", "-h", "--format")
+OPTIONS = (
+    "--json",
+    "--robot",
+    "--set",
+    "--fix",
+    "--option",
+    "--intervals",
+    "--seed",
+    "--x",
+    "--nothing",
+    "-h",
+    "--format",
+)
 
 
 def mutated_line(rng: random.Random) -> list[str]:
@@ -150,5 +172,3 @@ def _judged(status: object, printed: str, said: str) -> str:
     if status == 2 and said.strip():
         return "refused"
     return f"status {status}, {said!r}"
-
-

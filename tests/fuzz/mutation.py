@@ -39,7 +39,25 @@ TEXTS = (
     "\ufeff",
     "nul.json",
 )
-NUMBERS = (0, 1, -1, True, False, 0.0, -0.0, 1.5, 1e308, -1e308, 5e-324, 2**31, 2**63, 2**64, -(2**63) - 1, 10**400, 1e16)
+NUMBERS = (
+    0,
+    1,
+    -1,
+    True,
+    False,
+    0.0,
+    -0.0,
+    1.5,
+    1e308,
+    -1e308,
+    5e-324,
+    2**31,
+    2**63,
+    2**64,
+    -(2**63) - 1,
+    10**400,
+    1e16,
+)
 TOKENS = ("NaN", "Infinity", "-Infinity", "1e999", "01", "0x10", "1_000", "+1", ".5", "'x'", "nul", "True", '"\\ud800"')
 OTHERS: tuple[Any, ...] = (None, [], {}, [[]], {"a": 1}, [0.0, 1.0], {"": {}}, {"name": "pso"})
 
@@ -121,7 +139,9 @@ def mutated_bytes(data: bytes, rng: random.Random) -> bytes:
         elif what == 3:
             raw[at:at] = raw[at : at + size]
         elif what == 4:
-            raw[at:at] = rng.choice((b"\x00", b"\xff", b"\xef\xbb\xbf", b"\r", b"\n\n", b"[" * 3000, b"{", b'"', b"-", b"9" * 400))
+            raw[at:at] = rng.choice(
+                (b"\x00", b"\xff", b"\xef\xbb\xbf", b"\r", b"\n\n", b"[" * 3000, b"{", b'"', b"-", b"9" * 400)
+            )
         elif what == 5 and rng.random() < 0.3:
             del raw[at:]
         elif at < len(raw):
@@ -152,7 +172,9 @@ def _changed(tree: Any, rng: random.Random) -> Any:
         holder[Raw(key)] = holder[key]  # the same key again
         return _with_twin(tree, holder, key, rng)
     elif isinstance(holder[key], (int, float)) and abs(holder[key]) < 1e300 and not isinstance(holder[key], bool):
-        holder[key] = rng.choice((-holder[key], holder[key] * 1e3, holder[key] / 1e3, holder[key] + 1, str(holder[key])))
+        holder[key] = rng.choice(
+            (-holder[key], holder[key] * 1e3, holder[key] / 1e3, holder[key] + 1, str(holder[key]))
+        )
     return tree
 
 
@@ -185,12 +207,16 @@ def _value(rng: random.Random) -> Any:
 
 
 def _token(rng: random.Random) -> str:
-    return str(rng.choice((*TEXTS, *TOKENS, *(json.dumps(n) for n in NUMBERS), "nan", "inf", "true", "[", "]", "=", ",", "*")))
+    return str(
+        rng.choice((*TEXTS, *TOKENS, *(json.dumps(n) for n in NUMBERS), "nan", "inf", "true", "[", "]", "=", ",", "*"))
+    )
 
 
 def _set(element: ElementTree.Element, name: str, rng: random.Random) -> None:
     old = element.get(name, "")
-    text = rng.choice((_token(rng), old + " 0", old * 2, "-" + old, "1e308 0 0", "0 0", "nan nan nan", old.replace("0", "1")))
+    text = rng.choice(
+        (_token(rng), old + " 0", old * 2, "-" + old, "1e308 0 0", "0 0", "nan nan nan", old.replace("0", "1"))
+    )
     element.set(name, "".join(sign for sign in text if sign.isprintable() and not "\ud800" <= sign <= "\udfff"))
 
 

@@ -48,7 +48,9 @@ class Format:
         """Valid examples."""
         if self.name == "points":
             return [_points()]
-        return [path.read_bytes() for path in sorted((SEEDS / self.name).iterdir()) if path.suffix == Path(self.file).suffix]
+        return [
+            path.read_bytes() for path in sorted((SEEDS / self.name).iterdir()) if path.suffix == Path(self.file).suffix
+        ]
 
 
 def read_result(path: Path) -> None:

@@ -54,7 +54,9 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
         for k, joint in enumerate(signals.joints):
             motor = robot.joint(joint).motor
             assert motor is not None
-            at_motor = {"LHipYawPitch": shared, "RHipYawPitch": 0.0 * shared}.get(joint, torque[:, k]) / motor.gear_ratio
+            at_motor = {"LHipYawPitch": shared, "RHipYawPitch": 0.0 * shared}.get(
+                joint, torque[:, k]
+            ) / motor.gear_ratio
             # R I^2 with I = torque / k_t, k_t = V / no-load speed and R = k_t V / stall torque, at any voltage.
             voltage = 21.6
             k_t = voltage / (motor.no_load_rpm * math.tau / 60.0)
@@ -88,12 +90,10 @@ def test_limits_are_those_of_the_data_sheet() -> None:
 def test_a_flat_battery_binds() -> None:
     """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
     problem = load("nao-dsp", motors="limits")
-    weak = solve(problem.with_values(supply_share=0.18), starts=2)
+    weak = solve(problem.with_values(supply_share=0.18))
     assert weak.success
     assert any(a.name.startswith("torque_") and "[" in a.name for a in weak.active_constraints)
-    full = solve(problem, starts=2)
-    assert weak.objective > full.objective + 1e-4
-    assert full.objective == pytest.approx(solve(load("nao-dsp"), starts=2).objective, rel=1e-6)
+    assert weak.objective > solve(problem).objective + 1e-4
 
 
 def test_the_ankles_roll_follows_the_table() -> None:

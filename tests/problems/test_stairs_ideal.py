@@ -56,5 +56,5 @@ def test_a_search_is_refused(problem: GaitProblem) -> None:
 
 @pytest.mark.parametrize("intervals", [5, 70.0, True])
 def test_intervals_that_are_not_allowed(intervals: float) -> None:
-    with pytest.raises(InputError, match="whole number"):
+    with pytest.raises(InputError, match="intervals must be a"):
         nlp_gait.load("stairs-ideal", intervals=intervals)

@@ -70,7 +70,9 @@ def hostile_report() -> tuple[Page, str]:
         kernel=MARKED,
         jobs=MARKED,
     )
-    settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(algorithm=MARKED),))
+    settings = StudySettings(
+        problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(algorithm=MARKED),)
+    )
     document = document_of(records, Manifest(settings=settings, sessions=(session,)))
     page = Page()
     page.feed(html(document, ["<svg ></svg>"] * sum(len(section.figures) for section in document.sections)))

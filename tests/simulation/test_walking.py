@@ -77,9 +77,18 @@ def test_ten_steps_are_walked_without_a_fall(cycle: Result) -> None:
     assert 0.8 * found.planned_m < found.walked_m < found.planned_m
     assert abs(found.drift_m) < 0.05 and abs(found.heading_deg) < 5.0
     assert found.measurements.largest_tilt_deg < 5.0
+    assert 0.0 < found.measurements.slip_m < 0.03
     predicted = found.measurements.predicted.total_W * plan.duration_s / found.planned_m
     assert predicted == pytest.approx(19.15, rel=0.01)
     assert found.energy_J_per_m is not None and found.energy_J_per_m > predicted
+
+
+def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
+    plan = plan_of(cycle, 2)
+    times = np.array([0.2, 0.6, 0.9, 0.97 + 0.2, 0.97 + 0.6])  # swing, both, both, swing, both
+    assert plan.supports == ()
+    assert plan.stands("left", times).tolist() == [1, 1, 1, 0, 1]
+    assert plan.stands("right", times).tolist() == [0, 1, 1, 1, 1]
 
 
 def test_a_fall_leaves_no_distance(cycle: Result) -> None:

@@ -50,6 +50,7 @@ HELD = np.array([1.2, 1.9, 1.2, 1.9, 1.4, 0.0, 0.0, 0.0, 0.0])  # both feet side
 TOUCHING = ("T", "S", "A", "T'", "S'", "A'")  # toe, sole and ankle of both feet
 DROP_M, HOLD = 0.05, (2000.0, 200.0)  # how high above the ground, gains that hold every link's angle
 AT_REST = 1e-6  # [m/s], [rad/s]
+WEIGHT_TOLERANCE = 1e-5  # a contact 1.3 mm deep has faded in but for 1e-6 of its force
 
 
 @pytest.mark.parametrize("names", [*((name,) for name in TOUCHING), TOUCHING], ids="".join)
@@ -81,7 +82,7 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
     assert np.abs(path[11:, -50:]).max() < AT_REST
     depth = -np.array(heights(path[:11, -1])).ravel()
     carried = STIFFNESS * YIELD_DEPTH * np.tanh(np.maximum(depth, 0.0) / YIELD_DEPTH)
-    assert carried.sum() == pytest.approx(load_biped().mass_kg * GRAVITY, rel=0.05)
+    assert carried.sum() == pytest.approx(load_biped().mass_kg * GRAVITY, rel=WEIGHT_TOLERANCE)
 
 
 def test_friction_slows_a_sliding_mass_and_holds_it() -> None:
