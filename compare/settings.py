@@ -169,6 +169,9 @@ def _problem(raw: Any, source: str) -> ProblemSpec:
     label, options = read.take("label", str, ""), read.table("options", {})
     values, fixed = read.table("set", {}), read.table("fix", {})
     read.done()
+    for key, value in options.items():
+        if not isinstance(value, (str, int, float)):
+            raise InputError(f"{source}: [[problem]]: option {key} must be a text or a number, got {value!r}")
     spec = ProblemSpec(name=name, options=options, label=label, values=values)
     return replace(spec, values=dict(spec.load().fix(**fixed).values)) if fixed else spec
 
@@ -202,11 +205,11 @@ class _Reader:
     def take(self, name: str, kind: type[Any], default: Any = REQUIRED, at_least: int | None = None) -> Any:
         """Value of a key; without a default it is needed."""
         self._known.append(name)
-        value: Any = self._raw.pop(name, default)
-        if value is REQUIRED:
-            raise InputError(f"{self._where} needs {name!r}")
-        if value is default:
-            return value
+        if name not in self._raw:
+            if default is REQUIRED:
+                raise InputError(f"{self._where} needs {name!r}")
+            return default
+        value: Any = self._raw.pop(name)
         if kind is float and type(value) is int:
             value = float(value)
         if (

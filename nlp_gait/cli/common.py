@@ -179,6 +179,9 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 @contextmanager
 def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
     """Progress on stderr, of unknown length if total is None; the function inside advances it by one and shows a note."""
+    if not stderr.is_terminal:
+        yield lambda note: None
+        return
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -187,7 +190,7 @@ def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str]
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}", markup=False),
     )
-    with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
+    with Progress(*columns, console=stderr, transient=True) as progress:
         task = progress.add_task(harmless(description), total=total, note="")
         yield lambda note: progress.update(task, advance=1, note=harmless(note))
 

@@ -190,6 +190,7 @@ def _refuse_others(context: typer.Context, flag: str) -> None:
     for parameter in context.command.params:
         name = str(parameter.name)
         source = context.get_parameter_source(name)
-        if name not in OF_THE_SESSION and source is not None and source.name == "COMMANDLINE":
-            given = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
-            raise InputError(f"{flag} decides what the study computes; leave out {given}")
+        given = source is not None and source.name == "COMMANDLINE"
+        if name not in OF_THE_SESSION and given and context.params.get(name) not in (None, [], ()):
+            flagged = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
+            raise InputError(f"{flag} decides what the study computes; leave out {flagged}")

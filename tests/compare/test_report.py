@@ -157,7 +157,7 @@ def test_calls_and_weights(tables: Tables) -> None:
 
 
 def test_prices_are_those_of_the_best_optimum(tables: Tables) -> None:
-    assert tables.row("knee <b>torque</b>")[1:] == ["upper", "2.5 Nm", "-0.125 W per Nm"]
+    assert tables.row("knee <b>torque</b>")[1:] == ["upper", "2.5 Nm", "-0.125 W per Nm", "-0.0125 W for 0.1 Nm"]
 
 
 def test_every_failed_run_stands_there_with_its_reason(tables: Tables) -> None:

@@ -33,8 +33,8 @@ def test_mutated_files(form: Format, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kept", KEPT, ids=lambda path: path.relative_to(CORPUS).as_posix())
-def test_inputs_that_once_did_harm(kept: Path, tmp_path: Path) -> None:
-    """Names in the corpus say what must become of a file: ``refused-...`` or ``accepted-...``."""
+def test_kept_inputs(kept: Path, tmp_path: Path) -> None:
+    """Most once did harm. Names in the corpus say what must become of a file: ``refused-...`` or ``accepted-...``."""
     form = BY_NAME[kept.parent.name]
     path = prepared(form, tmp_path)
     path.write_bytes(kept.read_bytes())

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import nlp_gait
+from nlp_gait.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.export.result import Result
 from nlp_gait.export.sampled import finely_sampled
@@ -98,6 +103,19 @@ def test_a_fall_leaves_no_distance(cycle: Result) -> None:
     found = measure_walk(plan, play(plan), Drive(), 2)
     assert found.measurements.fallen and found.steps_done <= 2
     assert (found.walked_m, found.drift_m, found.heading_deg, found.energy_J_per_m) == (None, None, None, None)
+
+
+def test_the_command_says_how_far_it_walked(cycle: Result, tmp_path: Path) -> None:
+    result = tmp_path / "cycle.json"
+    result.write_text(json.dumps({"problem": "nao-cycle", "x": cycle.problem.by_name(cycle.x)}))
+    done = CliRunner().invoke(app, ["simulate", str(result), "--steps", "1", "--json"])
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert report["fallen"] is False
+    assert report["walk"]["steps_done"] == 1
+    assert report["walk"]["planned_m"] == pytest.approx(0.07619)
+    said = CliRunner().invoke(app, ["simulate", str(result), "--steps", "1"]).stdout
+    assert "1 steps: walked" in said and "of 76 mm" in said
 
 
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])
