@@ -129,13 +129,10 @@ def power_figure(found: Sequence[Motion]) -> Figure:
                 continue
             axes.plot([m.coefficients for m in drawn], [m.power_W for m in drawn], line, color=colour, label=words)
             for m in drawn:
-                axes.annotate(
-                    m.task.trajectory.removeprefix("spline-"),
-                    (m.coefficients, m.power_W),
-                    (3, 4),
-                    textcoords="offset points",
-                    fontsize=7,
-                )
+                word = m.task.trajectory.removeprefix("spline-")  # numbers of spans above the line, words below
+                offset, side = ((3, 4), "left") if word.isdigit() else ((0, -11), "center")
+                at = (m.coefficients, m.power_W)
+                axes.annotate(word, at, offset, textcoords="offset points", fontsize=7, ha=side)
             towards = limit([m.power_W for m in drawn])
             if towards is not None:
                 axes.axhline(towards, color=colour, ls=":", lw=1.0, label=f"extrapolated, {towards:.3f} W")

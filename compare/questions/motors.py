@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,7 @@ from compare.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problems import GaitProblem
+from nlp_gait.problems import GaitProblem, problem_maker
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.
 VARIANTS: Mapping[str, str] = {
@@ -87,7 +88,7 @@ def motor_variants(
     published = spec.load()
     if "motors" in spec.options:
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
-    if not spec.name.startswith("nao-") or "heat_loss_W_per_Nm2" not in {q.name for q in published.own_parameters}:
+    if "motors" not in inspect.signature(problem_maker(spec.name)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
     limited = _with(spec, "limits")
     first: np.ndarray | None = None

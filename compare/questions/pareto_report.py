@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.figures import COLOURS, new_figure, save, style
-from compare.labels import axis_label, name_in_words
+from compare.labels import axis_label
 from compare.questions.pareto_criteria import Criterion
 from compare.questions.pareto_front import FrontPoint
 from compare.questions.pareto_knees import Bends
@@ -53,7 +53,8 @@ def front_figure(
         left, right = figure.subplots(1, 2)
         for axes in (left, right):
             _draw(axes, front, bent, searches)
-            axes.set_xlabel(axis_label(f"{name_in_words(criterion.name, criterion.unit)}", criterion.unit))
+            axes.set_xlabel(axis_label(criterion.name, criterion.unit))
+            axes.locator_params(axis="x", nbins=6)
         left.set_ylabel("power [W]")
         values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
         left.set_xlim(values[0] - 0.03 * np.ptp(values), values[-1] + 0.03 * np.ptp(values))

@@ -7,13 +7,14 @@ import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from compare.sweep import Axis, SweepPoint, count_solves, sweep
 from compare.task import IPOPT, ProblemSpec
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.export.result import Result
 from nlp_gait.files import write_json, write_text
 from nlp_gait.simulation.drive import Drive
@@ -83,9 +84,18 @@ def optimal_gaits(
         starts: random starts of IPOPT at both ends, and where no neighbour helps.
         seed: of these starts.
         progress: called twice for each point.
+
+    Raises:
+        Interrupted: Ctrl-C; carries the gaits that were found until then.
     """
-    points = sweep(spec, [axis], starts=starts, seed=seed, progress=progress)
-    return [Gait(found=point, indexes=_indexes(result_of(spec, point))) for point in points]
+
+    def gaits(points: Sequence[SweepPoint]) -> list[Gait]:
+        return [Gait(found=point, indexes=_indexes(result_of(spec, point))) for point in points]
+
+    try:
+        return gaits(sweep(spec, [axis], starts=starts, seed=seed, progress=progress))
+    except Interrupted as interrupt:
+        raise Interrupted(interrupt.sentence, gaits(cast("list[SweepPoint]", interrupt.partial))) from None
 
 
 def solves(axis: Axis) -> int:

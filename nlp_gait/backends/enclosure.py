@@ -94,9 +94,10 @@ def _source(kernel: ca.Function) -> str:
     ):
         generator.add(ca.Function(name, [x, p], [ca.densify(output) for output in outputs]))
     generated = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
-    # A square is not the product of two independent intervals.
-    generated = re.sub(r"\bcasadi_real casadi_sq\(.*", "", generated)
-    generated = re.sub(r"\bcasadi_sq\(", "squared(", generated)
+    # A square is not the product of two independent intervals, and a sign is no branch.
+    for helper, name in (("sq", "squared"), ("sign", "sign")):
+        generated = re.sub(rf"\bcasadi_real casadi_{helper}\(.*", "", generated)
+        generated = re.sub(rf"\bcasadi_{helper}\(", f"{name}(", generated)
     native = files("nlp_gait.backends") / "native"
     return "\n".join(
         [

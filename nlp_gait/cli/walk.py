@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -17,6 +17,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     fail,
     print_json,
     print_table,
@@ -60,6 +61,7 @@ def walk(
     from compare.questions.walk_figures import write_figures
     from compare.storage import writable_folder
     from compare.sweep import parse_axis
+    from nlp_gait.backends.interrupts import Interrupted
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.plan import CYCLE
 
@@ -67,13 +69,20 @@ def walk(
         mujoco()  # said now if it is missing, not after the work
     folder, axis = writable_folder(out), parse_axis(over)
     spec = problem_spec(CYCLE, robot, intervals, None, ["objective=power", *(option or ())], values, fix)
-    with progress_bar("solves", solves(axis)) as advance:
-        gaits = optimal_gaits(spec, axis, starts=starts, seed=seed, progress=lambda: advance(""))
-    if steps:
+    stopped = ""
+    try:
+        with progress_bar("solves", solves(axis)) as advance:
+            gaits = optimal_gaits(spec, axis, starts=starts, seed=seed, progress=lambda: advance(""))
         with progress_bar("walks", len(gaits)) as advance:
-            for i, gait in enumerate(gaits):
+            for i, gait in enumerate(gaits if steps else ()):
                 gaits[i] = played(spec, gait, steps)
                 advance(f"{gait.at:g}")
+    except Interrupted as interrupt:
+        gaits, stopped = cast("list[Gait]", interrupt.partial), interrupt.sentence
+        if not gaits:
+            end_interrupted(f"{stopped}; nothing was written")
+    except KeyboardInterrupt:
+        stopped = "interrupted while the gaits were played"
     feasible = [gait for gait in gaits if gait.found.feasible]
     cheapest = min(feasible, key=lambda gait: gait.indexes["cost_of_transport"], default=None)
     written = write_walk(folder, spec, gaits)
@@ -85,6 +94,8 @@ def walk(
         _print(gaits)
         for path in written:
             stdout.print(f"wrote {path}", soft_wrap=True)
+    if stopped:
+        end_interrupted(f"{stopped}; what was found is in {folder}")
     if not feasible:
         fail(gaits[0].found.status)
 

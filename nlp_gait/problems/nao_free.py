@@ -58,12 +58,14 @@ class FreeSamples(NamedTuple):
     Attributes:
         samples: what every phase has.
         others: (5, N + 1) angles of the hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad].
+        along: (1, N + 1) x of the right ankle [m].
         heights: (4, N + 1) of the right sole's corners above the ground [m].
         sides: (2, N + 1) y of its left corners [m].
     """
 
     samples: Samples
     others: MX
+    along: MX
     heights: MX
     sides: MX
 
@@ -152,7 +154,7 @@ class FreeMotion:
         motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T)
         values = motion.map(n)(ca.repmat(point.x, 1, n), ca.repmat(point["reach_margin"], 1, n), table)
         motions = tied(values, ops)
-        torque, zmp, heights, sides = (tied(part, ops) for part in self._instant.map(n)(motions))
+        torque, zmp, along, heights, sides = (tied(part, ops) for part in self._instant.map(n)(motions))
         q, qd = (self._by_joint(part) for part in ca.vertsplit(motions, len(CURVES))[:2])
         samples = Samples(
             planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
@@ -161,11 +163,11 @@ class FreeMotion:
             power=ca.vertcat(*(qd[name] * torque[JOINTS.index(name), :] for name in MOVING)),
             zmp=zmp,
         )
-        return FreeSamples(samples, ca.vertcat(*(q[name] for name in OTHERS)), heights, sides)
+        return FreeSamples(samples, ca.vertcat(*(q[name] for name in OTHERS)), along, heights, sides)
 
     @cached_property
     def _instant(self) -> ca.Function:
-        """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and heights and sides of the sole."""
+        """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and where ankle and sole are."""
         rows = len(CURVES)
         v = SX.sym("v", 3 * rows)
         joints = {name: constant(angle) for name, angle in HELD_ARM_ANGLES.items()}
@@ -176,7 +178,7 @@ class FreeMotion:
         loads = self.loads(joints, body.torso, {"L": SX(DM(self.support[:2]))})
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         left = body.corners[1, 1::2]
-        return ca.Function("instant", [v], economical([torque, loads.zmp, body.corners[2, :].T, left.T]))
+        return ca.Function("instant", [v], economical([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
 
     @cached_property
     def _tree(self) -> tuple[TreeBody, ...]:

@@ -30,11 +30,18 @@ SMOOTHNESS = {
 }
 
 
-class Heights(NamedTuple):
-    """Height of a foot above the ground [m] from x (n,) and the phase, and the variable that says how high it must get."""
+class Swing(NamedTuple):
+    """A foot that swings.
 
-    curve: Callable[[SX, SX], SX]
-    least_in_the_middle: str
+    Attributes:
+        path: (3,) position, height above the ground, from x (n,) and the phase [m].
+        middle: where it is halfway [m].
+        least_height: name of the variable that says how high it must be there.
+    """
+
+    path: Callable[[SX, SX], SX]
+    middle: float
+    least_height: str
 
 
 def with_motion(
@@ -43,7 +50,7 @@ def with_motion(
     splines: Splines,
     criterion: Criterion,
     arms: Callable[[SX, SX], Mapping[str, Motion]],
-    foot: Heights | None = None,
+    foot: Swing | None = None,
 ) -> GaitProblem:
     """A phase's problem with the limits that only a spline can break, and with another objective.
 
@@ -53,7 +60,7 @@ def with_motion(
         splines: on top of the cubics.
         criterion: what is minimised.
         arms: motion of the arms' joints from x (n,) and the phase.
-        foot: height of the swing foot, if there is one.
+        foot: the swing foot, if there is one.
     """
     if criterion not in get_args(Criterion):
         raise InputError(f"objective must be one of {', '.join(get_args(Criterion))}, got {criterion!r}")
@@ -99,29 +106,37 @@ def _mean_squared_rate(values: MX, phase: Phase, point: Point) -> MX:
     return ca.sumsqr(values[:, 1:] - values[:, :-1]) / step**2 / phase.steps
 
 
-def _foot_rows(phase: Phase, foot: Heights | None, point: Point) -> tuple[Constraint, ...]:
-    """Swing foot above the ground between its ends, and as high as asked for in the middle of the phase."""
+def _foot_rows(phase: Phase, foot: Swing | None, point: Point) -> tuple[Constraint, ...]:
+    """Swing foot above the ground between its ends, and halfway in the middle of its path, as high as asked for."""
     if foot is None:
         return ()
-    n = phase.steps
-    heights = _at(lambda x, s: foot.curve(x, s), point, np.linspace(0.0, 1.0, n + 1)[1:-1])
-    middle = _at(lambda x, s: foot.curve(x, s), point, np.array([0.5]))
+    n, path = phase.steps, foot.path
+    heights = _at(lambda x, s: path(x, s)[2], point, np.linspace(0.0, 1.0, n + 1)[1:-1])
+    halfway = _at(path, point, np.array([0.5]))
+    labels = tuple(str(k) for k in range(1, n))
+    return (
+        Constraint(name="foot_height", labels=labels, unit="m", scale=HEIGHT_SCALE, value=heights.T, lower=MX(0.0)),
+        *halfway_rows(halfway[0], foot.middle, halfway[2], point[foot.least_height]),
+    )
+
+
+def halfway_rows(
+    along: MX, middle: float, heights: MX, least: MX, labels: tuple[str, ...] = ()
+) -> tuple[Constraint, ...]:
+    """Where a swing foot is halfway through the phase: in the middle of its path, as in the papers, and high enough.
+
+    Args:
+        along: position along the path [m].
+        middle: of the path [m].
+        heights: (m, 1) of the foot's points [m].
+        least: that these may have [m].
+        labels: of the points.
+    """
     return (
         Constraint(
-            name="foot_height",
-            labels=tuple(str(k) for k in range(1, n)),
-            unit="m",
-            scale=HEIGHT_SCALE,
-            value=heights.T,
-            lower=MX(0.0),
+            name="foot_middle", unit="m", scale=HEIGHT_SCALE, value=along - middle, lower=MX(0.0), upper=MX(0.0)
         ),
-        Constraint(
-            name="foot_lift",
-            unit="m",
-            scale=HEIGHT_SCALE,
-            value=middle - point[foot.least_in_the_middle],
-            lower=MX(0.0),
-        ),
+        Constraint(name="foot_lift", labels=labels, unit="m", scale=HEIGHT_SCALE, value=heights - least, lower=MX(0.0)),
     )
 
 

@@ -26,7 +26,7 @@ from nlp_gait.problems.nao_motion import (
     motion_options,
     samples_in_interval,
 )
-from nlp_gait.problems.nao_motion_limits import Criterion, Heights, with_motion
+from nlp_gait.problems.nao_motion_limits import Criterion, Swing, with_motion
 from nlp_gait.problems.nao_motors import motor_options, with_motors
 from nlp_gait.problems.nao_phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.robots import Foot, Robot
@@ -121,10 +121,11 @@ def nao_ssp(
         duration = single_support_duration(x)
         return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
 
-    def height(x: SX, s: SX) -> SX:
-        return _swing(x, stance, splines.motions(x, single_support_duration(x), s), 0.0, s).position[2]
+    def path(x: SX, s: SX) -> SX:
+        return _swing(x, stance, splines.motions(x, single_support_duration(x), s), 0.0, s).position
 
-    moved = with_motion(problem, phase, splines, objective, arms, Heights(height, "swing_height_m"))
+    swing = Swing(path, sum(stance.swing_x) / 2, "swing_height_m")
+    moved = with_motion(problem, phase, splines, objective, arms, swing)
     return with_motors(moved, phase, motors)
 
 

@@ -17,7 +17,7 @@ from nlp_gait.problems.nao_free import OTHERS, FreeMotion, FreeSamples, free_spl
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables
 from nlp_gait.problems.nao_limits import assemble_phase, phase_problem
 from nlp_gait.problems.nao_motion import SPANS, SPLINE_SAMPLES, Splines, Trajectory
-from nlp_gait.problems.nao_motion_limits import HEIGHT_SCALE, limit_rows
+from nlp_gait.problems.nao_motion_limits import HEIGHT_SCALE, halfway_rows, limit_rows
 from nlp_gait.problems.nao_phase import Phase
 from nlp_gait.problems.nao_ssp import (
     OWN_VARIABLES,
@@ -111,7 +111,7 @@ def nao_ssp_free(
         found = motion.samples(phase, point, ops)
         margins = single_support_margins(found.samples.zmp, stance.support_xy, foot, ops)
         assembly = assemble_phase(point, ops, found.samples, margins, samples_per_interval)
-        rows = free_rows(model, phase.steps, found, point, inner_edge)
+        rows = free_rows(model, phase.steps, found, point, sum(stance.swing_x) / 2, inner_edge)
         return replace(assembly, constraints=(*assembly.constraints, *rows))
 
     def start(p: Array, rng: np.random.Generator) -> Array:
@@ -137,11 +137,13 @@ def fitted_start(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Arra
     """
     dense = planned.dense(FIT_FACTOR)
     assert dense is not None and dense.signals is not None  # a phase has both; for the type checker
-    own = x[: len(hip_variables(nao(str(planned.options["robot"]), True))) + len(OWN_VARIABLES)]
+    own = x[: sum("[" not in name for name in planned.names)]
     return np.concatenate([own, joint_coefficients(dense.signals(x, dense.p), SPANS[trajectory])])
 
 
-def free_rows(robot: Robot, steps: int, found: FreeSamples, point: Point, inner_edge: float) -> tuple[Constraint, ...]:
+def free_rows(
+    robot: Robot, steps: int, found: FreeSamples, point: Point, path_middle: float, inner_edge: float
+) -> tuple[Constraint, ...]:
     """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
 
     Args:
@@ -149,6 +151,7 @@ def free_rows(robot: Robot, steps: int, found: FreeSamples, point: Point, inner_
         steps: N, even.
         found: the phase, N + 1 columns.
         point: symbols.
+        path_middle: x of the swing foot halfway [m].
         inner_edge: y of the supporting sole's inner edge [m].
     """
     between = range(1, steps)
@@ -162,6 +165,6 @@ def free_rows(robot: Robot, steps: int, found: FreeSamples, point: Point, inner_
     return (
         limit_rows(robot, "other_angle", OTHERS, found.others[:, 1:steps]),
         corner_rows("foot_height", found.heights[:, 1:steps], between),
-        corner_rows("foot_lift", found.heights[:, middle] - point["swing_height_m"], (middle,)),
+        *halfway_rows(found.along[middle], path_middle, found.heights[:, middle], point["swing_height_m"], corners),
         corner_rows("feet_apart", inner_edge - found.sides[:, 1:steps], between, corners[1::2]),
     )

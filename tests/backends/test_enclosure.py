@@ -23,7 +23,7 @@ def every_operation(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[
     angle = ca.acos(0.9 * ca.sin(x))
     wave = ca.sin(3 * x) * ca.cos(2 * y) + ca.atan2(y, x + 5) + ca.tanh(x) + ca.exp(-y) + ca.log(y + 1.5) + angle
     kink = ca.fabs(x) + ops.min(x, y) + ca.fmax(x * y, 0.3) + ops.step(x - 0.2, y, 2 * y)
-    return wave / (1.1 + ca.sq(x)) + ca.sqrt(x * x + 0.1) + ca.asin(0.5 * ca.cos(y)), (row(kink, lower=limit),)
+    return wave / (1.1 + x**2) + ca.sqrt(x * x + 0.1) + ca.asin(0.5 * ca.cos(y)), (row(kink, lower=limit),)
 
 
 def boxes_of(problem: GaitProblem, rng: np.random.Generator) -> list[Array]:
@@ -32,9 +32,7 @@ def boxes_of(problem: GaitProblem, rng: np.random.Generator) -> list[Array]:
     for width in np.geomspace(1.0, 1e-6, 13):
         middle = rng.uniform(problem.lower, problem.upper)
         half = width * problem.scale / 2
-        found.append(
-            np.stack([np.maximum(problem.lower, middle - half), np.minimum(problem.upper, middle + half)], -1)
-        )
+        found.append(np.stack([np.maximum(problem.lower, middle - half), np.minimum(problem.upper, middle + half)], -1))
     return found
 
 

@@ -45,7 +45,7 @@ def test_an_incumbent_that_is_not_the_optimum_is_found_out() -> None:
 
 def test_a_maximum_is_bounded_from_above() -> None:
     def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return 5 - ca.sq(x) - ca.sq(y - 1), (row(x, upper=limit),)
+        return 5 - x**2 - (y - 1) ** 2, (row(x, upper=limit),)
 
     certificate = certify(toy(hill, "maximise"), np.array([0.0, 1.0]), tolerance=1e-3, time_limit_s=60.0)
     assert certificate.closed

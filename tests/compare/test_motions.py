@@ -85,7 +85,7 @@ def test_single_support_adds_free_joints_and_smoothness() -> None:
         ("smooth", "nao-ssp", "spline-4"),
         ("free", "nao-ssp-free", "spline-2"),
     ]
-    assert [task.options["samples_per_interval"] for task in study] == [4, 4, 1, 4, 4, 4]
+    assert [task.options["samples_per_interval"] for task in study] == [4, 4, 1, 4, 4, 8]
 
 
 @pytest.mark.parametrize(

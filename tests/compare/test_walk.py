@@ -14,6 +14,7 @@ from compare.questions.walk import Gait, optimal_gaits, result_of, solves, walk_
 from compare.questions.walk_figures import write_figures
 from compare.sweep import parse_axis
 from compare.task import ProblemSpec
+from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.cli import app
 from nlp_gait.export.result import load_result
 
@@ -68,3 +69,17 @@ def test_the_command_walks(tmp_path: Path) -> None:
     assert gait["walk"]["steps_done"] == 2 and not gait["walk"]["measurements"]["fallen"]
     assert gait["walk"]["walked_m"] == pytest.approx(gait["walk"]["planned_m"], rel=0.3)
     assert (tmp_path / "nao-cycle-cost.png").exists() and (tmp_path / "nao-cycle.svg").exists()
+
+
+def test_an_interrupted_walk_keeps_what_was_found(
+    gaits: list[Gait], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from compare.questions import walk as question
+
+    def interrupted(*_: object, **__: object) -> list[Gait]:
+        raise Interrupted("interrupted after 1 of 2 points", gaits[:1])
+
+    monkeypatch.setattr(question, "optimal_gaits", interrupted)
+    done = CliRunner().invoke(app, ["walk", "--intervals", "3", "--out", str(tmp_path)])
+    assert done.exit_code == 130 and "interrupted after 1 of 2 points; what was found is in" in done.stderr
+    assert len((tmp_path / "nao-cycle-walk.csv").read_text().splitlines()) == 2

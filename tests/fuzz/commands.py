@@ -18,7 +18,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from unittest import mock
 
-from nlp_gait.cli import main
+import typer
+
+from nlp_gait.cli import app, main
+from nlp_gait.problems import PROBLEMS
 from tests.fuzz.mutation import TEXTS
 from tests.fuzz.readers import SEEDS
 from tests.fuzz.trial import Hung, limited
@@ -29,7 +32,7 @@ EVALUATE = ("evaluate", "nao-dsp", "--x", GAIT)
 SEARCH = ("search", "nao-dsp", "--runs", "1", "--evaluations", "60")
 SOLVE = ("solve", "walk12", "--starts", "1")
 # Valid command lines, and how often each is taken.
-SEED_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
+KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (2, ("list",)),
     (2, ("list", "walk12", "--json")),
     (8, EVALUATE),
@@ -52,12 +55,15 @@ SEED_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (3, ("simulate", "result.json", "--sole", "round", "--torque-limits", "none", "--friction", "0.5")),
     (2, ("reproduce", "nothing", "--out", "reproduction")),
 )
+# Studies of minutes: they are asked for what does not exist.
+STUDIES = tuple(sorted(set(typer.main.get_command(app).commands) - {line[0] for _, line in KNOWN_LINES}))  # type: ignore[attr-defined]
+SEED_LINES = (*KNOWN_LINES, *((1, (name, "nothing", "--out", "out")) for name in STUDIES))
 COUNTS = ("--starts", "--runs", "--evaluations", "--jobs", "--poses", "--period-ms")
 BAD_COUNTS = ("0", "-1", "1.5", "", "nan", "many", "9" * 400, "\ud800")
-# Never mutated: right values would take minutes.
-SLOW = ("reproduce", "simulate", "animate")
+# Little mutated: with right values they take minutes.
+SLOW = ("compare", "reproduce", "simulate", "animate", *STUDIES)
 HOSTILE = (
-    *TEXTS,
+    *(text for text in TEXTS if text not in PROBLEMS),
     *("nan", "inf", "-inf", "1e999", "1e308", "-1", "0", "9" * 400, "=", "a=", "=1", "a=b", "--", "-", "--help", "--x"),
     *("torque_change_limit_Nm=nan", "torque_change_limit_Nm=-1", "hip_height_m.lower=1e308", "self=1", "name=1"),
     *("intervals=0", "intervals=1e9", "intervals=99999999999", "robot=nao-v7", "step_length_m=inf", "derivatives=x"),
@@ -138,7 +144,8 @@ def workplace(folder: Path) -> Iterator[None]:
 
 def ended(line: Sequence[str]) -> str:
     """``"accepted"`` (status 0), ``"refused"`` (1 or 2, said why), or what is wrong."""
-    out, err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8"), io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", errors="backslashreplace")  # as Python's own
     status: object = None
     try:
         with (

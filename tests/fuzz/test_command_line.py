@@ -9,7 +9,7 @@ import pytest
 
 from tests.fuzz.commands import ended, mutated_line, workplace
 
-LINES = 120
+LINES = 80
 # Each once ended in a traceback, a hang, or an answer to another question.
 KEPT = (
     ("report", "9" * 400),
@@ -21,6 +21,7 @@ KEPT = (
     ("export", "pipe.json", "--format", "csv"),
     ("export", "result.json", "--format", "csv", "--out", "pipe.json"),
     ("evaluate", "nao-dsp", "--x", "\ud800"),
+    ("animate", "result.json", "--speed", "inf"),
 )
 
 

@@ -103,6 +103,7 @@ def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
 @pytest.mark.parametrize(
     ("curve", "value", "row"),
     [
+        ("foot_x_m", 0.02, "foot_middle"),
         ("foot_z_m", -0.2, "foot_height["),
         ("foot_z_m", -0.01, "foot_lift"),
         ("LElbowRoll_rad", 3.0, "arm_angle[LElbowRoll"),

@@ -82,6 +82,9 @@ static inline Interval fabs(Interval a) {
   const double s = __builtin_fabs(a.lo), t = __builtin_fabs(a.hi);
   return Interval(holds(a, 0.0) ? 0.0 : least(s, t), most(s, t));
 }
+static inline Interval sign(Interval a) {
+  return Interval(a.lo > 0.0 ? 1.0 : a.lo == 0.0 ? 0.0 : -1.0, a.hi < 0.0 ? -1.0 : a.hi == 0.0 ? 0.0 : 1.0);
+}
 static inline Interval squared(Interval a) {
   const Interval b = fabs(a);
   const Interval s = outward(b.lo * b.lo, b.hi * b.hi);
