@@ -14,6 +14,7 @@ from compare.questions.pareto_front import FrontPoint, pareto_front
 from compare.questions.pareto_knees import Bends, bends
 from compare.questions.pareto_search import Scale, SearchFront, best_of_all, search_fronts
 from compare.reproductions.resume import Steps, fingerprint
+from metaheuristics.multi_objective import MultiObjective
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import GaitProblem
 
@@ -88,6 +89,8 @@ def pareto_study(
         SearchError: no such algorithm, or pymoo is not installed.
     """
     beside = criterion(name, problem)
+    for algorithm in searches:
+        MultiObjective(algorithm=algorithm)  # said now, not after the front, if it cannot be had
     free = beside.freed(problem)
     steps = Steps(out, progress, code=[front_module])
     identity = {**fingerprint(free), "criterion": name}

@@ -51,7 +51,6 @@ def pareto_front(
     points: int = 40,
     starts: int = 5,
     seed: int = 0,
-    extra: Sequence[tuple[float, Array]] = (),
     progress: Callable[[str], None] = lambda note: None,
 ) -> list[FrontPoint]:
     """Points of the front, by rising criterion, about evenly spaced along it.
@@ -67,7 +66,6 @@ def pareto_front(
         points: at least five.
         starts: random starts at both ends and at every third point.
         seed: of the random starts.
-        extra: values of the criterion at which the front is to have a point, with a start (n,) for it.
         progress: told what is done.
 
     Raises:
@@ -101,11 +99,8 @@ def pareto_front(
         for _ in range(starts):
             attempt(at, criterion.limited(free, at).start_point(rng))
         progress(f"random starts at {criterion.name} {at:.5g} {criterion.unit}")
-    for at, x0 in extra:
-        attempt(at, x0)
-    known = sorted({*grid, *found})
-    walk(known, seed)
-    walk(known[::-1], seed + 1)
+    walk(grid, seed)
+    walk(grid[::-1], seed + 1)
     while len(found) < points:
         at, neighbours = _largest_gap(found)
         limited = criterion.limited(free, at)

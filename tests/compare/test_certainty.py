@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
 from casadi import MX

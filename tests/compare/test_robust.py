@@ -23,7 +23,18 @@ SPEC = ProblemSpec(name="nao-ssp")
 
 def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(questions, "boxes", lambda *args: {"soles": boxes(*args)["soles"]})
-    command = ["robust", "nao-ssp", "--starts", "1", "--samples", "2", "--no-simulate", "--out", str(tmp_path), "--json"]
+    command = [
+        "robust",
+        "nao-ssp",
+        "--starts",
+        "1",
+        "--samples",
+        "2",
+        "--no-simulate",
+        "--out",
+        str(tmp_path),
+        "--json",
+    ]
     done = RUN.invoke(app, command)
     assert done.exit_code == 0, done.output
     answer = json.loads(done.stdout)
