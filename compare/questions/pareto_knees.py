@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.questions.pareto_front import FrontPoint
+from nlp_gait.problems.gait_problem import Array
 
-# A bend is a knee if the front turns by so much [rad] within a tenth of its length, the ranges of both objectives being 1.
-LEAST_TURN = np.pi / 6
+# A bend is a knee if the front turns by so much [rad] within this part of its length, the ranges of both objectives being 1.
+LEAST_TURN = np.pi / 12
 WINDOW = 0.1
 
 
@@ -54,34 +55,38 @@ class Bends:
 def bends(front: Sequence[FrontPoint]) -> Bends:
     """Knees of a front (at least three points, by rising criterion), from its points alone.
 
-    The direction of each piece between neighbours is taken with both ranges as 1. A knee is a stretch of at most a tenth of
-    the front's length over which the direction turns by at least 30 degrees towards dearer; of overlapping stretches the one
-    that turns most counts, and its sharpest point is given. The prices beside it come from the multipliers.
+    A knee is a point at which the straight line from the point a twentieth of the front's length before it, and that to the
+    point as far behind it, differ in direction by at least 15 degrees, towards dearer, both ranges being 1; so a point that
+    lies a little off makes none. Of those within a tenth of the length the sharpest counts. The prices beside it come from
+    the multipliers.
     """
     value, power = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     across, up = np.diff(value) / np.ptp(value), np.diff(power) / np.ptp(power)
-    length = np.hypot(across, up)
-    angle = np.arctan2(up, across)
-    turn = np.concatenate([[0.0], np.diff(angle), [0.0]])
-    along = np.concatenate([[0.0], np.cumsum(length)])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(across, up))])
+    scaled = np.column_stack([(value - value[0]) / np.ptp(value), (power - power[0]) / np.ptp(power)])
     # From the better side: the chord lies above a convex front.
-    chord = ((value - value[0]) / np.ptp(value) - (power - power[0]) / np.ptp(power)) / np.sqrt(2)
+    chord = (scaled[:, 0] - scaled[:, 1]) / np.sqrt(2)
     half = WINDOW * along[-1] / 2
-    total = np.array([turn[np.abs(along - here) <= half].sum() for here in along])
+
+    def at(place: Array) -> Array:
+        return np.column_stack([np.interp(place, along, scaled[:, k]) for k in (0, 1)])
+
+    before, after = scaled - at(along - half), at(along + half) - scaled
+    total = np.arctan2(after[:, 1], after[:, 0]) - np.arctan2(before[:, 1], before[:, 0])
+    total[(along < half) | (along > along[-1] - half)] = 0.0
     free = np.ones(len(front), dtype=bool)
     knees = []
     while free.any() and total[free].max() >= LEAST_TURN:
         centre = int(np.flatnonzero(free)[np.argmax(total[free])])
         stretch = np.flatnonzero(np.abs(along - along[centre]) <= half)
-        sharpest = int(stretch[np.argmax(turn[stretch])])
         knees.append(
             Knee(
-                value=float(value[sharpest]),
-                power_W=float(power[sharpest]),
+                value=float(value[centre]),
+                power_W=float(power[centre]),
                 price_before=front[max(0, stretch[0] - 1)].price,
                 price_after=front[min(len(front) - 1, stretch[-1] + 1)].price,
                 turn_deg=float(np.degrees(total[centre])),
-                chord_distance=float(chord[sharpest]),
+                chord_distance=float(chord[centre]),
             )
         )
         free &= np.abs(along - along[centre]) > 2 * half

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,9 +102,18 @@ def pareto_surface(
                 x=tuple(x.tolist()),
             )
         )
+    # A point that meets more than is demanded of another one answers that demand too, and may be the better optimum.
+    better = [min((q for q in found if _meets(q, p)), key=lambda q: q.power_W) for p in found]
+    found = [replace(q, demanded=p.demanded) for p, q in zip(found, better, strict=True)]
     if not found:
         raise InputError(f"no pair of demands on {names[0]} and {names[1]} of {problem.name} can be met")
     return Surface(problem=free, criteria=(first, second), points=tuple(found), infeasible=tuple(infeasible))
+
+
+def _meets(point: SurfacePoint, other: SurfacePoint) -> bool:
+    """Whether a point is at least as good as another one in both criteria, or has its demands."""
+    reached = all(value >= demand for value, demand in zip(point.values, other.demanded, strict=True))
+    return reached or point.demanded == other.demanded
 
 
 def surface_json(surface: Surface) -> dict[str, Any]:

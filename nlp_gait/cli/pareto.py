@@ -106,14 +106,14 @@ def pareto(
 
 def _print(study: ParetoStudy) -> None:
     unit, front = study.criterion.unit, study.front
-    shown = [front[round(i * (len(front) - 1) / 9)] for i in range(10)]
+    shown = [front[i] for i in sorted({round(k * (len(front) - 1) / 9) for k in range(10)})]
     print_table(
-        f"{study.problem.name}: front of power against {study.criterion.name}, {len(front)} points, 10 shown",
+        f"{study.problem.name}: front of power against {study.criterion.name}, {len(front)} points, {len(shown)} shown",
         (study.criterion.name, "power", "price"),
         [(f"{p.value:.5f} {unit}", f"{p.power_W:.5f} W", f"{p.price:.4g} W per {unit}") for p in shown],
     )
     print_table(
-        "Knees: turns of at least 30 degrees within a tenth of the front's length, both ranges being 1",
+        "Knees: turns of at least 15 degrees within a tenth of the front's length, both ranges being 1",
         (study.criterion.name, "power", "turn", "price before", "price after"),
         [
             (

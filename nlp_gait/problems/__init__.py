@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problems.gait_problem import GaitProblem
+from nlp_gait.problems.gait_problem import GaitProblem, is_number
 
 # Module and function of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
@@ -25,6 +24,7 @@ PROBLEMS = {
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
+KINDS = {int: "a whole number", float: "a finite number", str: "a text", bool: "true or false"}
 
 
 def problem_names() -> tuple[str, ...]:
@@ -58,12 +58,11 @@ def check_options(name: str, options: Mapping[str, Any]) -> None:
         if option not in known:
             raise unknown(f"option of {name}", option, known)
         expected = type(known[option].default)
-        if type(value) is not expected and not (expected is float and type(value) is int):
-            raise InputError(f"option {option} must be a {expected.__name__}, got {value!r}")
+        right = type(value) is expected or (expected is float and type(value) is int)
+        if not right or (expected is float and not is_number(value)):
+            raise InputError(f"option {option} must be {KINDS.get(expected, expected.__name__)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
-        if expected is float and not math.isfinite(value):
-            raise InputError(f"option {option} must be finite, got {value}")
 
 
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:

@@ -128,7 +128,7 @@ def test_steps_may_be_longer(name: str) -> None:
 @pytest.mark.parametrize("step", [0.0, -0.06, np.nan, np.inf, "far", True])
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
-    with pytest.raises(InputError, match=r"step_length_m must be a finite number > 0, got"):
+    with pytest.raises(InputError, match=r"step_length_m must be a finite number( > 0)?, got"):
         load(name, step_length_m=step)
 
 
