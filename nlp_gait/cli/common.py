@@ -21,7 +21,7 @@ from rich.text import Text
 
 from compare.runner import ProblemSpec
 from metaheuristics import SearchError
-from nlp_gait.errors import GaitError, InputError, unknown
+from nlp_gait.errors import GaitError, InputError, OutputError, unknown
 from nlp_gait.files import without_nan
 from nlp_gait.problems import problem_maker
 
@@ -200,8 +200,11 @@ def output_file(path: Path) -> Path:
     from compare.storage import writable_folder
 
     writable_folder(path.parent)
-    if path.is_dir():
-        raise InputError(f"{str(path)!r} is a folder; name a file")
+    try:
+        if path.is_dir():
+            raise InputError(f"{str(path)!r} is a folder; name a file")
+    except OSError as error:  # its name is too long
+        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
     return path
 
 

@@ -51,7 +51,7 @@ def load_robot(name_or_path: str) -> Robot:
 def _beside_urdf(path: str) -> str:
     """The robot file that extends a URDF and lies beside it under the same name."""
     partner = Path(path).with_suffix(".json")
-    if not partner.is_file():
+    if not os.path.isfile(partner):
         raise RobotDataError(
             f"robot file {path!r}: a URDF says nothing about soles; write {str(partner)!r} with "
             f'{{"schema": {SCHEMA}, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'

@@ -22,6 +22,9 @@ KEPT = (
     ("export", "result.json", "--format", "csv", "--out", "pipe.json"),
     ("evaluate", "nao-dsp", "--x", "\ud800"),
     ("animate", "result.json", "--speed", "inf"),
+    ("export", "result.json", "--format", "csv", "--period-ms", "9" * 400),
+    ("export", "result.json", "--format", "csv", "--out", "x" * 300),
+    ("evaluate", "nao-dsp", "--x", "1", "--robot", "x" * 300 + ".urdf"),
 )
 
 
