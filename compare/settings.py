@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError, kind_name, unknown
 from nlp_gait.files import check_plain, read_text
 
 SCHEMA = 1  # of study files, which need not state it
@@ -218,7 +218,7 @@ class _Reader:
             or (at_least is not None and value < at_least)
         ):
             limit = "" if at_least is None else f" of at least {at_least}"
-            raise InputError(f"{self._where}: {name} must be a {kind.__name__}{limit}, got {value!r}")
+            raise InputError(f"{self._where}: {name} must be {kind_name(kind)}{limit}, got {value!r}")
         return value
 
     def table(self, name: str, default: Mapping[str, Any]) -> dict[str, Any]:

@@ -54,3 +54,16 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
     return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
+
+
+def kind_name(kind: type) -> str:
+    """What a value of a type is called to its user: ``a whole number`` for int."""
+    names = {
+        bool: "true or false",
+        int: "a whole number",
+        float: "a finite number",
+        str: "a text",
+        dict: "a table",
+        list: "a list",
+    }
+    return names.get(kind, kind.__name__)

@@ -21,7 +21,7 @@ from rich.text import Text
 
 from compare.runner import ProblemSpec
 from metaheuristics import SearchError
-from nlp_gait.errors import GaitError, InputError, OutputError, unknown
+from nlp_gait.errors import GaitError, InputError, OutputError, kind_name, unknown
 from nlp_gait.files import without_nan
 from nlp_gait.problems import problem_maker
 
@@ -235,5 +235,5 @@ def _typed(name: str, text: str, default: Any) -> str | int | float | bool:
         try:
             return type(default)(text)
         except ValueError:
-            raise InputError(f"--option {name} must be a {type(default).__name__}, got {text!r}") from None
+            raise InputError(f"--option {name} must be {kind_name(type(default))}, got {text!r}") from None
     return text

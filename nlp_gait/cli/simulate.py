@@ -81,9 +81,10 @@ def simulate(
         trace = (shown if viewer else play)(plan, conditions, drive, sole)
     walk = None if steps is None else measure_walk(plan, trace, drive, steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
-    survival, data = None, {**report.to_json(), **({} if walk is None else {"walk": walk.course()})}
+    survival = None
+    data = {"schema": 1, **report.to_json(), **({} if walk is None else {"walk": walk.course()})}
     if folder is not None:
-        write_json(folder / "report.json", {"schema": 1, **without_nan(data)})
+        write_json(folder / "report.json", without_nan(data))
         write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
         write_npz(folder / "playback.npz", trace.signals(plan.joints))
         plot_playback(plan, trace, drive, folder / "playback")
@@ -99,7 +100,7 @@ def simulate(
             end_interrupted(f"interrupted in the tests of robustness; {kept}")
         data["robustness"] = survival.to_json()
         if folder is not None:
-            write_json(folder / "report.json", {"schema": 1, **without_nan(data)})
+            write_json(folder / "report.json", without_nan(data))
     if as_json:
         print_json(data)
     else:

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError, kind_name, unknown
 from nlp_gait.problems.gait_problem import GaitProblem, is_number
 
 # Module and function of each problem, imported when it is asked for: no process pays for those that it does not use.
@@ -24,7 +24,6 @@ PROBLEMS = {
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
-KINDS = {int: "a whole number", float: "a finite number", str: "a text", bool: "true or false"}
 
 
 def problem_names() -> tuple[str, ...]:
@@ -60,7 +59,7 @@ def check_options(name: str, options: Mapping[str, Any]) -> None:
         expected = type(known[option].default)
         right = type(value) is expected or (expected is float and type(value) is int)
         if not right or (expected is float and not is_number(value)):
-            raise InputError(f"option {option} must be {KINDS.get(expected, expected.__name__)}, got {value!r}")
+            raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
 

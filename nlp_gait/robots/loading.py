@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
-from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.errors import RobotDataError, kind_name, unknown
 from nlp_gait.files import read_json
 from nlp_gait.robots.fields import LARGEST_NUMBER, check_keys
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
@@ -224,7 +224,7 @@ def _group(raw: Mapping[str, Any], group: str, robot: str) -> dict[str, Any]:
 def _get(raw: Mapping[str, Any], key: str, kind: type[T], owner: str) -> T:
     value = raw.get(key)
     if not isinstance(value, kind):
-        raise RobotDataError(f"{owner}: {key!r} must be a {kind.__name__}, got {value!r}")
+        raise RobotDataError(f"{owner}: {key!r} must be {kind_name(kind)}, got {value!r}")
     return value
 
 

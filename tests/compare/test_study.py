@@ -247,15 +247,15 @@ def test_study_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("runs = 3", "runs = 0"), "runs must be a int of at least 1, got 0"),
-        (("runs = 3", "runs = true"), "runs must be a int"),
+        (("runs = 3", "runs = 0"), "runs must be a whole number of at least 1, got 0"),
+        (("runs = 3", "runs = true"), "runs must be a whole number"),
         (("runs = 3", "run = 3"), "unknown key of .*'run'; did you mean 'runs'"),
         (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
         (("target = 0.9", "target = nan"), "finite numbers"),
         (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
         (('algorithm = "ipopt"', 'label = "x"'), "needs 'algorithm'"),
         (("runs = 3", "runs = "), "is not valid TOML"),
-        (('name = "nao-ssp"', "name = 3"), "name must be a str, got 3"),
+        (('name = "nao-ssp"', "name = 3"), "name must be a text, got 3"),
         (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
         (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be a table"),
     ],

@@ -57,7 +57,10 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": None}}, "hip_height_m must be a number, got None"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m' must be finite, got nan"),
         ({"problem": "nao-dsp", "x": X, "options": {"robot": 5}}, "option robot must be a text, got 5"),
-        ({"problem": "nao-dsp", "x": X, "options": {"intervals": True}}, "option intervals must be a whole number, got True"),
+        (
+            {"problem": "nao-dsp", "x": X, "options": {"intervals": True}},
+            "option intervals must be a whole number, got True",
+        ),
         ({"problem": "nao-dsp", "x": X, "options": {"robots": "nao-v5"}}, "unknown option of nao-dsp 'robots'"),
         ({"problem": "nao-dsp", "x": X, "options": []}, "'options' must be an object"),
         ({"problem": "nao-dsp", "x": X, "parameters": {"gravity": 1.6}}, "unknown parameter"),
