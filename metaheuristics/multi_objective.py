@@ -73,6 +73,18 @@ class MultiObjective:
                 "pip install 'nlp-gait[algorithms]'"
             )
 
+    def check_budgets(self, evaluations: Sequence[int]) -> None:
+        """Refuse budgets that this algorithm cannot be looked at after.
+
+        Raises:
+            SearchError: they do not rise, or the first one is less than a generation.
+        """
+        budgets = list(evaluations)
+        if not budgets or budgets != sorted(set(budgets)) or budgets[0] < self.population:
+            raise SearchError(
+                f"evaluations must rise and begin with at least the population of {self.population}, got {budgets}"
+            )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Snapshot:
@@ -112,11 +124,8 @@ def minimize_many(
     Raises:
         SearchError: an argument is not allowed, or an objective is not finite.
     """
+    algorithm.check_budgets(evaluations)
     budgets = list(evaluations)
-    if not budgets or budgets != sorted(set(budgets)) or budgets[0] < algorithm.population:
-        raise SearchError(
-            f"evaluations must rise and begin with at least the population of {algorithm.population}, got {budgets}"
-        )
     from pymoo.core.problem import Problem
     from pymoo.core.termination import NoTermination
 

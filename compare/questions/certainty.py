@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -67,13 +68,15 @@ class Certainty:
     @property
     def proven(self) -> str:
         """In one sentence."""
-        c, unit = self.certificate, self.problem.objective.unit
+        c = self.certificate
         if c is None:
             return "nothing: branch and bound is for smooth problems of at most four variables"
+        if not math.isfinite(c.bound):
+            return f"nothing: the time limit came before a finite bound, after {c.boxes:,} boxes"
+        unit = "" if self.problem.objective.unit == "1" else f" {self.problem.objective.unit}"
         word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
         return (
-            f"{word} {c.bound:.6g} {unit if unit != '1' else ''}".rstrip()
-            + f", {100 * c.gap:.3g} % from the best known {c.objective:.6g}; "
+            f"{word} {c.bound:.6g}{unit}, {100 * c.gap:.3g} % from the best known {c.objective:.6g}{unit}; "
             + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
             + "; intervals rounded outward, libm's functions taken to be within four units in the last place"
         )
@@ -135,12 +138,17 @@ def certainty(
         progress: told how many starts are done more, and a note.
 
     Raises:
-        InputError: no start converged.
+        InputError: no start converged, or tolerance or time limit are not allowed.
         SearchError: CMA-ES is asked for and not installed.
         CompilerError: branch and bound is asked for and there is no compiler.
     """
+    # What is wrong is said now, not after the starts.
+    if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
+        raise InputError(
+            f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"
+        )
     if evaluations:
-        metaheuristics.algorithm("cma")  # said now, not after the starts, if it is not installed
+        metaheuristics.algorithm("cma")
     ends = multistart(problem, out, starts=starts, seed=seed, progress=progress)
     optima = cluster(problem, ends)
     if not optima:
@@ -158,15 +166,14 @@ def certainty(
         return asdict(LongSearch(objective=value, evaluations=result.evaluations, gap=gap))
 
     def proven() -> dict[str, Any]:
-        return asdict(
-            certify(
-                problem,
-                np.array(best.x),
-                tolerance=tolerance,
-                time_limit_s=time_limit_s,
-                progress=lambda boxes, bound: progress(0, f"{boxes} boxes, bound {bound:.6g}"),
-            )
+        certificate = certify(
+            problem,
+            np.array(best.x),
+            tolerance=tolerance,
+            time_limit_s=time_limit_s,
+            progress=lambda boxes, bound: progress(0, f"{boxes} boxes, bound {bound:.6g}"),
         )
+        return {**asdict(certificate), "bound": certificate.bound if math.isfinite(certificate.bound) else None}
 
     search = certificate = None
     if evaluations:
@@ -174,7 +181,8 @@ def certainty(
     if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
         kept = steps("certificate", inputs, proven)
-        certificate = Certificate(**{**kept, "x": tuple(kept["x"])})
+        bound = -problem.objective.sign * math.inf if kept["bound"] is None else kept["bound"]
+        certificate = Certificate(**{**kept, "x": tuple(kept["x"]), "bound": bound})
     return Certainty(
         problem=problem,
         starts=starts,

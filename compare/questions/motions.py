@@ -21,7 +21,7 @@ from nlp_gait.files import read_json, write_json
 from nlp_gait.problems.gait_problem import Array, GaitProblem
 from nlp_gait.problems.nao_motion import SPANS
 from nlp_gait.problems.nao_ssp_free import fitted_start
-from nlp_gait.symbolic.splines import coefficient_count, finer
+from nlp_gait.symbolic.splines import finer
 
 # A study of many variables may take longer than a single solve of few.
 TIME_LIMIT_S, ITERATIONS = 3600.0, 1000
@@ -146,23 +146,33 @@ def _solved(task: MotionTask, earlier: Sequence[Motion], seed: int) -> Motion:
 
 
 def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) -> Array | None:
-    """Start point from the richest simpler motion: the same motion, or with free joints at first one fitted to a planned one."""
-    own = sum("[" not in name for name in problem.names)
-    simpler = [m for m in earlier if m.success and SPANS[m.task.trajectory] <= SPANS[task.trajectory]]
-    for motion in reversed(simpler):
-        if motion.task.problem == task.problem and motion.task.kind in (PLANNED, FREED):
-            curves = (len(problem.names) - own) // max(1, coefficient_count(SPANS[task.trajectory]))
-            x = np.array(list(motion.x.values()))
-            return np.concatenate([x[:own], _embedded(x[own:].reshape(curves, -1), SPANS[task.trajectory]).ravel()])
-    for motion in reversed([m for m in earlier if m.success and m.task.kind == PLANNED and task.kind == FREED]):
+    """Start point from the richest earlier motion that this one contains, or if there is none, fitted to a planned one."""
+    spans = SPANS[task.trajectory]
+    solved = [m for m in reversed(earlier) if m.success and m.task.kind in (PLANNED, FREED)]
+    for motion in solved:
+        if SPANS[motion.task.trajectory] <= spans and _contains(problem, motion.task, task.trajectory):
+            return _embedded(motion.x, problem.names, spans)
+    for motion in solved if task.kind == FREED else ():
         planned = ProblemSpec(name=motion.task.problem, options=motion.task.options).load()
         return fitted_start(task.trajectory, planned, np.array(list(motion.x.values())))  # type: ignore[arg-type]
     return None
 
 
-def _embedded(coefficients: Array, spans: int) -> Array:
-    """Coefficients (curves, m) of the same curves with more spans; 0 spans stand for none."""
-    return finer(coefficients.T, spans).T if spans else coefficients
+def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> bool:
+    """Whether a problem has all curves of a simpler one."""
+    same = ProblemSpec(name=simpler.problem, options={**simpler.options, "trajectory": trajectory}).load()
+    return set(same.names) <= set(problem.names)
+
+
+def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:
+    """The same motion with more spans, and with curves at zero that it has not."""
+    curves: dict[str, list[float]] = {}
+    for name, value in x.items():
+        curves.setdefault(name.partition("[")[0], []).append(value)
+    found = [np.array(curves[name]) for name in names if "[" not in name]
+    for curve in dict.fromkeys(name.partition("[")[0] for name in names if "[" in name):
+        found.append(finer(np.array(curves.get(curve, [])), spans))
+    return np.concatenate(found)
 
 
 def _objectives(task: MotionTask, x: Array) -> dict[str, float]:

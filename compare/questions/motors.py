@@ -10,9 +10,12 @@ import numpy as np
 
 from compare.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.backends.solution import Solution
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problems import GaitProblem, problem_maker
+from nlp_gait.problems.gait_problem import Array
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.
 VARIANTS: Mapping[str, str] = {
@@ -84,6 +87,7 @@ def motor_variants(
 
     Raises:
         InputError: a problem without motors, or one that has the option already.
+        Interrupted: Ctrl-C; carries the variants that were solved until then.
     """
     published = spec.load()
     if "motors" in spec.options:
@@ -91,33 +95,46 @@ def motor_variants(
     if "motors" not in inspect.signature(problem_maker(spec.name)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
     limited = _with(spec, "limits")
-    first: np.ndarray | None = None
     found: list[Variant] = []
-    for name, features in VARIANTS.items():
-        problem = _with(spec, features)
-        solution = solve(problem, starts=starts, seed=seed, x0=first)
-        x = np.array([solution.x[variable] for variable in problem.names])
-        first = x if first is None else first
-        moves = np.abs(x - first) / problem.scale
-        unchanged, violation, *_ = exact_model(problem).function(first, problem.p)
-        found.append(
-            Variant(
-                name=name,
-                features=features,
-                success=solution.success,
-                status=solution.status,
-                power_W=solution.objective,
-                unchanged_power_W=float(unchanged),
-                unchanged_violation=float(violation),
-                published_power_W=float(exact_model(published).function(x, published.p)[0]),
-                x=solution.x,
-                moved=(float(moves.max()), problem.names[int(moves.argmax())]),
-                uses=limit_uses(limited, x),
-            )
-        )
-        if progress is not None:
-            progress(name)
+    try:
+        for name, features in VARIANTS.items():
+            problem = _with(spec, features)
+            first = np.array(list(found[0].x.values())) if found else None
+            solution = solve(problem, starts=starts, seed=seed, x0=first)
+            found.append(_variant(name, problem, solution, first, published, limited))
+            if progress is not None:
+                progress(name)
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted after {len(found)} of {len(VARIANTS)} variants", tuple(found)) from None
     return tuple(found)
+
+
+def _variant(
+    name: str,
+    problem: GaitProblem,
+    solution: Solution,
+    first: Array | None,
+    published: GaitProblem,
+    limited: GaitProblem,
+) -> Variant:
+    """A variant from its solution, beside the published optimum ``first`` (n,), which None says it is itself."""
+    x = np.array([solution.x[variable] for variable in problem.names])
+    first = x if first is None else first
+    moves = np.abs(x - first) / problem.scale
+    unchanged, violation, *_ = exact_model(problem).function(first, problem.p)
+    return Variant(
+        name=name,
+        features=VARIANTS[name],
+        success=solution.success,
+        status=solution.status,
+        power_W=solution.objective,
+        unchanged_power_W=float(unchanged),
+        unchanged_violation=float(violation),
+        published_power_W=float(exact_model(published).function(x, published.p)[0]),
+        x=solution.x,
+        moved=(float(moves.max()), problem.names[int(moves.argmax())]),
+        uses=limit_uses(limited, x),
+    )
 
 
 def limit_uses(limited: GaitProblem, x: np.ndarray) -> dict[str, Use]:

@@ -86,11 +86,11 @@ def pareto_study(
     Raises:
         UnknownNameError: no such criterion.
         InputError: the problem trades nothing, or its front cannot be found.
-        SearchError: no such algorithm, or pymoo is not installed.
+        SearchError: no such algorithm, a budget that cannot be, or pymoo is not installed.
     """
     beside = criterion(name, problem)
-    for algorithm in searches:
-        MultiObjective(algorithm=algorithm)  # said now, not after the front, if it cannot be had
+    for algorithm, budgets in searches.items():
+        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # said now, not after the front
     free = beside.freed(problem)
     steps = Steps(out, progress, code=[front_module])
     identity = {**fingerprint(free), "criterion": name}

@@ -9,7 +9,8 @@ import numpy as np
 
 from compare.questions.pareto_criteria import REWARD, Criterion, rewarding
 from nlp_gait.backends.continuation import Attempt, Continuation, best_end
-from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem

@@ -14,7 +14,8 @@ from compare.questions.price import STANDS, Price, Prices
 from compare.questions.steps import LENGTH, MASS, NaturalStep, natural_step
 from compare.task import ProblemSpec
 from nlp_gait.backends.continuation import Continuation, best_end
-from nlp_gait.backends.ipopt import End, ipopt_for
+from nlp_gait.backends.ipopt import ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
 from nlp_gait.errors import InputError

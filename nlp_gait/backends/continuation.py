@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
-from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.solution import Solution
 from nlp_gait.backends.solve import outcome_of, solution_of
 from nlp_gait.problems.gait_problem import Array, GaitProblem

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
@@ -15,7 +14,8 @@ import numpy as np
 
 from nlp_gait.backends.derivatives import WORTHWHILE_STARTS, compiled_nlp, one_direction_at_a_time
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.interrupts import deferred_interrupts, never
+from nlp_gait.backends.ipopt_end import CONVERGED, End, Guess
 from nlp_gait.backends.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.iteration_watch import INTERRUPTED, TIME_IS_UP, IterationWatch
 from nlp_gait.backends.nlp import NlpModel, nlp_model
@@ -32,21 +32,6 @@ NARROWER_WIDTHS = (1e-4, 2e-5)
 # Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
 # Over the 50 points of nao-ssp's swing heights 1e-5 takes 574 iterations, 1e-8 takes 138; over its durations 584 and 332.
 WARM_BARRIER = 1e-8
-
-STATUS_WORDS = {
-    "Solve_Succeeded": "converged",
-    "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
-    "Infeasible_Problem_Detected": "converged to a point of local infeasibility",
-    "Maximum_Iterations_Exceeded": "stopped at the iteration limit",
-    TIME_IS_UP: "stopped at the time limit",
-    "Restoration_Failed": "restoration of feasibility failed",
-    "Search_Direction_Becomes_Too_Small": "search direction became too small",
-    "Diverging_Iterates": "iterates diverged",
-    "Invalid_Number_Detected": "a function returned NaN or inf",
-    "Error_In_Step_Computation": "the linear solver failed",
-    INTERRUPTED: "was interrupted",
-}
-CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,72 +68,6 @@ class IpoptSettings:
             raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Guess:
-    """Primal and dual start of IPOPT: scaled variables with the lifted ones, multipliers of bounds and rows.
-
-    ``width`` is the sigmoid width of the stage that they come from.
-    """
-
-    primal: Array
-    bounds: Array
-    rows: Array
-    width: float = WIDTHS[-1]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class End:
-    """Where one run ended.
-
-    Attributes:
-        x: (n,) decision variables, within their bounds.
-        cost: exact value of what is minimised.
-        violation: exact total violation.
-        row_multipliers: of the problem's rows.
-        bound_multipliers: of the scaled variables' bounds.
-        return_status: IPOPT's own word.
-        iterations: over all stages.
-        evaluations: over all stages.
-        time_s: wall time [s].
-        guess: start for a neighbouring problem.
-    """
-
-    x: Array
-    cost: float
-    violation: float
-    row_multipliers: Array
-    bound_multipliers: Array
-    return_status: str
-    iterations: int
-    evaluations: Evaluations
-    time_s: float
-    guess: Guess
-
-    @property
-    def feasible(self) -> bool:
-        """Whether the exact functions find it feasible, with a finite cost."""
-        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
-
-    @property
-    def success(self) -> bool:
-        """Converged, and feasible for the exact functions."""
-        return self.return_status in CONVERGED and self.feasible
-
-    @property
-    def rank(self) -> tuple[float, float]:
-        """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
-        if self.feasible:
-            return (0.0 if self.success else 1.0), self.cost
-        return 2.0, math.inf if math.isnan(self.violation) else self.violation
-
-    @property
-    def status(self) -> str:
-        """How it ended, in words."""
-        words = STATUS_WORDS.get(self.return_status, self.return_status.replace("_", " ").lower())
-        refused = self.return_status in CONVERGED and not self.success
-        return words + (", but the exact functions find it infeasible" if refused else "")
 
 
 class Ipopt:
@@ -222,26 +141,30 @@ class Ipopt:
         stop: Callable[[], bool],
         cold: bool,
     ) -> End:
+        """Stages of a run. Where the caller does not ask to stop, Ctrl-C ends the iterations and is raised after them."""
         model, exact, p, n = self.model, exact_model(problem), problem.p, self.model.variables
-        bounds = self._bounds(problem)
+        bounds = model.bounds(problem)
         iterations, evaluations = 0, Evaluations()
         started = time.perf_counter()
-        self._watch.begin(stop, started + self._time_limit_s)
-        for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
-            solver = self._cold if cold and stage == 0 else self._warm
-            result = solver(p=np.append(p, width), **start, **bounds)
-            stats = solver.stats()
-            iterations += int(stats["iter_count"])
-            evaluations += _counts(stats)
-            z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
-            start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
-            status = self._watch.reason or str(stats["return_status"])
-            if stage + 1 < len(widths) and status not in (INTERRUPTED, TIME_IS_UP):
-                continue
-            x = np.clip(model.offset + model.scale * z[:n], problem.lower, problem.upper)
-            cost, violation = (float(value) for value in exact.function(x, p)[:2])
-            if status not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
-                break
+        with deferred_interrupts() if stop is never else nullcontext(stop) as asked:
+            self._watch.begin(asked, started + self._time_limit_s)
+            for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
+                solver = self._cold if cold and stage == 0 else self._warm
+                result = solver(p=np.append(p, width), **start, **bounds)
+                stats = solver.stats()
+                iterations += int(stats["iter_count"])
+                evaluations += _counts(stats)
+                z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
+                start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
+                status = self._watch.reason or str(stats["return_status"])
+                if stage + 1 < len(widths) and status not in (INTERRUPTED, TIME_IS_UP):
+                    continue
+                x = np.clip(model.offset + model.scale * z[:n], problem.lower, problem.upper)
+                cost, violation = (float(value) for value in exact.function(x, p)[:2])
+                if status not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
+                    break
+        if stop is never and asked():
+            raise KeyboardInterrupt
         return End(
             x=x,
             cost=cost,
@@ -254,17 +177,6 @@ class Ipopt:
             time_s=time.perf_counter() - started,
             guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
         )
-
-    def _bounds(self, problem: GaitProblem) -> dict[str, Array]:
-        model = self.model
-        lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-        free = np.full(model.lifted, np.inf)
-        return {
-            "lbx": np.concatenate([(problem.lower - model.offset) / model.scale, -free]),
-            "ubx": np.concatenate([(problem.upper - model.offset) / model.scale, free]),
-            "lbg": np.concatenate([lower, np.zeros(len(model.tie_upper))]),
-            "ubg": np.concatenate([upper, model.tie_upper]),
-        }
 
 
 def ipopt_for(problem: GaitProblem, settings: IpoptSettings, solves: int = 1) -> Ipopt:

@@ -58,6 +58,17 @@ class NlpModel:
     smoothed: bool
     build_s: float
 
+    def bounds(self, problem: GaitProblem) -> dict[str, Array]:
+        """Bounds of (z, s) and of g for a problem's parameter values, as CasADi's solvers take them."""
+        lower, upper = (np.array(bound).ravel() for bound in self.row_bounds(problem.p))
+        free = np.full(self.lifted, np.inf)
+        return {
+            "lbx": np.concatenate([(problem.lower - self.offset) / self.scale, -free]),
+            "ubx": np.concatenate([(problem.upper - self.offset) / self.scale, free]),
+            "lbg": np.concatenate([lower, np.zeros(len(self.tie_upper))]),
+            "ubg": np.concatenate([upper, self.tie_upper]),
+        }
+
 
 def nlp_model(problem: GaitProblem) -> NlpModel:
     """NLP of a problem, built once for all copies that differ in parameter values only.

@@ -19,7 +19,8 @@ import numpy as np
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import deferred_interrupts, never
-from nlp_gait.backends.ipopt import STATUS_WORDS, WIDTHS
+from nlp_gait.backends.ipopt import WIDTHS
+from nlp_gait.backends.ipopt_end import STATUS_WORDS
 from nlp_gait.backends.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solution import Evaluations
@@ -120,7 +121,7 @@ def solve_with(name: str, problem: GaitProblem, x0: Array, time_limit_s: float |
     z0 = (np.clip(x0, problem.lower, problem.upper) - model.offset) / model.scale
     widths = WIDTHS if model.smoothed else WIDTHS[-1:]
     primal = np.concatenate([z0, np.array(model.lift_start(z0, problem.p, widths[0])).ravel()])
-    bounds = _bounds(problem, model)
+    bounds = model.bounds(problem)
     iterations, evaluations, stats = 0, Evaluations(), {}
     started = time.perf_counter()
     with deferred_interrupts() if name in WATCHED else contextlib.nullcontext(never) as interrupted:
@@ -174,17 +175,6 @@ def _make(name: str, model: NlpModel) -> tuple[ca.Function, IterationWatch]:
     options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **OPTIONS[name]}
     with _silent():
         return ca.nlpsol(name, name, model.nlp, options), watch
-
-
-def _bounds(problem: GaitProblem, model: NlpModel) -> dict[str, Array]:
-    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    free = np.full(model.lifted, np.inf)
-    return {
-        "lbx": np.concatenate([(problem.lower - model.offset) / model.scale, -free]),
-        "ubx": np.concatenate([(problem.upper - model.offset) / model.scale, free]),
-        "lbg": np.concatenate([lower, np.zeros(len(model.tie_upper))]),
-        "ubg": np.concatenate([upper, model.tie_upper]),
-    }
 
 
 @contextlib.contextmanager

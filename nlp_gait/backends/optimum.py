@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.ipopt import End, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.kkt import KktFunctions, column, kkt_functions, kkt_step
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem

@@ -9,7 +9,8 @@ import numpy as np
 
 from nlp_gait.backends.exact import row_violations
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
-from nlp_gait.backends.ipopt import End, Ipopt, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import Ipopt, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
 from nlp_gait.errors import InputError
 from nlp_gait.problems.gait_problem import Array, GaitProblem

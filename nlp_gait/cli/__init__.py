@@ -1,7 +1,8 @@
 """Command line: ``nlp-gait COMMAND``.
 
 From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
-result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | motors | motions | robust``.
+result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
+robust``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.

@@ -25,7 +25,8 @@ from nlp_gait.cli.common import (
     quantity,
     stdout,
 )
-from nlp_gait.files import write_json
+from nlp_gait.cli.resumable import resumable
+from nlp_gait.files import without_nan, write_json
 
 if TYPE_CHECKING:
     from compare.questions.certainty import Certainty
@@ -38,7 +39,7 @@ def certainty(
     problem: ProblemName,
     starts: Annotated[int, typer.Option(min=1, help="Random starts of IPOPT.")] = 10_000,
     evaluations: Annotated[int, typer.Option(min=0, help="Of one long CMA-ES with restarts; 0 for none.")] = 1_000_000,
-    tolerance: Annotated[float, typer.Option(help="Relative, of the certificate.")] = 0.01,
+    tolerance: Annotated[float, typer.Option(help="Of the certificate, relative to the objective.")] = 0.01,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Of the certificate [s], for at most four variables; 0 for none.")
     ] = 600.0,
@@ -62,7 +63,7 @@ def certainty(
 
     folder = writable_folder(out)
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
-    with progress_bar("starts, search, proof", None) as advance:
+    with resumable(folder), progress_bar("starts, search, proof", None) as advance:
         study = study_certainty(
             loaded,
             folder,
@@ -75,7 +76,7 @@ def certainty(
         )
     written = write_certainty(folder, study)
     target = folder / f"{problem}-certainty.json"
-    write_json(target, study.to_json())
+    write_json(target, without_nan(study.to_json()))
     if as_json:
         print_json({**study.to_json(), "files": [str(path) for path in (*written, target)]})
         return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nlp_gait.cli.common import AsJson, Seed, command, fail, print_json, print_table, progress_bar, stdout
+from nlp_gait.cli.resumable import resumable
 
 if TYPE_CHECKING:
     from compare.questions.motions import Motion
@@ -43,7 +44,7 @@ def motions(
 
     folder = writable_folder(out)
     study = tasks(problem, orders=_names(orders), free_orders=_names(free_orders), robot=robot, starts=starts)
-    with progress_bar("motions", len(study)) as advance:
+    with resumable(folder, f"motions/{problem}-*.json"), progress_bar("motions", len(study)) as advance:
         found = run(study, folder / "motions", seed=seed, progress=advance)
     written = write_motions(folder, found, problem)
     if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -20,6 +20,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     fail,
     print_json,
     print_table,
@@ -53,17 +54,26 @@ def motors(
     from compare.questions.motors import VARIANTS, motor_variants
     from compare.questions.motors_report import write_motors
     from compare.storage import writable_folder
+    from nlp_gait.backends.interrupts import Interrupted
 
     folder = writable_folder(out)
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
-    with progress_bar("variants", len(VARIANTS)) as advance:
-        found = motor_variants(spec, starts=starts, seed=seed, progress=advance)
+    stopped = ""
+    try:
+        with progress_bar("variants", len(VARIANTS)) as advance:
+            found = motor_variants(spec, starts=starts, seed=seed, progress=advance)
+    except Interrupted as interrupt:
+        found, stopped = cast("tuple[Variant, ...]", interrupt.partial), interrupt.sentence
+        if not found:
+            end_interrupted(f"{stopped}; nothing was written")
     written = write_motors(folder, found, spec.load())
     if as_json:
         variants = [asdict(variant) for variant in found]
         print_json({"problem": problem, "variants": variants, "files": [str(path) for path in written]})
     else:
         _print(problem, found, written)
+    if stopped:
+        end_interrupted(f"{stopped}; what was found is in {folder}")
     failed = [variant for variant in found if not variant.success]
     if failed:
         fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))

@@ -24,6 +24,8 @@ from nlp_gait.cli.common import (
     progress_bar,
     stdout,
 )
+from nlp_gait.cli.resumable import resumable, whole
+from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
 
 if TYPE_CHECKING:
@@ -37,7 +39,10 @@ def pareto(
     problem: ProblemName,
     objectives: Annotated[
         str,
-        typer.Option(help="power and one or two of dbm_y_mean, dbm_x_mean, speed, separated by commas."),
+        typer.Option(
+            help="power [W] and one or two of dbm_y_mean, dbm_x_mean, dbm_y_min, dbm_x_min [m] and speed [m/s], "
+            "separated by commas."
+        ),
     ] = "power,dbm_y_mean",
     points: Annotated[int, typer.Option(min=5, help="Points of the front.")] = 40,
     starts: Annotated[int, typer.Option(min=1, help="Random starts at every third point.")] = 5,
@@ -72,10 +77,13 @@ def pareto(
 
     names = parse_objectives(objectives)
     searches = parse_searches(search or SEARCHES)
+    three = len(names) == 2  # beside power
+    if three and search and searches:
+        raise InputError("three objectives are traded without searches; leave out --search")
     folder = writable_folder(out)
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
-    with progress_bar("front", None) as advance:
-        if len(names) == 2:
+    with whole() if three else resumable(folder), progress_bar("front", None) as advance:
+        if three:
             surface = pareto_surface(loaded, names, points=points, starts=starts, seed=seed, progress=advance)
             written = write_surface(folder, surface)
             data = surface_json(surface)
@@ -98,7 +106,7 @@ def pareto(
     if as_json:
         print_json({**data, "files": [str(path) for path in (*written, target)]})
         return
-    if len(names) == 1:
+    if not three:
         _print(study)
     for path in (*written, target):
         stdout.print(f"wrote {path}", soft_wrap=True)

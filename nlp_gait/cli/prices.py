@@ -28,6 +28,7 @@ from nlp_gait.cli.common import (
     quantity,
     stdout,
 )
+from nlp_gait.cli.resumable import whole
 
 if TYPE_CHECKING:
     from compare.questions.price import Price, Prices
@@ -60,7 +61,7 @@ def prices(
 
     folder = writable_folder(out)
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
-    with progress_bar("steps", None) as advance:
+    with whole(), progress_bar("steps", None) as advance:
         found = find(spec, starts=starts, seed=seed, checks=checks, progress=advance)
     written = write_prices(folder, found)
     if as_json:

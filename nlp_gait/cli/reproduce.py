@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from nlp_gait.cli.common import command, end_interrupted, progress_bar, stdout
+from nlp_gait.cli.common import command, progress_bar, stdout
+from nlp_gait.cli.resumable import resumable
 from nlp_gait.errors import unknown
 
 # Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
@@ -31,10 +32,6 @@ def reproduce(
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
     module = import_module(REPRODUCTIONS[paper])
-    with progress_bar(paper, getattr(module, "STEPS", None)) as advance:
-        try:
-            module.reproduce(out, progress=advance)
-        except KeyboardInterrupt:
-            finished = len(list((out / "steps").glob("*.json")))
-            end_interrupted(f"interrupted; {finished} finished steps are kept in {out}; the same command continues")
+    with resumable(out), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
+        module.reproduce(out, progress=advance)
     stdout.print(f"wrote {out / 'report.md'}", soft_wrap=True)

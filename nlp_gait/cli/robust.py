@@ -20,6 +20,7 @@ from nlp_gait.cli.common import (
     Seed,
     Set,
     command,
+    end_interrupted,
     print_json,
     print_table,
     problem_spec,
@@ -71,12 +72,19 @@ def robust(
         mujoco()
     folder = writable_folder(out)
     spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
-    with progress_bar("steps", None) as advance:
-        found = [
-            find(spec, name, box, starts=starts, seed=seed, samples=samples, progress=advance)
-            for name, box in boxes(spec, mass / 100.0, sole / 1000.0).items()
-        ]
-        runs = played(spec, found[-1], advance) if simulate else ()
+    uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
+    found: list[Robust] = []
+    runs: Sequence[Played] = ()
+    stopped = ""
+    try:
+        with progress_bar("steps", None) as advance:
+            for name, box in uncertain.items():
+                found.append(find(spec, name, box, starts=starts, seed=seed, samples=samples, progress=advance))
+            runs = played(spec, found[-1], advance) if simulate else ()
+    except KeyboardInterrupt:
+        stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
+        if not found:
+            end_interrupted(f"{stopped}; nothing was written")
     written = write_robust(folder, problem, found, runs)
     if as_json:
         data = {"problem": problem, "boxes": [asdict(r) for r in found], "played": [asdict(run) for run in runs]}
@@ -84,6 +92,8 @@ def robust(
     else:
         _print(problem, found, runs, mass, sole)
         stdout.print(f"Written: {', '.join(map(str, written))}")
+    if stopped:
+        end_interrupted(f"{stopped}; what was found is in {folder}")
 
 
 def _print(problem: str, found: Sequence[Robust], runs: Sequence[Played], mass: float, sole: float) -> None:

@@ -15,6 +15,7 @@ PROBLEMS = {
     "nao-ssp": "nao_ssp",
     "nao-dsp": "nao_dsp",
     "nao-ssp-free": "nao_ssp_free",
+    "nao-dsp-free": "nao_dsp_free",
     "nao-cycle": "nao_cycle",
     "walk12": "walk12",
     "stairs-plan": "stairs_plan",

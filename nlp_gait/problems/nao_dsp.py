@@ -6,20 +6,27 @@ torso, which depends on where the hip is between the feet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar, get_args
+from collections.abc import Collection, Mapping
+from typing import Generic, Literal, NamedTuple, TypeVar, get_args
 
-from casadi import MX, SX, fmax, vertcat
+from casadi import MX, SX, vertcat
 
 from nlp_gait.errors import InputError
-from nlp_gait.problems.gait_problem import GaitProblem, Variable
+from nlp_gait.problems.gait_problem import GaitProblem
 from nlp_gait.problems.nao import (
     GRAVITY,
     JOINTS,
-    LEAST_DURATION,
     leg_joints,
     nao,
     upright_links,
+)
+from nlp_gait.problems.nao_dsp_stance import (
+    DURATION,
+    Point2,
+    double_support_duration,
+    double_support_hip,
+    soles_of,
+    standing_ankles,
 )
 from nlp_gait.problems.nao_legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.problems.nao_limits import phase_problem
@@ -28,7 +35,6 @@ from nlp_gait.problems.nao_motion import (
     Trajectory,
     arm_motions,
     hip_and_arm_units,
-    hip_on_spline,
     motion_options,
     samples_in_interval,
 )
@@ -40,7 +46,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import combined_zmp, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, stack
+from nlp_gait.symbolic.trajectories import Motion
 
 # Section 4.2: least mean margins of 0.08 m, in the box of 0.21 m by 0.18 m around NAO's soles.
 MEAN_DBM_SHARES = (8 / 21, 4 / 9)
@@ -52,10 +58,7 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
 }
 FEET = {"L": "left", "R": "right"}
 
-DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
-
 TorsoShare = Literal["printed", "lever"]
-Point2: TypeAlias = tuple[float, float]
 Side = TypeVar("Side", float, MX)
 
 
@@ -91,7 +94,7 @@ def nao_dsp(
         raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
-    soles = _soles(model, step_length_m)
+    soles = soles_of(model, step_length_m)
     box = support_box(model, soles)
     own = (*hip_variables(model), DURATION)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING), first=len(own))
@@ -100,7 +103,7 @@ def nao_dsp(
     phase = Phase(
         robot=model,
         variables=len(variables),
-        duration="double_support_time_s",
+        duration=DURATION.name,
         plan=_planner(model, soles, splines),
         loads=double_support_loads(model, torso_share),
         intervals=intervals,
@@ -128,7 +131,7 @@ def nao_dsp(
     )
 
     def arms(x: SX, s: SX) -> Mapping[str, Motion]:
-        duration = _duration(x)
+        duration = double_support_duration(x)
         return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
 
     return with_motors(with_motion(problem, phase, splines, objective, arms), phase, motors)
@@ -141,11 +144,6 @@ class Box(NamedTuple, Generic[Side]):
     front: Side
     right: float
     left: float
-
-
-def _soles(robot: Robot, step: float) -> dict[str, Point2]:
-    """Ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2)."""
-    return {"L": (step, leg_geometry(robot, "L").hip_m[1]), "R": (2 * step, leg_geometry(robot, "R").hip_m[1])}
 
 
 def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
@@ -165,31 +163,21 @@ def double_support_mean_margins(box: Box[float]) -> Point2:
     return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
 
 
-def _duration(x: SX) -> SX:
-    return fmax(x[7], LEAST_DURATION)
-
-
 def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Planner:
-    """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics.
-
-    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, rounded to a micrometre so
-    that the paper's numbers come out exactly, and from halfway to the left foot to halfway to the right one.
-    """
-    (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
-    sixth = (front_x - rear_x) / 6
-    hip_x, hip_y = (round(rear_x + sixth, 6), round(front_x - sixth, 6)), (left_y / 2, right_y / 2)
-    ankles = {side: stack(*map(constant, (*xy, robot.feet[FEET[side]].ankle_height_m))) for side, xy in soles.items()}
+    """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
+    ankles = standing_ankles(robot, soles)
 
     def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        duration = _duration(x)
+        duration = double_support_duration(x)
         more = splines.motions(x, duration, phase)
-        hip = hip_on_spline(x, more, hip_x, hip_y, duration, phase)
-        left, left_reach = leg_joints(robot, "L", hip, ankles["L"], margin, ops)
-        right, right_reach = leg_joints(robot, "R", hip, ankles["R"], margin, ops)
+        hip = double_support_hip(x, more, soles, phase)
+        still = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in ankles.items()}
+        left, left_reach = leg_joints(robot, "L", hip, still["L"], margin, ops)
+        right, right_reach = leg_joints(robot, "R", hip, still["R"], margin, ops)
         return Plan(
             joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
             hip=hip.position,
-            ankles={side: ankle.position for side, ankle in ankles.items()},
+            ankles=ankles,
             reach=vertcat(left_reach, right_reach),
         )
 
@@ -216,13 +204,13 @@ def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) ->
     return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
 
 
-def double_support_loads(robot: Robot, rule: TorsoShare) -> Loader:
-    """Torques of each half from its own foot, and the combined ZMP of both feet."""
+def double_support_loads(robot: Robot, rule: TorsoShare, upright: Collection[str] | None = None) -> Loader:
+    """Torques of each half from its own foot, and the combined ZMP of both feet; ``upright`` as for single support."""
     halves = {
         side: tree_from(robot, robot.feet[foot].link, [joint for joint in JOINTS if joint.startswith(side)])
         for side, foot in FEET.items()
     }
-    weight, upright = robot.mass_kg * GRAVITY, upright_links(robot)
+    weight, upright = robot.mass_kg * GRAVITY, upright_links(robot) if upright is None else upright
     feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
 
     def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:

@@ -111,8 +111,8 @@ def _foot_rows(phase: Phase, foot: Swing | None, point: Point) -> tuple[Constrai
     if foot is None:
         return ()
     n, path = phase.steps, foot.path
-    heights = _at(lambda x, s: path(x, s)[2], point, np.linspace(0.0, 1.0, n + 1)[1:-1])
-    halfway = _at(path, point, np.array([0.5]))
+    heights = at_phases(lambda x, s: path(x, s)[2], point, np.linspace(0.0, 1.0, n + 1)[1:-1])
+    halfway = at_phases(path, point, np.array([0.5]))
     labels = tuple(str(k) for k in range(1, n))
     return (
         Constraint(name="foot_height", labels=labels, unit="m", scale=HEIGHT_SCALE, value=heights.T, lower=MX(0.0)),
@@ -145,7 +145,7 @@ def _arm_rows(phase: Phase, arms: Callable[[SX, SX], Mapping[str, Motion]], poin
     n = phase.steps
     x, s = SX.sym("x", phase.variables), SX.sym("s")
     moved = [name for name, motion in arms(x, s).items() if not motion.velocity.is_zero()]
-    angles = _at(
+    angles = at_phases(
         lambda x, s: ca.vertcat(*(arms(x, s)[j].position for j in moved)), point, np.linspace(0.0, 1.0, n + 1)[1:-1]
     )
     return (limit_rows(phase.robot, "arm_angle", moved, angles),)
@@ -168,7 +168,7 @@ def limit_rows(robot: Robot, name: str, joints: Sequence[str], angles: MX) -> Co
     )
 
 
-def _at(function: Callable[[SX, SX], SX], point: Point, phases: Array) -> MX:
+def at_phases(function: Callable[[SX, SX], SX], point: Point, phases: Array) -> MX:
     """Values of a function of x (n,) and the phase, a column for each phase."""
     x, s = SX.sym("x", point.x.shape[0]), SX.sym("s")
     values, table = tabulated(ca.Function("path", [x, s], [function(x, s)]), DM(phases).T)

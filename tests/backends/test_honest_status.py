@@ -11,7 +11,8 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model, row_violations
-from nlp_gait.backends.ipopt import CONVERGED, STATUS_WORDS, End, Guess, IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.ipopt_end import CONVERGED, STATUS_WORDS, End, Guess
 from nlp_gait.backends.ipopt_installation import linear_solver
 from nlp_gait.backends.solution import Evaluations
 from nlp_gait.backends.solve import solve
@@ -105,7 +106,7 @@ def end(status: str, cost: float, violation: float) -> End:
         iterations=0,
         evaluations=Evaluations(),
         time_s=0.0,
-        guess=Guess(primal=none, bounds=none, rows=none),
+        guess=Guess(primal=none, bounds=none, rows=none, width=1.0),
     )
 
 

@@ -9,7 +9,8 @@ from casadi import MX
 
 from nlp_gait import load
 from nlp_gait.backends.continuation import Continuation, best_end
-from nlp_gait.backends.ipopt import End, ipopt_for
+from nlp_gait.backends.ipopt import ipopt_for
+from nlp_gait.backends.ipopt_end import End
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.sensitivities import model_sensitivities, parameter_sensitivities
