@@ -196,7 +196,9 @@ def _worst(verdict: Evaluation) -> str:
 
 
 def limit(powers: Sequence[float]) -> float | None:
-    """Where a sequence goes whose differences shrink by a constant factor, from its last three terms; None if they do not shrink.
+    """Where a sequence goes whose differences shrink by a constant factor, from its last three terms.
+
+    None if they do not shrink, and if it would be farther away than the last two terms are apart.
 
     Source:
         Aitken's extrapolation, which is Richardson's for an unknown order.
@@ -204,4 +206,4 @@ def limit(powers: Sequence[float]) -> float | None:
     if len(powers) < 3:
         return None
     first, second = powers[-3] - powers[-2], powers[-2] - powers[-1]
-    return powers[-1] - second**2 / (first - second) if 0.0 < second < first else None
+    return powers[-1] - second**2 / (first - second) if 0.0 < second <= first / 2 else None

@@ -21,7 +21,7 @@ def motions(
         str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
     ] = "cubic,quintic,spline-2,spline-4,spline-8",
     free_orders: Annotated[
-        str, typer.Option(help="Motions of free joints (nao-ssp), separated by commas; empty for none.")
+        str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
     ] = "spline-2,spline-4,spline-8,spline-16",
     starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
     seed: Seed = 0,
@@ -33,7 +33,8 @@ def motions(
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.
 
-    Each order starts from the optimum of the one before, which it contains exactly. Takes minutes; called again, it continues.
+    Each order starts from the optimum of the one before, which it contains exactly. Free joints take minutes each; called again, it
+    continues where it stopped.
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """

@@ -96,7 +96,7 @@ def _part(motion: Motion, rows: slice) -> Motion:
 
 
 def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
-    """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond that of an upright torso [rad]."""
+    """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond upright [rad]."""
     turn = _solved(robot, pose, ankles)
     found = [turn[1]]
     for side in "LR":
@@ -136,5 +136,5 @@ def _hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
 
 
 def _plane(hip: SX, ankle: SX) -> SX:
-    """Roll of a leg's plane against upright, from hip and ankle (3,) [rad] (eq. 5)."""
+    """Roll of a leg's plane against upright, from hip and ankle (3,) [rad] (see ``leg_angles``)."""
     return ca.atan2(ankle[1] - hip[1], hip[2] - ankle[2])

@@ -8,13 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from compare.judge import evaluate
 from compare.questions import motions as module
 from compare.questions.motion_tasks import tasks
 from compare.questions.motions import Motion, limit, motions
 from compare.questions.motions_report import rows, sentences
+from compare.task import ProblemSpec
 from nlp_gait.cli import app
 from nlp_gait.errors import InputError
 
@@ -29,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> list[Motion]:
-    return motions(tasks("nao-dsp", orders=ORDERS, starts=0), folder / "motions")
+    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), folder / "motions")
 
 
 def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: list[Motion]) -> None:
@@ -47,7 +50,7 @@ def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], mon
 
     monkeypatch.setattr(module, "solve", never)
     again: list[str] = []
-    study = tasks("nao-dsp", orders=ORDERS, starts=0)
+    study = tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0)
     assert motions(study, folder / "motions", progress=again.append) == found
     assert again == ["planned-cubic-power", "planned-quintic-power", "coarse-quintic-power"]
     with pytest.raises(InputError, match="another study"):
@@ -55,7 +58,8 @@ def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], mon
 
 
 def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
-    command = ["motions", "nao-dsp", "--orders", "cubic,quintic", "--starts", "0", "--out", str(folder)]
+    command = ["motions", "nao-dsp", "--orders", "cubic,quintic", "--free-orders", "", "--starts", "0"]
+    command += ["--out", str(folder)]
     done = RUN.invoke(app, [*command, "--json"])
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
@@ -68,6 +72,16 @@ def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
     assert "11 samples: quintic" in printed and "never rises" in printed
 
 
+def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: list[Motion]) -> None:
+    *_, task = tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], starts=0)
+    problem = ProblemSpec(name=task.problem, options=task.options).load()
+    planned = ProblemSpec(name="nao-dsp", options=task.options).load()
+    x0 = module._start(task, problem, found)
+    assert x0 is not None
+    expected = evaluate(planned, np.array(list(found[1].x.values())))
+    assert evaluate(problem, x0).indexes["power_W"] == pytest.approx(expected.indexes["power_W"], rel=1e-9)
+
+
 def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
     cubic, quintic, coarse = found
     worse = replace(quintic, power_W=cubic.power_W + 0.01)
@@ -75,15 +89,16 @@ def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
     assert rows([cubic, worse])[1][3].startswith("-")
 
 
-def test_single_support_adds_free_joints_and_smoothness() -> None:
-    study = tasks("nao-ssp", orders=["cubic", "spline-4"], free_orders=["spline-2"])
+@pytest.mark.parametrize("phase", ["nao-ssp", "nao-dsp"])
+def test_a_study_adds_free_joints_and_smoothness(phase: str) -> None:
+    study = tasks(phase, orders=["cubic", "spline-4"], free_orders=["spline-2"])
     assert [(task.kind, task.problem, task.trajectory) for task in study] == [
-        ("planned", "nao-ssp", "cubic"),
-        ("planned", "nao-ssp", "spline-4"),
-        ("coarse", "nao-ssp", "spline-4"),
-        ("smooth", "nao-ssp", "spline-4"),
-        ("smooth", "nao-ssp", "spline-4"),
-        ("free", "nao-ssp-free", "spline-2"),
+        ("planned", phase, "cubic"),
+        ("planned", phase, "spline-4"),
+        ("coarse", phase, "spline-4"),
+        ("smooth", phase, "spline-4"),
+        ("smooth", phase, "spline-4"),
+        ("free", f"{phase}-free", "spline-2"),
     ]
     assert [task.options["samples_per_interval"] for task in study] == [4, 4, 1, 4, 4, 8]
 
@@ -106,3 +121,4 @@ def test_the_limit_of_a_geometric_sequence_is_exact() -> None:
     assert limit([3.0, 2.0, 1.5]) == pytest.approx(1.0)
     assert limit([9.0, 3.0, 2.0, 1.5]) == pytest.approx(1.0)
     assert limit([3.0, 2.0, 1.0]) is None and limit([3.0, 2.0]) is None and limit([3.0, 2.0, 2.5]) is None
+    assert limit([3.0, 2.0, 1.1]) is None  # would be 8.1 away, nine times as far as the last step

@@ -52,8 +52,11 @@ def signals_of(problem: GaitProblem, x: Array) -> Signals:
     return problem.signals(x, problem.p)
 
 
-def at(signals: Signals, sample: int) -> list[dict[str, float]]:
-    return [dict(zip(signals.joints, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")]
+def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    q, qd, qdd = (
+        dict(zip(signals.joints, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")
+    )
+    return q, qd, qdd
 
 
 def ankle_of(robot: Robot, side: str) -> Array:
