@@ -33,8 +33,8 @@ def motions(
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.
 
-    Each order starts from the optimum of the one before, which it contains exactly. Free joints take minutes each; called again, it
-    continues where it stopped.
+    Each order starts from the optimum of the one before, which it contains exactly. Free joints take minutes each;
+    called again, it continues where it stopped.
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """
