@@ -8,6 +8,7 @@ import inspect
 import json
 import os
 import sys
+import unicodedata
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -69,8 +70,13 @@ class PlainConsole(Console):
 
 def harmless(text: str) -> str:
     """Text whose control characters, and what is no character at all, stand as escapes."""
-    shown = (sign if sign.isprintable() or sign in "\n\t" else repr(sign)[1:-1] for sign in text)
+    shown = (sign if sign in "\n\t" or _is_shown(sign) else repr(sign)[1:-1] for sign in text)
     return "".join(shown)
+
+
+def _is_shown(sign: str) -> bool:
+    """Printable, or a space of another width, as between thousands."""
+    return sign.isprintable() or unicodedata.category(sign) == "Zs"
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)

@@ -118,6 +118,7 @@ def test_names_of_robots_are_escaped_in_models() -> None:
         ("a\rb\x08", r"a\rb\x08"),
         ("\u202eevil", r"\u202eevil"),
         ("half \ud800", r"half \ud800"),
+        ("1\u202f793 and 5\u00a0W", "1\u202f793 and 5\u00a0W"),
         ("gr\u00f6\u00dfer 10\u207b\u2076\n", "gr\u00f6\u00dfer 10\u207b\u2076\n"),
     ],
 )
