@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +11,7 @@ import numpy as np
 from compare.figures import COLOURS, new_figure, save, style
 from compare.labels import axis_label, quantity
 from compare.sweep import SweepPoint
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 from nlp_gait.problems.gait_problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -23,19 +21,18 @@ if TYPE_CHECKING:
 def sweep_csv(points: Sequence[SweepPoint], problem: GaitProblem) -> str:
     """Table of all points, one row each, units in the header."""
     axes, names = list(points[0].at), list(problem.names)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     unit = problem.objective.unit
     objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
     # A variable may be an axis too; its column then says what the axis asked for, exactly.
     columns = [name for name in names if name not in axes]
-    writer.writerow([*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"])
+    table.append([*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"])
     for point in points:
         at = [repr(value) for value in point.at.values()]
         x = [repr(point.x[name]) for name in columns]
         numbers = [repr(point.objective), str(point.feasible).lower(), repr(point.violation)]
-        writer.writerow([*at, *numbers, *x, point.evaluations, f"{point.time_s:.4f}", point.status])
-    return text.getvalue()
+        table.append([*at, *numbers, *x, point.evaluations, f"{point.time_s:.4f}", point.status])
+    return csv_text(table)
 
 
 def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Figure:

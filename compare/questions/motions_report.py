@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +13,7 @@ from compare.figures import COLOURS, legend_below, new_figure, save, style
 from compare.questions.motion_tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.questions.motions import Motion, limit
 from compare.task import ProblemSpec
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 from nlp_gait.problems.gait_problem import Array
 
 if TYPE_CHECKING:
@@ -95,16 +93,15 @@ def sentences(found: Sequence[Motion]) -> list[str]:
 
 def motions_csv(found: Sequence[Motion]) -> str:
     """One row for each motion, units in the header."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
+    table: list[Sequence[object]] = []
+    table.append(
         "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation converged "
         "starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status".split()
     )
     for m in found:
         options = m.task.options
         values: list[float | str] = [*m.objectives.values()] or ["", ""]
-        writer.writerow(
+        table.append(
             [
                 m.task.kind,
                 m.task.problem,
@@ -115,7 +112,7 @@ def motions_csv(found: Sequence[Motion]) -> str:
             + [m.variables, repr(m.power_W), repr(m.dense_power_W), m.worst, m.converged, m.attempts, m.iterations]
             + [f"{m.time_s:.3f}", *values, m.status]
         )
-    return text.getvalue()
+    return csv_text(table)
 
 
 def power_figure(found: Sequence[Motion]) -> Figure:

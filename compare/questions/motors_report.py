@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +11,7 @@ import numpy as np
 from compare.figures import legend_below, new_figure, save, style
 from compare.labels import axis_label
 from compare.questions.motors import Variant
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 from nlp_gait.problems import GaitProblem
 
 if TYPE_CHECKING:
@@ -22,18 +20,17 @@ if TYPE_CHECKING:
 
 def motors_csv(found: Sequence[Variant]) -> str:
     """One row for each variant."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     names, kinds = list(found[0].x), list(found[0].uses)
-    writer.writerow(
+    table.append(
         ["variant", "motors", "power_W", "power_at_published_x_W", "violation_of_published_x", "power_as_published_W"]
         + [*names, *(f"share_of_{kind.replace(' ', '_')}" for kind in kinds), "success", "status"]
     )
     for v in found:
         numbers = (v.power_W, v.unchanged_power_W, v.unchanged_violation, v.published_power_W, *v.x.values())
         shares = [repr(v.uses[kind].share) for kind in kinds]
-        writer.writerow([v.name, v.features, *map(repr, numbers), *shares, str(v.success).lower(), v.status])
-    return text.getvalue()
+        table.append([v.name, v.features, *map(repr, numbers), *shares, str(v.success).lower(), v.status])
+    return csv_text(table)
 
 
 def motors_figure(found: Sequence[Variant], problem: GaitProblem) -> Figure:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +14,7 @@ from compare.questions.pareto_criteria import Criterion
 from compare.questions.pareto_front import FrontPoint
 from compare.questions.pareto_knees import Bends
 from compare.questions.pareto_search import SearchFront
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 from nlp_gait.problems.gait_problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -30,14 +28,13 @@ MARKS = ("x", "+", ".")
 
 def front_csv(front: Sequence[FrontPoint], problem: GaitProblem, criterion: Criterion) -> str:
     """Table of a front, one row a point, units in the header."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     unit = criterion.unit.replace("/", "_")
-    writer.writerow([f"{criterion.name}_{unit}", "power_W", f"price_W_per_{unit}", "violation", *problem.names])
+    table.append([f"{criterion.name}_{unit}", "power_W", f"price_W_per_{unit}", "violation", *problem.names])
     for point in front:
         numbers = (point.value, point.power_W, point.price, point.violation, *point.x)
-        writer.writerow([repr(number) for number in numbers])
-    return text.getvalue()
+        table.append([repr(number) for number in numbers])
+    return csv_text(table)
 
 
 def front_figure(

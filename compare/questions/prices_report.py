@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING
 from compare.figures import new_figure, save, style
 from compare.labels import name_in_words
 from compare.questions.price import Price, Prices
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,10 +23,9 @@ PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
 
 def prices_csv(found: Prices) -> str:
     """All quantities, one row each; slopes are those of the objective and of x* for each unit of the quantity."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     names = list(found.x)
-    writer.writerow(
+    table.append(
         (
             "kind",
             "quantity",
@@ -48,8 +45,8 @@ def prices_csv(found: Prices) -> str:
             numbers = (price.value, price.slope, price.step, price.per_step, price.resolved, *steps, *price.reach)
             moves = [None if price.x is None else price.x[name] for name in names]
             cells = ("" if value is None else repr(value) for value in (*numbers, *moves))
-            writer.writerow((kind, price.name, price.unit, *cells))
-    return text.getvalue()
+            table.append((kind, price.name, price.unit, *cells))
+    return csv_text(table)
 
 
 def prices_figure(found: Prices) -> Figure:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +11,7 @@ import numpy as np
 from compare.figures import legend_below, new_figure, save, style
 from compare.questions.robust import Robust
 from compare.questions.robust_playback import Played
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,18 +21,17 @@ NOMINAL, ROBUST = "0.72", "#0072B2"
 
 def robust_csv(found: Sequence[Robust]) -> str:
     """One row for each box."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     names = list(found[0].x)
-    writer.writerow(
+    table.append(
         ["uncertain", "scenarios", "nominal_W", "violation_of_nominal", "unit", "row", "robust_W", "robust_worst_W"]
         + ["violation_of_robust", "violation_of_robust_in_random_corners", *names, "settled"]
     )
     for r in found:
         nominal = (repr(r.nominal_W), repr(r.nominal_worst.violation), r.nominal_worst.unit, r.nominal_worst.row)
         own = (r.power_W, r.worst_W, r.worst.violation, r.random_worst.violation, *r.x.values())
-        writer.writerow([r.name, len(r.corners), *nominal, *map(repr, own), str(r.settled).lower()])
-    return text.getvalue()
+        table.append([r.name, len(r.corners), *nominal, *map(repr, own), str(r.settled).lower()])
+    return csv_text(table)
 
 
 def robust_figure(found: Sequence[Robust], runs: Sequence[Played]) -> Figure:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +14,7 @@ from compare.task import IPOPT, ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.export.result import Result
-from nlp_gait.files import write_json, write_text
+from nlp_gait.files import csv_text, write_json, write_text
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import CYCLE, plan_of
 from nlp_gait.simulation.playback import play
@@ -131,14 +129,13 @@ def _indexes(result: Result) -> dict[str, float]:
 
 def walk_csv(gaits: Sequence[Gait]) -> str:
     """Table of all gaits, one row each, units in the header."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    table: list[Sequence[object]] = []
     (name,) = gaits[0].found.at
     names = list(gaits[0].found.x)
     head = [f"at {name}" if name in names or name in FIGURES else name, "feasible"]
     measured = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
     powers = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
-    writer.writerow([*head, *FIGURES, *names, *(f"engine_{key}" for key in (*measured, *powers)), "status"])
+    table.append([*head, *FIGURES, *names, *(f"engine_{key}" for key in (*measured, *powers)), "status"])
     for gait in gaits:
         walk = gait.walk
         engine: list[Any] = [None] * (len(measured) + len(powers))
@@ -149,8 +146,8 @@ def walk_csv(gaits: Sequence[Gait]) -> str:
             engine += [found.largest_tilt_deg, found.tracking_max_rad, power.mechanical_W, power.heat_W]
         cells = [*(gait.indexes[key] for key in FIGURES), *gait.found.x.values(), *engine]
         numbers = ["" if value is None else repr(value) for value in cells]
-        writer.writerow([repr(gait.at), str(gait.found.feasible).lower(), *numbers, gait.found.status])
-    return text.getvalue()
+        table.append([repr(gait.at), str(gait.found.feasible).lower(), *numbers, gait.found.status])
+    return csv_text(table)
 
 
 def write_walk(folder: Path, spec: ProblemSpec, gaits: Sequence[Gait]) -> list[Path]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from compare.table import markdown
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 
 Cell = str | float | int
 
@@ -39,7 +37,4 @@ def write_table(stem: Path, columns: Mapping[str, str], rows: Sequence[Sequence[
 
 def write_csv(path: Path, header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
     """Write rows of numbers and text with all digits."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([header, *rows])
-    write_text(path, text.getvalue())
+    write_text(path, csv_text([header, *rows]))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
 
 from nlp_gait.errors import InputError
 from nlp_gait.export.result import SCHEMA, Result
-from nlp_gait.files import write_text
+from nlp_gait.files import csv_text, write_text
 from nlp_gait.problems.gait_problem import Array, Signals
 from nlp_gait.symbolic.stair_loads import MOVING
 
@@ -69,11 +67,8 @@ def _unit_and_labels(name: str, count: int, joints: tuple[str, ...]) -> tuple[st
 def write_csv(path: Path, signals: Signals) -> None:
     """One row a sample, a header like ``q LKneePitch [rad]``; raises InputError, OutputError."""
     table = list(columns(signals))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(f"{name} [{unit}]" for name, unit, _ in table)
-    writer.writerows(zip(*(values.tolist() for _, _, values in table), strict=True))
-    write_text(path, text.getvalue())
+    header = [f"{name} [{unit}]" for name, unit, _ in table]
+    write_text(path, csv_text([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
 
 
 def write_json(path: Path, result: Result, signals: Signals) -> None:
