@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks import ipopt, kernel, process, search
 from benchmarks.rows import Row, table
-from nlp_gait.backends.compiler import find_compiler, native_lanes
+from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 
 
 def main() -> None:

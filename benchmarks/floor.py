@@ -13,9 +13,9 @@ from pathlib import Path
 
 import casadi as ca
 
-from nlp_gait.backends.compiler import find_compiler, lane_flags
-from nlp_gait.backends.library_cache import load_library
-from nlp_gait.backends.native_kernel import BASE_FLAGS
+from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags
+from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 
 MEASURED = ("multiply", "divide", "sqrt", "sin", "cos", "acos", "atan2")
 KINDS = {
@@ -47,7 +47,7 @@ def operation_counts(function: ca.Function, samples: int) -> Counter[str]:
 
 def operation_times(lanes: int) -> dict[str, float]:
     """Time of each kind of operation on ``lanes`` doubles [s]: the least of several measurements."""
-    header = (files("nlp_gait.backends") / "native" / "lanes.hpp").read_text(encoding="utf-8")
+    header = (files("nlp_gait.backends.kernel") / "native" / "lanes.hpp").read_text(encoding="utf-8")
     body = Path(__file__).with_name("operations.cpp").read_text(encoding="utf-8")
     names = tuple(f"time_{name}" for name in MEASURED)
     flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}")

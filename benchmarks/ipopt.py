@@ -10,11 +10,11 @@ from casadi import MX, SX
 
 import nlp_gait
 from benchmarks.rows import Row
-from nlp_gait.backends.derivatives import compiled_nlp
-from nlp_gait.backends.ipopt import IpoptSettings
 from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.problems import GaitProblem
-from nlp_gait.problems.gait_problem import Point, constraint_rows
+from nlp_gait.backends.solvers.derivatives import compiled_nlp
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.problem.gait_problem import Point, constraint_rows
+from nlp_gait.problem.registry import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Angle
 
 QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}

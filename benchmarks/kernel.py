@@ -13,12 +13,12 @@ import nlp_gait
 from benchmarks.by_hand import ARM_SWING, ByHand, pinocchio_model
 from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
-from nlp_gait.backends.compiler import find_compiler, native_lanes
-from nlp_gait.backends.derivatives import compiled_functions
-from nlp_gait.backends.kernel_source import Kernel, kernel_of
-from nlp_gait.backends.native_kernel import NativeKernel
-from nlp_gait.problems import GaitProblem
-from nlp_gait.problems.nao import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
+from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
+from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.kernel.native_kernel import NativeKernel
+from nlp_gait.backends.solvers.derivatives import compiled_functions
+from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.problems.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler

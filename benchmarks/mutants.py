@@ -1,6 +1,6 @@
 """Mutation testing: small errors put into the code one at a time; a test that stands for that code must find each.
 
-    python benchmarks/mutants.py compare/statistics --tests tests/compare/test_statistics.py tests/compare/test_rank_sum_normal.py
+    python benchmarks/mutants.py compare/analysis/statistics --tests tests/compare/analysis
 
 Works in a copy of the tree. Prints every survivor with its line; exit status 1 if there is one. Some survivors are equivalent
 to the original, which only a reader can tell.

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import nlp_gait
-from compare.figures import new_figure, save, style
+from compare.drawing.figures import new_figure, save, style
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 problem = nlp_gait.load("nao-ssp")

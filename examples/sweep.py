@@ -6,9 +6,9 @@ python examples/sweep.py [FOLDER]
 import sys
 from pathlib import Path
 
-from compare.sweep import parse_axis, sweep
-from compare.sweep_report import write_sweep
-from compare.task import ProblemSpec
+from compare.questions.sweep.report import write_sweep
+from compare.questions.sweep.study import parse_axis, sweep
+from compare.study.task import ProblemSpec
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 spec = ProblemSpec(name="nao-ssp")

@@ -5,10 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from compare.comparison import compare_problems
-from compare.study import Study, run_study
-from compare.table import HEADER, cells, markdown, summarise
-from compare.task import ProblemSpec, Task
+from compare.analysis.comparison import compare_problems
+from compare.analysis.table import HEADER, cells, markdown, summarise
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Task
 
 
 @dataclass(frozen=True, kw_only=True)

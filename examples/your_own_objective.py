@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import metaheuristics
 import nlp_gait
-from nlp_gait.problems.gait_problem import Assembly, Objective, Parameter
+from nlp_gait.problem.gait_problem import Assembly, Objective, Parameter
 
 base = nlp_gait.load("nao-ssp")
 

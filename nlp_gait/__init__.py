@@ -3,12 +3,12 @@
 ``load`` makes a problem, ``solve`` gives it to IPOPT, ``compile_objective`` gives its exact functions to search algorithms.
 """
 
-from nlp_gait.backends.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.ipopt import IpoptSettings
-from nlp_gait.backends.solution import Solution
+from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import GaitError
-from nlp_gait.problems import GaitProblem, load, problem_names
+from nlp_gait.problem.registry import GaitProblem, load, problem_names
+from nlp_gait.problem.solution import Solution
 
 __all__ = [
     "CompiledObjective",

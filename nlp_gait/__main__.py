@@ -1,5 +1,5 @@
 """``python -m nlp_gait`` is the console script."""
 
-from nlp_gait.cli import main
+from compare.cli import main
 
 main()

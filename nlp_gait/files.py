@@ -15,6 +15,8 @@ import math
 import os
 import secrets
 import stat
+import tempfile
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +29,8 @@ DEEPEST = 32  # levels of objects and lists; the package's own files have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
+# Writing one file takes far less; an older temporary file is nobody's.
+LEFTOVER_AGE_S = 60.0
 
 
 def read_bytes(
@@ -208,3 +212,30 @@ def _check_leaf(where: str, value: Any) -> None:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
+
+
+def writable_folder(path: Path) -> Path:
+    """Make a folder, and prove now that files can be written there rather than after the work.
+
+    Raises:
+        OutputError: it cannot be made or written to.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"cannot write to {str(path)!r}: {error.strerror}; choose another folder with --out"
+        ) from error
+    return path
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of ``new_file`` that a killed process left behind, none that may still be in use."""
+    for path in folder.glob(".*.tmp"):
+        try:
+            if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # from the future too: a clock was put back
+                path.unlink(missing_ok=True)
+        except OSError:
+            continue  # another process has removed it

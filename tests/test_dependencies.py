@@ -11,10 +11,32 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-# Earlier layers know nothing of later ones.
-LAYERS = ("errors", "files", "robots", "symbolic", "problems", "backends")
-# Where search and comparison may be called from.
-COMMAND_LINE = ("nlp_gait.cli", "nlp_gait.__main__")
+# A room imports from itself and from rooms before it only.
+ROOMS = (
+    "nlp_gait.errors",
+    "nlp_gait.files",
+    "nlp_gait.decoding",
+    "nlp_gait.robots",
+    "nlp_gait.symbolic",
+    "nlp_gait.problem",
+    "nlp_gait.problems",
+    "nlp_gait.backends",
+    "nlp_gait.simulation",
+    "nlp_gait.export",
+    "metaheuristics",
+    "compare.judge",
+    "compare.study",
+    "compare.analysis",
+    "compare.drawing",
+    "compare.report",
+    "compare.questions",
+    "compare.papers",
+    "compare.cli",
+)
+# The front doors of packages: what stands in them is for users, and the command line stands above all.
+DOORS = ("nlp_gait", "nlp_gait.__main__", "compare")
+FAMILIES = ("nao", "stairs", "walk12")
+MOST_ENTRIES = 17
 
 
 def modules(package: str) -> list[str]:
@@ -41,31 +63,49 @@ def within(name: str, *packages: str) -> bool:
     return any(name == package or name.startswith(f"{package}.") for package in packages)
 
 
-def layer(module: str) -> int | None:
-    parts = module.split(".")
-    return LAYERS.index(parts[1]) if parts[0] == "nlp_gait" and len(parts) > 1 and parts[1] in LAYERS else None
+def room(name: str) -> int | None:
+    """Place of a dotted name among the rooms; None for a name that stands in a front door."""
+    found = [place for place, package in enumerate(ROOMS) if within(name, package)]
+    return found[0] if found else None
 
 
-@pytest.mark.parametrize("module", [m for m in modules("nlp_gait") if layer(m) is not None])
-def test_a_layer_imports_earlier_layers_only(module: str) -> None:
-    own = layer(module)
-    assert own is not None
+ALL = [m for package in ("nlp_gait", "metaheuristics", "compare") for m in modules(package)]
+
+
+@pytest.mark.parametrize("module", ALL)
+def test_a_room_imports_earlier_rooms_only(module: str) -> None:
+    own = room(module)
+    if own is None:
+        assert module in DOORS, f"{module} stands in no room"
+        return
     for name in imports(module):
-        if within(name, "nlp_gait"):
-            imported = layer(name)
-            assert imported is not None, f"{module} imports {name}, which is in no earlier layer"
-            assert imported <= own, f"{module} imports {name} from a later layer"
+        if within(name, "nlp_gait", "metaheuristics", "compare"):
+            imported = room(name)
+            if imported is None:  # a front door, of packages that come before this one
+                assert own > ROOMS.index("nlp_gait.export"), f"{module} imports {name} from a front door"
+                assert not within(name, "compare"), f"{module} imports {name} from its own front door"
+            else:
+                assert imported <= own, f"{module} imports {name} from a later room"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_families_of_problems_know_nothing_of_each_other(family: str) -> None:
+    others = tuple(f"nlp_gait.problems.{other}" for other in FAMILIES if other != family)
+    for module in modules(f"nlp_gait/problems/{family}"):
+        bad = [name for name in imports(module) if within(name, *others)]
+        assert not bad, f"{module} imports {bad}"
+
+
+def test_no_folder_is_crowded() -> None:
+    for package in ("nlp_gait", "metaheuristics", "compare"):
+        for folder in [ROOT / package, *(path for path in (ROOT / package).rglob("*") if path.is_dir())]:
+            entries = [p.name for p in folder.iterdir() if not p.name.startswith(("__", "."))]
+            assert len(entries) <= MOST_ENTRIES, f"{folder.relative_to(ROOT)} shows {len(entries)}: {sorted(entries)}"
 
 
 @pytest.mark.parametrize("module", modules("metaheuristics"))
 def test_search_algorithms_know_neither_casadi_nor_gaits(module: str) -> None:
     bad = [name for name in imports(module) if within(name, "casadi", "nlp_gait", "compare")]
-    assert not bad, f"{module} imports {bad}"
-
-
-@pytest.mark.parametrize("module", [m for m in modules("nlp_gait") if not within(m, *COMMAND_LINE)])
-def test_only_the_command_line_joins_gaits_with_search_and_comparison(module: str) -> None:
-    bad = [name for name in imports(module) if within(name, "metaheuristics", "compare", *COMMAND_LINE)]
     assert not bad, f"{module} imports {bad}"
 
 

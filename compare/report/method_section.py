@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from compare.comparison import Comparison
-from compare.manifest import Manifest, Session
+from compare.analysis.comparison import Comparison
+from compare.analysis.statistics.run_length import Weighting
 from compare.report.document import Section, table
-from compare.statistics.run_length import Weighting
+from compare.study.manifest import Manifest, Session
 
 
 def method_section(comparisons: Sequence[Comparison], manifest: Manifest, weighting: Weighting) -> Section:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from compare.comparison import Comparison
-from compare.convergence import convergence_figure
-from compare.distributions import ecdf_figure, final_gap_figure
-from compare.published import published_rows
-from compare.questions.steps import BY_UNIT
-from compare.record import RunRecord
+from compare.analysis.comparison import Comparison
+from compare.analysis.natural_steps import BY_UNIT
+from compare.analysis.published import published_rows
+from compare.analysis.significance import compare_pairs
+from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
+from compare.drawing.convergence import convergence_figure
+from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, Table, table
-from compare.significance import compare_pairs
-from compare.statistics.run_length import TARGETS
-from compare.table import HEADER, SolverSummary, cells, count, summarise
-from nlp_gait.backends.solution import ActiveConstraint
+from compare.study.record import RunRecord
+from nlp_gait.problem.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
 

@@ -9,17 +9,17 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from compare.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
-from compare.distributions import expected_costs, profile_figure
-from compare.figures import inline_svg, save
-from compare.manifest import Manifest, read_manifest
-from compare.record import RunRecord
+from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
+from compare.analysis.statistics.run_length import Weighting
+from compare.analysis.verdict import verdict
+from compare.drawing.distributions import expected_costs, profile_figure
+from compare.drawing.figures import inline_svg, save
 from compare.report.document import Document, Figure, Section
 from compare.report.method_section import method_section
 from compare.report.problem_section import problem_section
-from compare.statistics.run_length import Weighting
-from compare.study import read_records
-from compare.verdict import verdict
+from compare.study.manifest import Manifest, read_manifest
+from compare.study.record import RunRecord
+from compare.study.study import read_records
 from nlp_gait.files import write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.backends.solution import RowViolation
-from nlp_gait.problems.gait_problem import Array, GaitProblem, constraint_rows
+from nlp_gait.problem.gait_problem import Array, GaitProblem, constraint_rows
+from nlp_gait.problem.solution import RowViolation
 from nlp_gait.symbolic.nonsmooth import Exact
 
 # A total violation below this counts as feasible (each row in units of its scale).

@@ -17,7 +17,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problems.gait_problem import Array, GaitProblem, Point, constraint_rows
+from nlp_gait.problem.gait_problem import Array, GaitProblem, Point, constraint_rows
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
 # A derivative below this is zero for the check of the lifting's sense.

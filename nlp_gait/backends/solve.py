@@ -9,11 +9,11 @@ import numpy as np
 
 from nlp_gait.backends.exact import row_violations
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
-from nlp_gait.backends.ipopt import Ipopt, IpoptSettings, ipopt_for
-from nlp_gait.backends.ipopt_end import End
-from nlp_gait.backends.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
+from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problems.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
 
 # A bound whose price, times the bound's scale, is below this is numerical dust and not reported.
 PRICE_TOLERANCE = 1e-6

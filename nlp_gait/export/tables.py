@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nlp_gait.errors import InputError
-from nlp_gait.export.result import SCHEMA, Result
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problems.gait_problem import Array, Signals
-from nlp_gait.symbolic.stair_loads import MOVING
+from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.result import SCHEMA, Result
+from nlp_gait.problems.stairs.formulas.loads import MOVING
 
 # Units of arrays with a column for each joint, and for each moving link of the stair climber.
 JOINT_UNITS = {

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nlp_gait.backends.compiled import compile_objective
+from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.export.result import Result
-from nlp_gait.problems.gait_problem import GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.result import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.mjcf import TIME_STEP

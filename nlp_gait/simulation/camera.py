@@ -7,13 +7,13 @@ import warnings
 from typing import Any
 
 from nlp_gait.errors import OutputError
-from nlp_gait.export.video import Frame
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.playback import Trace, play
+from nlp_gait.simulation.video import Frame
 
 WIDTH, HEIGHT = 480, 480
 AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.1, (0.06, 0.0, 0.24)  # it follows the torso

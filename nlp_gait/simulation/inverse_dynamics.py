@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.export.result import Result
-from nlp_gait.problems.gait_problem import Array, Signals
-from nlp_gait.problems.nao import GRAVITY, nao
-from nlp_gait.problems.nao_dsp import FEET, torso_shares
+from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.result import Result
+from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.double_support import FEET, torso_shares
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import fixed_model

@@ -10,10 +10,10 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.export.result import Result
-from nlp_gait.export.sampled import finely_sampled
-from nlp_gait.problems.gait_problem import Array, Signals
-from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS, JOINTS, nao
+from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.result import Result
+from nlp_gait.problem.sampled import finely_sampled
+from nlp_gait.problems.nao.body import GRAVITY, HEAD_JOINTS, JOINTS, nao
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 from nlp_gait.simulation.steps import walk

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problems.gait_problem import Array, Signals
+from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 

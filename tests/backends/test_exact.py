@@ -7,8 +7,8 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model, row_violations
-from nlp_gait.problems import GaitProblem, load
-from nlp_gait.problems.gait_problem import Array, Constraint
+from nlp_gait.problem.gait_problem import Array, Constraint
+from nlp_gait.problem.registry import GaitProblem, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

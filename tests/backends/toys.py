@@ -7,8 +7,8 @@ from typing import Literal
 
 from casadi import MX
 
-from nlp_gait.problems import GaitProblem
-from nlp_gait.problems.gait_problem import Assembly, Constraint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.gait_problem import Assembly, Constraint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.registry import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # From the two variables, the parameter "limit" and an interpretation, to the objective and the constraints.

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from compare.record import History, RunRecord, Times, Verdict
-from nlp_gait.backends.solution import ActiveConstraint
+from compare.study.record import History, RunRecord, Times, Verdict
+from nlp_gait.problem.solution import ActiveConstraint
 
 POWER = {"name": "power", "unit": "W", "sense": "minimise"}
 

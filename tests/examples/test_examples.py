@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.settings import read_settings
-from compare.study import Study, check_study
+from compare.study.settings import read_settings
+from compare.study.study import Study, check_study
 
 ROOT = Path(__file__).parents[2]
 EXPECTED = {

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from compare.record import read_record
-from nlp_gait.backends import library_cache
-from nlp_gait.backends.compiler import find_compiler
+from compare.study.record import read_record
+from nlp_gait.backends.kernel import library_cache
+from nlp_gait.backends.kernel.compiler import find_compiler
 from tests.faults.processes import in_own_mounts, start
 
 SEARCH = ("search", "walk12", "--runs", "6", "--evaluations", "500")

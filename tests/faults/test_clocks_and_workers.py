@@ -13,12 +13,12 @@ from typing import ClassVar
 import pytest
 
 import nlp_gait
-from compare.record import read_record
-from compare.storage import remove_leftovers
-from compare.study import Study, run_study
-from compare.task import ProblemSpec, Stop, Task
+from compare.study.record import read_record
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
+from nlp_gait.files import remove_leftovers
 
 WALK = ProblemSpec(name="walk12")
 STOP = Stop(evaluations=300)

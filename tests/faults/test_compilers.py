@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends import compiler as compiler_module
-from nlp_gait.backends import ipopt, library_cache
-from nlp_gait.backends.compiler import find_compiler
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.ipopt import IpoptSettings
+from nlp_gait.backends.kernel import compiler as compiler_module
+from nlp_gait.backends.kernel import library_cache
+from nlp_gait.backends.kernel.compiler import find_compiler
+from nlp_gait.backends.solvers import ipopt
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import CompilerError
 from tests.backends.toys import corner, toy
 from tests.faults.processes import fake_compiler

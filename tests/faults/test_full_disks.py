@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.record import read_record
+from compare.study.record import read_record
 from tests.faults.processes import ROOT, in_own_mounts
 
 FULL = Path("/dev/full")

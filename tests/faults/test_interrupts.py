@@ -18,13 +18,13 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import nlp_gait
-from compare.record import read_record
-from compare.reproductions.resume import Steps
-from nlp_gait.backends.compiled import CompiledObjective
-from nlp_gait.backends.continuation import solve_both_ways
+from compare.cli import app
+from compare.study.record import read_record
+from compare.study.steps import Steps
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, remembered_interrupts
-from nlp_gait.backends.iteration_watch import IterationWatch
-from nlp_gait.cli import app
+from nlp_gait.backends.kernel.compiled import CompiledObjective
+from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from tests.backends.toys import corner, toy
 from tests.faults.processes import start
 
@@ -174,7 +174,7 @@ def test_reproduce_names_the_steps_that_it_keeps(tmp_path: Path, monkeypatch: py
 
     module.reproduce = reproduce  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "reproduction", module)
-    monkeypatch.setitem(sys.modules["nlp_gait.cli.reproduce"].REPRODUCTIONS, "nao", "reproduction")
+    monkeypatch.setitem(sys.modules["compare.cli.reproduce"].REPRODUCTIONS, "nao", "reproduction")
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished steps are kept in {tmp_path}; the same command continues" in done.stderr
     assert [path.name for path in (tmp_path / "steps").iterdir()] == ["one.json"]

@@ -9,13 +9,13 @@ import sys
 import time
 from pathlib import Path
 
-from compare.reproductions.resume import Steps
+from compare.study.steps import Steps
 from tests.faults.processes import ROOT, start
 
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from compare.reproductions.resume import Steps
+from compare.study.steps import Steps
 
 def work(number):
     time.sleep(0.03)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.runner import attempt
-from compare.study import Study, run_study
-from compare.task import ProblemSpec, Stop, Task
-from nlp_gait.backends import iteration_watch, nlpsol
-from nlp_gait.backends.ipopt import IpoptSettings
-from nlp_gait.backends.iteration_watch import IterationWatch
+from compare.study.runner import attempt
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.backends.solvers import iteration_watch, nlpsol
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from nlp_gait.errors import InputError
 
 WALK = ProblemSpec(name="walk12")

@@ -20,8 +20,8 @@ from unittest import mock
 
 import typer
 
-from nlp_gait.cli import app, main
-from nlp_gait.problems import PROBLEMS
+from compare.cli import app, main
+from nlp_gait.problem.registry import PROBLEMS
 from tests.fuzz.mutation import TEXTS
 from tests.fuzz.readers import SEEDS
 from tests.fuzz.trial import Hung, limited

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from compare.manifest import FILE, read_manifest
-from compare.record import read_record
-from compare.reproductions.nao_runs import read_points, write_points
-from compare.reproductions.resume import Steps
-from compare.settings import StudySettings, read_settings
-from compare.study import Study, check_study
-from nlp_gait.export.result import load_result
+from compare.papers.nao.runs import read_points, write_points
+from compare.study.manifest import FILE, read_manifest
+from compare.study.record import read_record
+from compare.study.settings import StudySettings, read_settings
+from compare.study.steps import Steps
+from compare.study.study import Study, check_study
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
+from nlp_gait.problem.result import load_result
 from nlp_gait.robots import Robot, load_robot
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
 from tests.fuzz.trial import Misread

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from nlp_gait.backends import library_cache
-from nlp_gait.backends.compiler import find_compiler
-from nlp_gait.backends.library_cache import cache_folder, load_library
+from nlp_gait.backends.kernel import library_cache
+from nlp_gait.backends.kernel.compiler import find_compiler
+from nlp_gait.backends.kernel.library_cache import cache_folder, load_library
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
 

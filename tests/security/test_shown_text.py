@@ -12,13 +12,13 @@ from xml.etree import ElementTree
 import pytest
 from rich.console import Console
 
-from compare.figures import inline_svg, new_figure, style, svg_text
-from compare.manifest import Manifest, Session
+from compare.cli import common
+from compare.cli.common import PlainConsole, harmless
+from compare.drawing.figures import inline_svg, new_figure, style, svg_text
 from compare.report.writing import document_of, html, markdown_page
-from compare.settings import SolverSpec, StudySettings
-from compare.task import ProblemSpec
-from nlp_gait.cli import common
-from nlp_gait.cli.common import PlainConsole, harmless
+from compare.study.manifest import Manifest, Session
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.task import ProblemSpec
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import free_model

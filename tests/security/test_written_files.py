@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from compare.figures import save
+from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
 from nlp_gait.export.signals import write_npz
-from nlp_gait.export.video import write_video
 from nlp_gait.files import new_file, write_text
-from nlp_gait.problems.gait_problem import Signals
+from nlp_gait.problem.gait_problem import Signals
+from nlp_gait.simulation.video import write_video
 
 
 def test_a_link_is_replaced_not_followed(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.problems.nao import GRAVITY, HEAD_JOINTS
+from nlp_gait.problems.nao.body import GRAVITY, HEAD_JOINTS
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.conditions import Conditions

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compare.questions.robot_family import Worst
-from compare.questions.robust import Robust
-from compare.questions.robust_playback import played
-from compare.task import ProblemSpec
+from compare.questions.robust.family import Worst
+from compare.questions.robust.playback import played
+from compare.questions.robust.study import Robust
+from compare.study.task import ProblemSpec
 
 # Optimum of nao-dsp, and the one that keeps its limits with soles off by 2 mm and masses by 5 %.
 NOMINAL = (0.31, 0.0068288, 6.49e-05, 0.0048554, 0.068276, -0.052914, -0.0217, 2.0)

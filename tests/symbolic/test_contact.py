@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, centres, points
+from nlp_gait.problems.stairs.robot import load_biped
 from nlp_gait.symbolic.contact import (
     CREEP_SPEED,
     YIELD_DEPTH,
@@ -18,7 +19,6 @@ from nlp_gait.symbolic.contact import (
     solve_definite,
 )
 from nlp_gait.symbolic.lagrange import equations_of_motion
-from nlp_gait.symbolic.planar_biped import LINKS, centres, points
 from nlp_gait.symbolic.quantised import Controller, State, after, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81

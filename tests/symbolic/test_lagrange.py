@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problems.stairs_robot import load_biped
+from nlp_gait.problems.stairs.formulas.planar_biped import ENDS, LINKS, biped_dynamics, centres, points
+from nlp_gait.problems.stairs.robot import load_biped
 from nlp_gait.symbolic.lagrange import equations_of_motion
-from nlp_gait.symbolic.planar_biped import ENDS, LINKS, biped_dynamics, centres, points
 
 pinocchio = pytest.importorskip("pinocchio")
 

@@ -1,0 +1,42 @@
+"""Changes of limits and lengths that people think in: one millimetre, a tenth of a newton metre, one degree."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from nlp_gait.problem.gait_problem import Parameter
+
+
+class NaturalStep(NamedTuple):
+    """A change of a quantity, in its own unit, and how it is said."""
+
+    size: float
+    words: str
+
+
+BY_UNIT = {
+    "m": NaturalStep(1e-3, "1 mm"),
+    "rad": NaturalStep(math.radians(1.0), "1 degree"),
+    "Nm": NaturalStep(0.1, "0.1 Nm"),
+    "N": NaturalStep(1.0, "1 N"),
+    "s": NaturalStep(0.1, "0.1 s"),
+    "m/s": NaturalStep(1e-3, "1 mm/s"),
+    "rad/s": NaturalStep(0.1, "0.1 rad/s"),
+    "rad/s^2": NaturalStep(1.0, "1 rad/s^2"),
+    "1": NaturalStep(0.01, "0.01"),
+}
+SHARE = 0.05  # of the value, where the unit has no step of its own
+MASS = NaturalStep(SHARE, f"{100 * SHARE:g} %")
+LENGTH = BY_UNIT["m"]
+
+
+def natural_step(parameter: Parameter, value: float) -> NaturalStep:
+    """Step of a parameter at its current value."""
+    if parameter.unit in BY_UNIT:
+        return BY_UNIT[parameter.unit]
+    return (
+        NaturalStep(SHARE * abs(value), f"{100 * SHARE:g} %")
+        if value
+        else NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")
+    )

@@ -1,0 +1,133 @@
+"""What a run has cost when it reaches a target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.study.record import RunRecord
+from nlp_gait.problem.gait_problem import Array, Objective
+
+# Relative distances from the best known objective for which the expected running time is tabled.
+TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weighting:
+    """What each call counts, in evaluations of objective and constraints at one point.
+
+    The defaults charge derivatives as forward differences would cost them, objective and constraints each on their own:
+    n + 1 for a first derivative, (n + 1)(n + 2) / 2 for the second. Gradient methods are thereby never flattered.
+
+    Attributes:
+        f: of the objective (in searches with all constraints).
+        g: of the constraints alone.
+        gradient: of the objective's gradient; None for n + 1.
+        jacobian: of the constraints' Jacobian; None for n + 1.
+        hessian: of the Lagrangian's Hessian; None for (n + 1)(n + 2) / 2.
+    """
+
+    f: float = 1.0
+    g: float = 1.0
+    gradient: float | None = None
+    jacobian: float | None = None
+    hessian: float | None = None
+
+    def of_kind(self, n: int) -> dict[str, float]:
+        """Weight of each kind of call for n variables."""
+        second = (n + 1) * (n + 2) / 2
+        defaults = {"f": 1.0, "g": 1.0, "gradient": n + 1.0, "jacobian": n + 1.0, "hessian": second}
+        return {
+            kind: default if getattr(self, kind) is None else getattr(self, kind) for kind, default in defaults.items()
+        }
+
+    def equivalent(self, calls: Mapping[str, int], n: int) -> float:
+        """Equivalent evaluations of counted calls."""
+        weights = self.of_kind(n)
+        return float(sum(weights[kind] * count for kind, count in calls.items()))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """Best so far of one run against what it cost.
+
+    A gradient method has one entry, its end: it is not known to be feasible earlier.
+
+    Attributes:
+        evaluations: (G,) equivalent evaluations.
+        seconds: (G,) wall time of the solve.
+        gap: (G,) relative distance from the reference, infinite while nothing was feasible; negative beyond it.
+    """
+
+    evaluations: Array
+    seconds: Array
+    gap: Array
+
+    def reached(self, target: float, axis: str = "evaluations") -> float:
+        """Cost at which the gap is first at most the target; infinite if never."""
+        hit = np.flatnonzero(self.gap <= target)
+        return float(getattr(self, axis)[hit[0]]) if hit.size else math.inf
+
+    def total(self, axis: str = "evaluations") -> float:
+        """Cost of the whole run; 0 if it failed before it began."""
+        costs = getattr(self, axis)
+        return float(costs[-1]) if len(costs) else 0.0
+
+
+def curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
+    """Best so far of a run.
+
+    Args:
+        record: the run.
+        objective: its sense.
+        reference: objective that gaps are measured from.
+        weighting: of calls.
+    """
+    evaluations = np.array(record.history.evaluations, dtype=float)
+    if evaluations.size:  # derivatives, where there are any, are spent by the end
+        evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))
+    values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
+    if not record.verdict.feasible:
+        values[:] = math.nan  # what the judge refuses has reached nothing
+    gaps = np.array([relative_gap(value, reference, objective) for value in values])
+    return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
+
+
+def relative_gap(value: float, reference: float, objective: Objective) -> float:
+    """Distance of an objective from the reference, positive if worse, in units of the reference unless that is 0.
+
+    Infinite for NaN: nothing feasible was found.
+    """
+    if math.isnan(value) or math.isnan(reference):
+        return math.inf
+    return objective.sign * (value - reference) / (abs(reference) or 1.0)
+
+
+def best_known(records: Sequence[RunRecord], objective: Objective) -> float:
+    """Best objective that the judge finds feasible; NaN if none is."""
+    costs = [objective.sign * r.verdict.objective for r in records if r.verdict.feasible]
+    return objective.sign * min(costs) if costs else math.nan
+
+
+def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:
+    """Cost spent over all runs until the target or their end, divided by the number of successes.
+
+    Args:
+        reached: (R,) cost at which each run reached the target; infinite if never.
+        totals: (R,) cost of each whole run.
+
+    Returns:
+        Expected cost until the first success if runs are repeated; infinite without a success.
+
+    Source:
+        Hansen, Auger, Ros, Mersmann, Tusar, Brockhoff (2021), COCO: a platform for comparing continuous optimizers in a
+        black-box setting, section 4 (ERT, there also aRT).
+    """
+    successes = [cost for cost in reached if math.isfinite(cost)]
+    if not successes:
+        return math.inf
+    spent = sum(cost if math.isfinite(cost) else total for cost, total in zip(reached, totals, strict=True))
+    return spent / len(successes)

@@ -1,0 +1,144 @@
+"""The table of solvers: what they claim, what the judge finds, what it cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from compare.analysis.comparison import Comparison, SolverRuns
+from compare.analysis.statistics.intervals import bootstrap_interval
+from compare.analysis.statistics.run_length import TARGETS, relative_gap
+
+HEADER = (
+    "solver",
+    "runs",
+    "claim success",
+    "judged feasible",
+    "best claim",
+    "best",
+    "median",
+    "worst",
+    "median gap",
+    "evaluations",
+    "time a run",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverSummary:
+    """All runs of one solver on one problem; objectives in the problem's sense, None without a feasible run.
+
+    Attributes:
+        algorithm: name of the solver.
+        runs: how many.
+        claimed: how many claim success.
+        feasible: how many end feasible, by the judge, on the problem's own samples.
+        dense_feasible: how many are feasible between the samples too; None without a dense grid.
+        best_claim: best objective that a run claims to be feasible.
+        best: best objective that the judge finds feasible; likewise ``median`` and ``worst`` over the feasible runs.
+        median_interval: 95 % bootstrap interval of the median.
+        gap: relative distance of the median from the best known objective.
+        evaluations: median equivalent evaluations of a run.
+        time_s: median wall time of a run [s].
+        build_s: longest time to build the symbolic problem [s].
+        compile_s: longest time to compile the objective, or to make derivatives and solver [s].
+        expected_evaluations: expected running time to each of ``TARGETS``; infinite if it was never reached.
+        expected_s: the same in seconds.
+    """
+
+    algorithm: str
+    runs: int
+    claimed: int
+    feasible: int
+    dense_feasible: int | None
+    best_claim: float | None
+    best: float | None
+    median: float | None
+    worst: float | None
+    median_interval: tuple[float, float] | None
+    gap: float | None
+    evaluations: float
+    time_s: float
+    build_s: float
+    compile_s: float
+    expected_evaluations: tuple[float, ...]
+    expected_s: tuple[float, ...]
+
+
+def summarise(comparison: Comparison) -> list[SolverSummary]:
+    """One summary for each solver."""
+    return [_summary(comparison, solver) for solver in comparison.solvers]
+
+
+def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
+    costs, records, sign = solver.feasible, solver.records, comparison.objective.sign
+    middle = comparison.value(median(costs)) if costs else None
+    claims = [sign * r.objective for r in records if r.success and r.objective is not None]
+    interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
+    dense = [r.verdict.dense_feasible for r in records]
+    return SolverSummary(
+        algorithm=solver.name,
+        runs=len(records),
+        claimed=sum(r.success for r in records),
+        feasible=len(costs),
+        dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
+        best_claim=sign * min(claims) if claims else None,
+        best=comparison.value(costs[0]) if costs else None,
+        median=middle,
+        worst=comparison.value(costs[-1]) if costs else None,
+        median_interval=(interval[0], interval[1]) if interval else None,
+        gap=None if middle is None else relative_gap(middle, comparison.reference, comparison.objective),
+        evaluations=median(c.total() for c in solver.curves),
+        time_s=median(r.time_s.solve for r in records),
+        build_s=max(r.time_s.build for r in records),
+        compile_s=max(r.time_s.compile for r in records),
+        expected_evaluations=tuple(solver.expected_cost(target) for target in TARGETS),
+        expected_s=tuple(solver.expected_cost(target, "seconds") for target in TARGETS),
+    )
+
+
+def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
+    """One row of text under ``HEADER``."""
+    unit = "" if comparison.objective.unit == "1" else f" {comparison.objective.unit}"
+
+    def value(v: float | None) -> str:
+        return "-" if v is None else f"{v:.6f}{unit}"
+
+    return (
+        summary.algorithm,
+        str(summary.runs),
+        f"{summary.claimed}/{summary.runs}",
+        f"{summary.feasible}/{summary.runs}",
+        value(summary.best_claim),
+        value(summary.best),
+        value(summary.median),
+        value(summary.worst),
+        percent(summary.gap),
+        count(summary.evaluations),
+        f"{summary.time_s:.3f} s",
+    )
+
+
+def percent(share: float | None) -> str:
+    """Share in percent, to four decimals or in scientific notation below."""
+    if share is None or not math.isfinite(share):
+        return "-"
+    return f"{100 * share:.4f} %" if share == 0.0 or abs(share) >= 5e-7 else f"{100 * share:.1e} %"
+
+
+def count(number: float) -> str:
+    """Number of evaluations; a dash if it is infinite."""
+    return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Markdown table; the first column is left-aligned, the others right. Text in cells is taken literally."""
+    rule = [":--", *["--:"] * (len(header) - 1)]
+    literal = [[_escaped(cell) for cell in row] for row in rows]
+    return "\n".join("| " + " | ".join(row) + " |" for row in (header, rule, *literal)) + "\n"
+
+
+def _escaped(cell: str) -> str:
+    return cell.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")

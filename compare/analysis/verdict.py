@@ -1,0 +1,66 @@
+"""The verdict in three sentences: who found the best known, how far the others stay, what it costs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from compare.analysis.comparison import Comparison
+from compare.analysis.significance import compare_pairs
+from compare.analysis.table import count, percent
+
+# A run whose gap is at most this has found the best known.
+FOUND = 1e-6
+SIGNIFICANT = 0.05
+
+
+def verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
+    """Three sentences over all problems."""
+    known = [c for c in comparisons if math.isfinite(c.reference)]
+    if not known:
+        names = ", ".join(c.problem for c in comparisons)
+        return (
+            f"No solver found a feasible point of {names}.",
+            "Nothing can be said about distances.",
+            "The failed runs below say what stood in the way.",
+        )
+    return (
+        "Best known: " + "; ".join(_found(c) for c in known) + ".",
+        "Distance of the medians: " + "; ".join(_distance(c) for c in known) + ".",
+        "Expected cost to come within 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
+    )
+
+
+def _found(comparison: Comparison) -> str:
+    unit = "" if comparison.objective.unit == "1" else f" {comparison.objective.unit}"
+    counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
+    finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
+    best = f"{comparison.reference:.6f}{unit}"
+    return f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {_listed(finders) or 'one run'}"
+
+
+def _distance(comparison: Comparison) -> str:
+    parts = []
+    for solver in comparison.solvers:
+        gap = (solver.median_cost - comparison.objective.sign * comparison.reference) / (
+            abs(comparison.reference) or 1.0
+        )
+        parts.append(f"{solver.name} {percent(gap) if math.isfinite(gap) else 'mostly infeasible'}")
+    pairs = compare_pairs(comparison)
+    different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)
+    tests = f" ({different} of {len(pairs)} pairs differ at the 5 % level, Holm-corrected)" if pairs else ""
+    return f"on {comparison.problem} {_listed(parts)}{tests}"
+
+
+def _cost(comparison: Comparison) -> str:
+    target = 1e-3
+    costs = [(s, s.expected_cost(target), s.expected_cost(target, "seconds")) for s in comparison.solvers]
+    reached = sorted((item for item in costs if math.isfinite(item[1])), key=lambda item: item[1])
+    never = [solver.name for solver, cost, _ in costs if not math.isfinite(cost)]
+    parts = [f"{solver.name} {count(cost)} evaluations or {seconds:.2g} s" for solver, cost, seconds in reached]
+    text = f"on {comparison.problem} {_listed(parts) or 'no solver'}"
+    return text + (f", never by {_listed(never)}" if never else "")
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + (" and " if parts else "") + "".join(parts[-1:])

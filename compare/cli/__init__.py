@@ -1,0 +1,63 @@
+"""Command line: ``nlp-gait COMMAND``.
+
+From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
+result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
+robust``.
+
+Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from compare.cli.animate import animate
+from compare.cli.compare import compare
+from compare.cli.evaluate import evaluate
+from compare.cli.export import export
+from compare.cli.list import list_problems
+from compare.cli.questions.certainty import certainty
+from compare.cli.questions.motions import motions
+from compare.cli.questions.motors import motors
+from compare.cli.questions.pareto import pareto
+from compare.cli.questions.prices import prices
+from compare.cli.questions.robust import robust
+from compare.cli.questions.sweep import sweep
+from compare.cli.questions.walk import walk
+from compare.cli.report import report
+from compare.cli.reproduce import reproduce
+from compare.cli.search import search
+from compare.cli.simulate import simulate
+from compare.cli.solve import solve
+
+app = typer.Typer(
+    help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+)
+app.command("list")(list_problems)
+app.command("evaluate")(evaluate)
+app.command("solve")(solve)
+app.command("search")(search)
+app.command("compare")(compare)
+app.command("report")(report)
+app.command("sweep")(sweep)
+app.command("reproduce")(reproduce)
+app.command("prices")(prices)
+app.command("pareto")(pareto)
+app.command("certainty")(certainty)
+app.command("motions")(motions)
+app.command("motors")(motors)
+app.command("robust")(robust)
+app.command("walk")(walk)
+app.command("simulate")(simulate)
+app.command("export")(export)
+app.command("animate")(animate)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()

@@ -1,0 +1,44 @@
+"""``nlp-gait animate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compare.cli.common import ResultFile, command, output_file, stdout
+
+SHEET = ".png"
+
+
+@command
+def animate(
+    result: ResultFile,
+    out: Annotated[
+        Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
+    ] = None,
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second.")] = 12.5,
+    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="1 is real time.")] = 1.0,
+    poses: Annotated[int, typer.Option(min=2, max=20, help="Of a contact sheet.")] = 6,
+) -> None:
+    """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
+
+    Example: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`
+    """
+    from compare.drawing.animation import contact_sheet, frames
+    from compare.drawing.skeletons import skeleton_of
+    from nlp_gait.problem.result import load_result
+    from nlp_gait.simulation.video import check_video_path, write_video
+
+    target = output_file(result.with_suffix(".gif") if out is None else out)
+    if target.suffix.lower() != SHEET:
+        check_video_path(target)
+    loaded = load_result(result)
+    skeleton = skeleton_of(loaded, frames_per_s / speed)
+    if target.suffix.lower() == SHEET:
+        contact_sheet(skeleton, target, poses)
+    else:
+        played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
+        write_video(target, frames(skeleton), (len(skeleton.t) - 1) / played_s)
+    stdout.print(f"wrote {target}", soft_wrap=True, markup=False)

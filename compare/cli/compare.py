@@ -1,0 +1,196 @@
+"""``nlp-gait compare``."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from compare.cli.common import (
+    AsJson,
+    Derivatives,
+    Fix,
+    Intervals,
+    Jobs,
+    Options,
+    Robot,
+    Seed,
+    Set,
+    command,
+    end_interrupted,
+    print_json,
+    print_table,
+    problem_spec,
+    progress_bar,
+    stdout,
+)
+from compare.cli.study_options import (
+    Handle,
+    PenaltyWeight,
+    Scheduler,
+    Stagnation,
+    Target,
+    TimeLimit,
+    handling_of,
+    stop_of,
+)
+from nlp_gait.errors import InputError
+
+if TYPE_CHECKING:
+    from compare.study.record import RunRecord
+    from compare.study.settings import StudySettings
+    from compare.study.task import ProblemSpec
+
+DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
+# Options that say how and where a study runs; all others decide what it computes and stand in a study file.
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "as_json")
+
+
+@command
+def compare(
+    context: typer.Context,
+    problems: Annotated[
+        list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
+    ] = None,
+    algorithms: Annotated[
+        str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
+    ] = "pso,ga,aco",
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search algorithm.")] = 11,
+    starts: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
+    ] = 20,
+    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")] = 10_000,
+    handling: Handle = "deb",
+    penalty_weight: PenaltyWeight = None,
+    target: Target = None,
+    stagnation: Stagnation = None,
+    time_limit: TimeLimit = None,
+    polish: Annotated[
+        bool, typer.Option("--polish", help="IPOPT from each search's result, as solvers of their own.")
+    ] = False,
+    seed: Seed = 0,
+    robot: Robot = None,
+    intervals: Intervals = None,
+    derivatives: Derivatives = None,
+    option: Options = None,
+    values: Set = None,
+    fix: Fix = None,
+    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are kept.")
+    ] = Path("results"),
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out, whatever it was.")] = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    as_json: AsJson = False,
+) -> None:
+    """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
+
+    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way.
+
+    Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
+    `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
+    """
+    from compare.report import write_report
+    from compare.study.manifest import Session, read_manifest, write_manifest
+    from compare.study.settings import read_settings
+    from compare.study.study import Study, check_study, default_jobs, run_study
+    from nlp_gait.backends.interrupts import Interrupted
+    from nlp_gait.files import writable_folder
+
+    if config is not None or resume:
+        _refuse_others(context, "--config" if config is not None else "--resume")
+    if config is not None:
+        settings = read_settings(config)
+    elif resume:
+        known = read_manifest(out).settings
+        if known is None:
+            raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
+        settings = known
+    else:
+        specs = [
+            problem_spec(name, robot, intervals, derivatives, option, values, fix)
+            for name in problems or DEFAULT_PROBLEMS
+        ]
+        settings = _settings(algorithms, specs, runs, starts, polish)
+        settings = replace(
+            settings,
+            handling=handling_of(handling, penalty_weight),
+            stop=stop_of(evaluations, target, stagnation, time_limit),
+            seed=seed,
+        )
+    study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
+    check_study(study)
+    command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
+    write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
+    with progress_bar("runs", len(study.tasks)) as advance:
+        try:
+            records = run_study(
+                study,
+                progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
+                kept=lambda count: _advance_by(advance, count),
+            )
+        except Interrupted as interrupt:
+            end_interrupted(
+                f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
+            )
+    written = write_report(out, records, read_manifest(out))
+    if as_json:
+        print_json({"problems": summaries_of(records), "files": [str(path) for path in written]})
+        return
+    print_summaries(records)
+    for path in written:
+        stdout.print(f"wrote {path}", soft_wrap=True)
+
+
+def _advance_by(advance: Callable[[str], None], count: int) -> None:
+    for _ in range(count):
+        advance("kept from before")
+
+
+def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
+    """By problem, what the table of solvers says, as plain data."""
+    from compare.analysis.comparison import compare_problems
+    from compare.analysis.table import summarise
+
+    return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
+
+
+def print_summaries(records: Sequence[RunRecord]) -> None:
+    """Table of solvers for each problem."""
+    from compare.analysis.comparison import compare_problems
+    from compare.analysis.table import HEADER, cells, summarise
+
+    for comparison in compare_problems(records):
+        rows = [cells(summary, comparison) for summary in summarise(comparison)]
+        print_table(f"{comparison.problem}: judged by the exact functions", HEADER, rows)
+
+
+def _settings(algorithms: str, problems: Sequence[ProblemSpec], runs: int, starts: int, polish: bool) -> StudySettings:
+    """Study of IPOPT, unless it has no starts, and the named solvers."""
+    from compare.study.settings import SolverSpec, StudySettings
+    from compare.study.task import GRADIENT_SOLVERS, IPOPT
+
+    names = [name.strip() for name in algorithms.split(",") if name.strip()]
+    if starts > 0 and IPOPT not in names:
+        names.insert(0, IPOPT)
+    if starts == 0:
+        names = [name for name in names if name not in GRADIENT_SOLVERS]
+    solvers = tuple(SolverSpec(algorithm=name, polish=polish and name not in GRADIENT_SOLVERS) for name in names)
+    return StudySettings(problems=tuple(problems), solvers=solvers, runs=runs, starts=max(starts, 1))
+
+
+def _refuse_others(context: typer.Context, flag: str) -> None:
+    """Raise if an option is given that a study file or an earlier session has decided already."""
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        source = context.get_parameter_source(name)
+        given = source is not None and source.name == "COMMANDLINE"
+        if name not in OF_THE_SESSION and given and context.params.get(name) not in (None, [], ()):
+            flagged = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
+            raise InputError(f"{flag} decides what the study computes; leave out {flagged}")

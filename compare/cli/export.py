@@ -1,0 +1,36 @@
+"""``nlp-gait export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compare.cli.common import ResultFile, command, output_file, stdout
+from nlp_gait.errors import unknown
+from nlp_gait.export.setpoints import PERIOD_MS
+
+
+@command
+def export(
+    result: ResultFile,
+    format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
+    ] = None,
+    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows.")] = PERIOD_MS,
+) -> None:
+    """Write a gait in a format that other tools read.
+
+    Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
+    """
+    from nlp_gait.export.formats import FORMATS, write_as
+    from nlp_gait.problem.result import load_result
+
+    if format_ not in FORMATS:
+        raise unknown("format", format_, FORMATS)
+    loaded = load_result(result)
+    target = output_file(out if out is not None else result.with_name(result.stem + FORMATS[format_]))
+    write_as(format_, target, loaded, period_ms)
+    stdout.print(f"wrote {target}", soft_wrap=True, markup=False)

@@ -1,0 +1,42 @@
+"""``nlp-gait report``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compare.cli.common import AsJson, command, print_json, stdout
+from nlp_gait.errors import InputError
+
+
+@command
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: what --out was.")],
+    gradient_weight: Annotated[
+        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts (default n + 1).")
+    ] = None,
+    hessian_weight: Annotated[
+        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts (default (n + 1)(n + 2)/2).")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a study's report anew from its records, without running anything.
+
+    Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`
+    """
+    from compare.analysis.statistics.run_length import Weighting
+    from compare.report import rebuild_report
+
+    for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
+        if weight is not None and not math.isfinite(weight):
+            raise InputError(f"{flag} must be a finite number, got {weight}")
+    weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
+    written = rebuild_report(folder, weighting)
+    if as_json:
+        print_json({"files": [str(path) for path in written]})
+        return
+    for path in written:
+        stdout.print(f"wrote {path}", soft_wrap=True)

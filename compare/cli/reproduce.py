@@ -1,0 +1,37 @@
+"""``nlp-gait reproduce``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compare.cli.common import command, progress_bar, stdout
+from compare.cli.resumable import resumable
+from nlp_gait.errors import unknown
+
+# Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
+REPRODUCTIONS = {
+    "nao": "compare.papers.nao.reproduce",
+    "walk12": "compare.papers.walk12.reproduce",
+    "stairs": "compare.papers.stairs.reproduce",
+}
+
+
+@command
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
+    out: Annotated[Path, typer.Option(help="Folder for tables, figures and report.md; finished steps in it are kept.")],
+) -> None:
+    """Compute a paper's tables and figures anew and put them beside the printed ones.
+
+    Example: `nlp-gait reproduce nao --out reproduction`
+    """
+    if paper not in REPRODUCTIONS:
+        raise unknown("reproduction", paper, REPRODUCTIONS)
+    module = import_module(REPRODUCTIONS[paper])
+    with resumable(out), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
+        module.reproduce(out, progress=advance)
+    stdout.print(f"wrote {out / 'report.md'}", soft_wrap=True)

@@ -1,0 +1,151 @@
+"""``nlp-gait simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from compare.cli.common import (
+    AsJson,
+    ResultFile,
+    command,
+    end_interrupted,
+    fail,
+    output_file,
+    print_json,
+    print_table,
+    stdout,
+)
+from nlp_gait.simulation.mjcf import FRICTION
+
+if TYPE_CHECKING:
+    from nlp_gait.simulation.measurements import Measurements
+    from nlp_gait.simulation.robustness import Robustness
+    from nlp_gait.simulation.walking import Walk
+
+
+@command
+def simulate(
+    result: ResultFile,
+    steps: Annotated[
+        int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")
+    ] = None,
+    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
+    video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
+    frames_per_s: Annotated[
+        float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")
+    ] = 25.0,
+    out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
+    torque_limits: Annotated[str, typer.Option(help="urdf, stall or continuous: published limits differ.")] = "urdf",
+    sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
+    friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    robustness: Annotated[
+        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Play a NAO gait in MuJoCo, open loop with a set-point every 40 ms, and compare it with the model's predictions.
+
+    Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
+    """
+    from compare.drawing.playback_figure import plot_playback
+    from nlp_gait.export.signals import write_npz
+    from nlp_gait.files import without_nan, writable_folder, write_json, write_text
+    from nlp_gait.problem.result import load_result
+    from nlp_gait.simulation.camera import filmed, shown
+    from nlp_gait.simulation.conditions import Conditions
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.engine import mujoco
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.mjcf import free_model
+    from nlp_gait.simulation.plan import plan_of
+    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.robustness import robustness as sweep
+    from nlp_gait.simulation.video import check_video_path, write_video
+    from nlp_gait.simulation.walking import measure_walk
+
+    mujoco(pictures=video is not None)
+    if viewer and video is not None:
+        fail("--viewer and --video exclude each other; film it in a second run")
+    target = None if video is None else output_file(check_video_path(video))
+    folder = None if out is None else writable_folder(out)
+    plan = plan_of(load_result(result), steps)
+    drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
+    if target is not None:
+        trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)
+        write_video(target, frames, frames_per_s)
+    else:
+        trace = (shown if viewer else play)(plan, conditions, drive, sole)
+    walk = None if steps is None else measure_walk(plan, trace, drive, steps)
+    report = measure(plan, trace, drive) if walk is None else walk.measurements
+    survival = None
+    data = {"schema": 1, **report.to_json(), **({} if walk is None else {"walk": walk.course()})}
+    if folder is not None:
+        write_json(folder / "report.json", without_nan(data))
+        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        write_npz(folder / "playback.npz", trace.signals(plan.joints))
+        plot_playback(plan, trace, drive, folder / "playback")
+    if robustness:
+        try:
+            survival = sweep(plan, drive)
+        except KeyboardInterrupt:
+            kept = (
+                "nothing was written; name a folder with --out"
+                if folder is None
+                else f"the playback is kept in {folder}"
+            )
+            end_interrupted(f"interrupted in the tests of robustness; {kept}")
+        data["robustness"] = survival.to_json()
+        if folder is not None:
+            write_json(folder / "report.json", without_nan(data))
+    if as_json:
+        print_json(data)
+    else:
+        _print(report, survival)
+        if walk is not None:
+            _print_course(walk)
+
+
+def _print(report: Measurements, survival: Robustness | None) -> None:
+    fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
+    stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
+    rows = [
+        (label, f"{p.mechanical_W:.3f}", f"{p.heat_W:.3f}", f"{p.total_W:.3f}")
+        for label, p in (("model", report.predicted), ("engine", report.measured))
+    ]
+    print_table("Mean power [W]", ("", "mechanical", "heat", "total"), rows)
+    lengths = {
+        "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
+        "- largest": report.pressure_max_m,
+        "- RMS in the middle 60 % of the phase": report.pressure_middle_rms_m,
+        "- RMS without averaging over 40 ms": report.pressure_raw_rms_m,
+        "slip of a supporting foot": report.slip_m,
+        **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
+    }
+    rows_mm = [(name, "-" if value is None else f"{1000 * value:.1f} mm") for name, value in lengths.items()]
+    tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
+    print_table("Against the plan", ("", "measured"), [*rows_mm, ("tracking error of the joints", tracking)])
+    for joint, share in report.saturated.items():
+        stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
+    for joint in report.joint_limits:
+        stdout.print(f"{joint} goes beyond its mechanical range")
+    if survival is not None:
+        for title, unit, found in (("push", "N s", survival.push_Ns), ("slope", "degrees", survival.slope_deg)):
+            listed = ", ".join(f"{direction} {value:g}" for direction, value in found.items())
+            stdout.print(f"Largest {title} survived [{unit}]: {listed}", markup=False)
+        for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
+            listed = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
+            stdout.print(f"{title}: {listed}")
+
+
+def _print_course(walk: Walk) -> None:
+    if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
+        stdout.print(f"{walk.steps_done} of {walk.steps} steps done before it fell")
+        return
+    energy = "-" if walk.energy_J_per_m is None else f"{walk.energy_J_per_m:.1f} J/m"
+    stdout.print(
+        f"{walk.steps} steps: walked {1000 * walk.walked_m:.0f} mm of {1000 * walk.planned_m:.0f} mm, "
+        f"{1000 * walk.drift_m:.0f} mm to the left, heading {walk.heading_deg:.1f} degrees to the left; {energy}"
+    )

@@ -1,0 +1,1 @@
+"""Pictures of gaits, runs and distributions."""

@@ -1,0 +1,151 @@
+"""Stick figures: a gait in 3D, from the side, the front and above, as frames of a video or as a contact sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from compare.drawing.figures import new_figure, style
+from compare.drawing.skeleton import LEFT, RIGHT, TRUNK, Skeleton
+from nlp_gait.files import new_file
+from nlp_gait.simulation.video import Frame
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = {LEFT: "#0072B2", RIGHT: "#D55E00", TRUNK: "#404040"}
+GROUND, SUPPORT, COM, ZMP = "#909090", "#009E73", "#000000", "#CC79A7"
+MARGIN = 0.04  # [m] around everything that moves
+FRAME_DPI, SHEET_DPI = 80, 150
+# Views by name: the coordinates across and up.
+VIEWS = {"side": (0, 2), "front": (1, 2), "above": (0, 1)}
+# Of the views in a frame: left, bottom, width, height.
+PLACES = {"side": (0.53, 0.48, 0.19, 0.45), "front": (0.79, 0.48, 0.2, 0.45), "above": (0.55, 0.09, 0.42, 0.3)}
+AXIS_NAMES = ("x [m]", "y [m]", "z [m]")
+
+
+def frames(skeleton: Skeleton) -> Iterator[Frame]:
+    """One picture a sample: in 3D, from the side, the front and above; a planar gait from the side only."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with style():
+        figure = new_figure(*((6.0, 5.0) if skeleton.planar else (8.0, 5.0)))
+        figure.set_layout_engine("none")  # fixed places: solving for them costs more than drawing
+        figure.set_dpi(FRAME_DPI)
+        canvas: Any = FigureCanvasAgg(figure)
+        for k in range(len(skeleton.t)):
+            figure.clear()
+            _draw_frame(figure, skeleton, k)
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
+    """Some instants side by side as one PNG, a row for each view.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    chosen = np.linspace(0, len(skeleton.t) - 1, poses).round().astype(int)
+    views = ["side"] if skeleton.planar else list(VIEWS)
+    low, high = skeleton.box()
+    heights = [float((high - low)[VIEWS[view][1]] + 2 * MARGIN) for view in views]
+    with style():
+        figure = new_figure(
+            1.6 * poses, 0.7 + sum(0.35 + 1.45 * height / _width(skeleton, views) for height in heights)
+        )
+        axes = figure.subplots(len(views), poses, squeeze=False, sharey="row", height_ratios=heights)
+        for row, view in zip(axes, views, strict=True):
+            for axis, k in zip(row, chosen, strict=True):
+                _draw_view(axis, skeleton, int(k), view)
+                if axis is not row[0]:
+                    axis.set_ylabel("")
+        for axis, k in zip(axes[0], chosen, strict=True):
+            axis.set_title(f"{skeleton.t[k]:.2f} s")
+        figure.suptitle(f"{skeleton.title}: {_legend(skeleton)}", fontsize=9)
+        with new_file(path) as file:
+            figure.savefig(file, format="png", dpi=SHEET_DPI)
+
+
+def _width(skeleton: Skeleton, views: list[str]) -> float:
+    low, high = skeleton.box()
+    return max(float((high - low)[VIEWS[view][0]] + 2 * MARGIN) for view in views)
+
+
+def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
+    figure.suptitle(f"{skeleton.title}, {skeleton.t[k]:.2f} s: {_legend(skeleton)}", fontsize=8)
+    if skeleton.planar:
+        _draw_view(figure.add_axes((0.1, 0.1, 0.85, 0.8)), skeleton, k, "side")
+        return
+    _draw_3d(figure.add_axes((-0.02, 0.02, 0.5, 0.9), projection="3d"), skeleton, k)
+    for view, place in PLACES.items():
+        _draw_view(figure.add_axes(place), skeleton, k, view)
+
+
+def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
+    across, up = VIEWS[view]
+    if view == "above":
+        support = skeleton.support(k)
+        if support is not None:
+            axis.fill(support[:, 0], support[:, 1], color=SUPPORT, alpha=0.3, lw=0)
+    elif view == "side":
+        axis.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
+    else:
+        axis.axhline(0.0, color=GROUND, lw=1.0)
+    for sole in skeleton.soles:
+        ring = np.concatenate([sole.corners[k], sole.corners[k, :1]])
+        axis.plot(ring[:, across], ring[:, up], color=COLOURS[sole.side], lw=1.0)
+    for limb in skeleton.limbs:
+        line = limb.points[k]
+        faint = 0.25 if view == "above" else 1.0
+        axis.plot(line[:, across], line[:, up], color=COLOURS[limb.side], marker="o", ms=2.5, alpha=faint)
+    for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
+        if points is not None:
+            axis.plot(points[k, across], points[k, up], color=colour, marker=marker, ms=5, ls="none", zorder=5)
+    low, high = skeleton.box()
+    ground_low = min(float(low[2]), 0.0 if not skeleton.planar else float(skeleton.ground[:, 1].min()))
+    low = np.array([low[0], low[1], ground_low])
+    axis.set_xlim(low[across] - MARGIN, high[across] + MARGIN)
+    axis.set_ylim(low[up] - MARGIN, high[up] + MARGIN)
+    axis.set_aspect("equal")
+    if view == "front":
+        axis.invert_xaxis()  # seen from behind: its left is our left
+    axis.set_xlabel(AXIS_NAMES[across])
+    axis.set_ylabel(AXIS_NAMES[up])
+
+
+def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    support = skeleton.support(k)
+    if support is not None:
+        corners = np.column_stack([support, np.zeros(len(support))])
+        axis.add_collection3d(Poly3DCollection([corners], color=SUPPORT, alpha=0.3, lw=0))
+    for sole in skeleton.soles:
+        axis.plot(*np.concatenate([sole.corners[k], sole.corners[k, :1]]).T, color=COLOURS[sole.side], lw=1.0)
+    for limb in skeleton.limbs:
+        axis.plot(*limb.points[k].T, color=COLOURS[limb.side], marker="o", ms=2.5)
+    for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
+        if points is not None:
+            axis.plot(*points[k : k + 1].T, color=colour, marker=marker, ms=5, ls="none")
+    low, high = skeleton.box()
+    low = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN
+    high = high + MARGIN
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axis.set_box_aspect(high - low, zoom=1.1)
+    axis.view_init(elev=15, azim=-55)
+    axis.set(xticklabels=[], yticklabels=[], zticklabels=[])
+
+
+def _legend(skeleton: Skeleton) -> str:
+    marks = [
+        "left blue, right orange",
+        "support polygon green" if skeleton.soles else "",
+        "ZMP cross" if skeleton.zmp is not None else "",
+        "centre of mass dot" if skeleton.com is not None else "",
+    ]
+    return ", ".join(mark for mark in marks if mark)

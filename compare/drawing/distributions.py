@@ -1,0 +1,100 @@
+"""Figures of distributions: run lengths over targets, final gaps over runs, solvers over problems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from compare.analysis.comparison import Comparison
+from compare.analysis.statistics.distribution import ECDF_TARGETS, ecdf, performance_profile
+from compare.analysis.statistics.run_length import TARGETS
+from compare.drawing.convergence import AXES, SMALLEST_GAP
+from compare.drawing.figures import legend_below, logarithmic, looks, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def ecdf_figure(comparison: Comparison) -> Figure:
+    """Share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
+    with style():
+        figure = new_figure(7.4, 2.8)
+        names = [solver.name for solver in comparison.solvers]
+        for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
+            ends = [c.total(axis) for s in comparison.solvers for c in s.curves]
+            last = max([*ends, 1e-3])
+            for solver, look in zip(comparison.solvers, looks(names), strict=True):
+                costs = np.array([c.reached(target, axis) for c in solver.curves for target in ECDF_TARGETS])
+                at, share = ecdf(costs)
+                if at.size:
+                    at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
+                axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=solver.name)
+            logarithmic(axes)
+            axes.set_xlabel(AXES[axis])
+            axes.set_ylim(0.0, 1.02)
+        figure.axes[0].set_ylabel("share of runs and targets")
+        legend_below(figure)
+    return figure
+
+
+def final_gap_figure(comparison: Comparison) -> Figure:
+    """Gap of each run at its end, one row a solver; infeasible runs as crosses at the right edge."""
+    with style():
+        figure = new_figure(7.4, 0.8 + 0.28 * len(comparison.solvers))
+        axes = figure.subplots()
+        names = [solver.name for solver in comparison.solvers]
+        reference = comparison.objective.sign * comparison.reference
+        unit = abs(reference) or 1.0
+        for row, (solver, look) in enumerate(zip(comparison.solvers, looks(names), strict=True)):
+            gaps = np.array([(cost - reference) / unit for cost in solver.costs])
+            known = np.isfinite(gaps)
+            shown = 100.0 * np.maximum(gaps[known], SMALLEST_GAP)
+            axes.plot(
+                shown, np.full(shown.size, row), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8
+            )
+            if known.any():
+                axes.plot(np.median(shown), row, "|", color=look.colour, markersize=16, markeredgewidth=2)
+            missing = int((~known).sum())
+            if missing:
+                axes.annotate(
+                    f"{missing} infeasible",
+                    (1.0, row),
+                    xycoords=("axes fraction", "data"),
+                    ha="right",
+                    va="center",
+                    fontsize=8,
+                )
+        logarithmic(axes)
+        axes.set_xlabel("gap to the best known at the end [%], bars: medians")
+        axes.set_yticks(range(len(names)), names)
+        axes.set_ylim(len(names) - 0.5, -0.5)
+    return figure
+
+
+def profile_figure(comparisons: Sequence[Comparison]) -> Figure:
+    """Performance profile of expected running times over problems and targets, for solvers that ran on all of them."""
+    with style():
+        costs = expected_costs(comparisons)
+        figure = new_figure(4.6, 2.8)
+        axes = figure.subplots()
+        profile = performance_profile(costs)
+        last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
+        for (name, (factor, share)), look in zip(profile.items(), looks(list(profile)), strict=True):
+            at, height = np.append(factor, last), np.append(share, share[-1] if share.size else 0.0)
+            axes.step(at, height, where="post", color=look.colour, linestyle=look.line, label=name)
+        logarithmic(axes)
+        axes.set_xlim(left=1.0)
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel("factor of the cheapest solver's expected evaluations")
+        axes.set_ylabel("share of problems and targets")
+        legend_below(figure)
+    return figure
+
+
+def expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
+    """By solver, expected evaluations for each problem and target; only solvers that ran on all problems."""
+    found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
+    shared = [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
+    return {name: [solvers[name].expected_cost(target) for solvers in found for target in TARGETS] for name in shared}

@@ -1,0 +1,1 @@
+"""A biped on stairs: planned, tracked and ideal."""

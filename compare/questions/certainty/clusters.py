@@ -1,0 +1,96 @@
+"""Distinct local optima among the ends of many starts, and what their shares say about those that were never reached."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.questions.certainty.multistart import Ends
+from metaheuristics.interface import Array
+from nlp_gait.problem.gait_problem import GaitProblem
+
+# Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this part of
+# its range.
+SAME_OBJECTIVE = 1e-5
+SAME_X = 0.01
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum:
+    """A local optimum.
+
+    Attributes:
+        objective: of the best end in it, in the problem's sense.
+        count: of starts that ended in it.
+        share: of the starts that converged.
+        x: of the best end.
+    """
+
+    objective: float
+    count: int
+    share: float
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unseen:
+    """What a sample of N starts says about optima that none of them reached. Support, not proof: N is finite.
+
+    Attributes:
+        good_turing: share of starts that would end in an unseen optimum: optima reached once, divided by N.
+        expected_optima: expected number of all local optima, under a uniform prior on their number and shares; None if the
+            sample is too small for it.
+        expected_covered: expected share of starts that end in optima seen, under the same prior; None likewise.
+        largest_missed: with 95 % confidence no single unseen optimum attracts more than this share of the starts.
+
+    Source:
+        Good (1953), The population frequencies of species and the estimation of population parameters; Boender, Rinnooy Kan
+        (1987), Bayesian stopping rules for multistart global optimization methods, Mathematical Programming 37.
+    """
+
+    good_turing: float
+    expected_optima: float | None
+    expected_covered: float | None
+    largest_missed: float
+
+
+def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
+    """Distinct optima among the ends that converged and are feasible, best first."""
+    kept = np.flatnonzero(ends.success)
+    order = kept[np.argsort(problem.objective.sign * ends.objective[kept], kind="stable")]
+    scaled = ends.x / problem.scale
+    heads: list[int] = []
+    counts: list[int] = []
+    for i in order:
+        for k, head in enumerate(heads):
+            near = abs(ends.objective[i] - ends.objective[head]) <= SAME_OBJECTIVE * abs(ends.objective[head])
+            if near and np.max(np.abs(scaled[i] - scaled[head])) <= SAME_X:
+                counts[k] += 1
+                break
+        else:
+            heads.append(int(i))
+            counts.append(1)
+    return [
+        Optimum(
+            objective=float(ends.objective[head]),
+            count=count,
+            share=count / len(kept),
+            x=tuple(ends.x[head].tolist()),
+        )
+        for head, count in zip(heads, counts, strict=True)
+    ]
+
+
+def unseen(optima: list[Optimum]) -> Unseen:
+    """Estimates from the counts of at least one optimum."""
+    counts: Array = np.array([optimum.count for optimum in optima], dtype=float)
+    n, w = float(counts.sum()), float(len(counts))
+    return Unseen(
+        good_turing=float((counts == 1).sum()) / n,
+        expected_optima=w * (n - 1) / (n - w - 2) if n > w + 2 else None,
+        expected_covered=(n - w - 1) * (n + w) / (n * (n - 1)) if n > w + 1 else None,
+        largest_missed=-math.expm1(math.log(1 - CONFIDENCE) / n),
+    )

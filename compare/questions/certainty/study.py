@@ -1,0 +1,195 @@
+"""How certain it is that the best optimum known is the global one: what is proven, and what is only supported."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import metaheuristics
+from compare.questions.certainty import branch_and_bound
+from compare.questions.certainty.branch_and_bound import Certificate, certify
+from compare.questions.certainty.clusters import Optimum, Unseen, cluster, unseen
+from compare.questions.certainty.multistart import Ends, multistart
+from compare.study.steps import Steps, fingerprint
+from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import GaitProblem
+
+# Branch and bound is for this many variables at most: its work grows exponentially with them.
+MOST_CERTIFIED = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class LongSearch:
+    """One long run of CMA-ES with restarts, which shares nothing with IPOPT but the exact functions.
+
+    Attributes:
+        objective: best feasible one, in the problem's sense; None if there was none.
+        evaluations: used.
+        gap: by how much it is worse than the best optimum, relative; negative if it is better.
+    """
+
+    objective: float | None
+    evaluations: int
+    gap: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Certainty:
+    """Evidence.
+
+    Attributes:
+        problem: with its parameter values.
+        starts: of IPOPT.
+        statuses: how often they ended how.
+        optima: distinct local optima, best first.
+        unseen: what the counts say about others.
+        ends: of all starts.
+        search: None if it was not asked for.
+        certificate: None if it was not asked for or there are too many variables.
+    """
+
+    problem: GaitProblem
+    starts: int
+    statuses: dict[str, int]
+    optima: tuple[Optimum, ...]
+    unseen: Unseen
+    ends: Ends
+    search: LongSearch | None
+    certificate: Certificate | None
+
+    @property
+    def proven(self) -> str:
+        """In one sentence."""
+        c = self.certificate
+        if c is None:
+            return "nothing: branch and bound is for smooth problems of at most four variables"
+        if not math.isfinite(c.bound):
+            return f"nothing: the time limit came before a finite bound, after {c.boxes:,} boxes"
+        unit = "" if self.problem.objective.unit == "1" else f" {self.problem.objective.unit}"
+        word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
+        return (
+            f"{word} {c.bound:.6g}{unit}, {100 * c.gap:.3g} % from the best known {c.objective:.6g}{unit}; "
+            + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
+            + "; intervals rounded outward, libm's functions taken to be within four units in the last place"
+        )
+
+    @property
+    def supported(self) -> str:
+        """In one sentence."""
+        best = self.optima[0]
+        text = (
+            f"{best.count} of {sum(o.count for o in self.optima)} converged starts end in the best of {len(self.optima)} "
+            f"distinct optima; with 95 % confidence no unseen one attracts more than "
+            f"{100 * self.unseen.largest_missed:.2g} % of starts"
+        )
+        if self.search is not None and self.search.gap is not None:
+            text += (
+                f"; CMA-ES ends {100 * self.search.gap:+.2g} % from it after {self.search.evaluations:,} evaluations"
+            )
+        return text
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; the ends of the starts stay in their files."""
+        certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
+        return {
+            "problem": self.problem.name,
+            "options": dict(self.problem.options),
+            "parameters": dict(self.problem.values),
+            "starts": self.starts,
+            "statuses": self.statuses,
+            "optima": [asdict(optimum) for optimum in self.optima],
+            "unseen": asdict(self.unseen),
+            "search": None if self.search is None else asdict(self.search),
+            "certificate": certificate,
+            "proven": self.proven,
+            "supported": self.supported,
+        }
+
+
+def certainty(
+    problem: GaitProblem,
+    out: Path,
+    *,
+    starts: int,
+    evaluations: int,
+    tolerance: float = 0.01,
+    time_limit_s: float = 600.0,
+    seed: int = 0,
+    progress: Callable[[int, str], None],
+) -> Certainty:
+    """Starts, a long search and, for few variables, branch and bound; what is done is kept under ``out``.
+
+    Args:
+        problem: with its current parameter values.
+        out: folder.
+        starts: of IPOPT.
+        evaluations: of CMA-ES; 0 for none.
+        tolerance: relative, of the certificate.
+        time_limit_s: of the certificate [s]; 0 for none.
+        seed: of starts and search.
+        progress: told how many starts are done more, and a note.
+
+    Raises:
+        InputError: no start converged, or tolerance or time limit are not allowed.
+        SearchError: CMA-ES is asked for and not installed.
+        CompilerError: branch and bound is asked for and there is no compiler.
+    """
+    # What is wrong is said now, not after the starts.
+    if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
+        raise InputError(
+            f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"
+        )
+    if evaluations:
+        metaheuristics.algorithm("cma")
+    ends = multistart(problem, out, starts=starts, seed=seed, progress=progress)
+    optima = cluster(problem, ends)
+    if not optima:
+        raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
+    best = optima[0]
+    steps = Steps(out, lambda note: progress(0, note), code=[branch_and_bound])
+    identity = {**fingerprint(problem), "best": list(best.x)}
+
+    def searched() -> dict[str, Any]:
+        objective = compile_objective(problem)
+        result = metaheuristics.minimize(objective, metaheuristics.algorithm("cma"), evaluations=evaluations, seed=seed)
+        feasible = result.violation <= FEASIBILITY_TOLERANCE
+        value = problem.objective.sign * result.objective if feasible else None
+        gap = None if value is None else problem.objective.sign * (value - best.objective) / abs(best.objective)
+        return asdict(LongSearch(objective=value, evaluations=result.evaluations, gap=gap))
+
+    def proven() -> dict[str, Any]:
+        certificate = certify(
+            problem,
+            np.array(best.x),
+            tolerance=tolerance,
+            time_limit_s=time_limit_s,
+            progress=lambda boxes, bound: progress(0, f"{boxes} boxes, bound {bound:.6g}"),
+        )
+        return {**asdict(certificate), "bound": certificate.bound if math.isfinite(certificate.bound) else None}
+
+    search = certificate = None
+    if evaluations:
+        search = LongSearch(**steps("cma", {**identity, "evaluations": evaluations, "seed": seed}, searched))
+    if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
+        inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
+        kept = steps("certificate", inputs, proven)
+        bound = -problem.objective.sign * math.inf if kept["bound"] is None else kept["bound"]
+        certificate = Certificate(**{**kept, "x": tuple(kept["x"]), "bound": bound})
+    return Certainty(
+        problem=problem,
+        starts=starts,
+        statuses=dict(Counter(ends.status)),
+        optima=tuple(optima),
+        unseen=unseen(optima),
+        ends=ends,
+        search=search,
+        certificate=certificate,
+    )

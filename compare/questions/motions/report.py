@@ -1,0 +1,198 @@
+"""Table and pictures of the comparison of motions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from compare.drawing.figures import COLOURS, legend_below, new_figure, save, style
+from compare.questions.motions.study import Motion, limit
+from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
+from compare.study.task import ProblemSpec
+from nlp_gait.files import csv_text, write_text
+from nlp_gait.problem.gait_problem import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HEADER = (
+    "motion",
+    "variables",
+    "power [W]",
+    "saved [%]",
+    "IPOPT [s]",
+    "iterations",
+    "starts",
+    "dense power [W]",
+    "dense violation",
+)
+KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
+LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
+# Points of a drawn path.
+DRAWN = 20
+
+
+def title(motion: Motion) -> str:
+    """What was solved, in words."""
+    if motion.task.kind == SMOOTHED:
+        return f"{KIND_WORDS[SMOOTHED]}{motion.task.options['objective']}, {motion.task.trajectory}"
+    return KIND_WORDS[motion.task.kind] + motion.task.trajectory
+
+
+def rows(found: Sequence[Motion]) -> list[tuple[str, ...]]:
+    """Cells under ``HEADER``."""
+    base = found[0].power_W
+    return [
+        (
+            title(m),
+            str(m.variables),
+            f"{m.power_W:.6f}",
+            f"{100 * (1 - m.power_W / base):.2f}",
+            f"{m.time_s:.1f}",
+            str(m.iterations),
+            f"{m.converged}/{m.attempts}",
+            f"{m.dense_power_W:.6f}",
+            m.worst or "none",
+        )
+        for m in found
+    ]
+
+
+def sentences(found: Sequence[Motion]) -> list[str]:
+    """What the table says: the limits of the orders, the cheat between 11 samples, the price of smoothness."""
+    said = []
+    for kind, (_, _, words) in LOOKS.items():
+        powers = [m.power_W for m in found if m.task.kind == kind]
+        rising = [b - a for a, b in zip(powers, powers[1:], strict=False) if b > a]
+        if len(powers) > 1:
+            order = f"rises by up to {max(rising):.2g} W" if rising else "never rises"
+            towards = limit(powers)
+            goal = f"; its last three values point to {towards:.3f} W" if towards is not None else ""
+            said.append(f"{words}: power {order} from order to order, {powers[0]:.4f} W to {powers[-1]:.4f} W{goal}")
+    for m in found:
+        if m.task.kind == COARSE_KIND:
+            said.append(
+                f"on the paper's 11 samples {m.task.trajectory} seems to need {m.power_W:.4f} W; "
+                f"between them it needs {m.dense_power_W:.4f} W" + (f" and breaks {m.worst}" if m.worst else "")
+            )
+    cheapest = {m.task.trajectory: m for m in found if m.task.kind == PLANNED}
+    for m in found:
+        if m.task.kind == SMOOTHED:
+            least = cheapest[m.task.trajectory]
+            gains = ", ".join(
+                f"{name} {least.objectives[name]:.3g} to {value:.3g}" for name, value in m.objectives.items()
+            )
+            said.append(f"{title(m)} costs {100 * (m.power_W / least.power_W - 1):.1f} % more power: {gains}")
+    return said
+
+
+def motions_csv(found: Sequence[Motion]) -> str:
+    """One row for each motion, units in the header."""
+    table: list[Sequence[object]] = []
+    table.append(
+        "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation converged "
+        "starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status".split()
+    )
+    for m in found:
+        options = m.task.options
+        values: list[float | str] = [*m.objectives.values()] or ["", ""]
+        table.append(
+            [
+                m.task.kind,
+                m.task.problem,
+                m.task.trajectory,
+                options.get("objective", "power"),
+                options["samples_per_interval"],
+            ]
+            + [m.variables, repr(m.power_W), repr(m.dense_power_W), m.worst, m.converged, m.attempts, m.iterations]
+            + [f"{m.time_s:.3f}", *values, m.status]
+        )
+    return csv_text(table)
+
+
+def power_figure(found: Sequence[Motion]) -> Figure:
+    """Power against the number of free coefficients, with the floor that the richest motions point to."""
+    with style():
+        figure = new_figure(4.6, 3.0)
+        axes = figure.subplots()
+        for kind, (colour, line, words) in LOOKS.items():
+            drawn = [m for m in found if m.task.kind == kind]
+            if not drawn:
+                continue
+            axes.plot([m.coefficients for m in drawn], [m.power_W for m in drawn], line, color=colour, label=words)
+            for m in drawn:
+                word = m.task.trajectory.removeprefix("spline-")  # numbers of spans above the line, words below
+                offset, side = ((3, 4), "left") if word.isdigit() else ((0, -11), "center")
+                at = (m.coefficients, m.power_W)
+                axes.annotate(word, at, offset, textcoords="offset points", fontsize=7, ha=side)
+            towards = limit([m.power_W for m in drawn])
+            if towards is not None:
+                axes.axhline(towards, color=colour, ls=":", lw=1.0, label=f"extrapolated, {towards:.3f} W")
+        axes.set_xscale("symlog", linthresh=10)
+        ticks = sorted({0, 10, 20, 50, 100, 200, 500})
+        axes.set_xticks(ticks, [str(tick) for tick in ticks])
+        axes.set_xlim(-1, 1.3 * max(m.coefficients for m in found) + 5)
+        axes.set_xlabel("coefficients beyond the paper's cubics")
+        axes.set_ylabel("least mean power [W]")
+        axes.set_ylim(bottom=0.0)
+        legend_below(figure)
+    return figure
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Path3:
+    """Paths (n, 3) of hip and swing foot [m]."""
+
+    label: str
+    hip: Array
+    foot: Array
+
+
+def paths(found: Sequence[Motion]) -> list[Path3]:
+    """Of the paper's cubics, the richest planned motion and the richest with free joints."""
+    chosen: dict[str, Motion] = {}
+    for m in found:
+        if m.task.kind in LOOKS:
+            chosen[m.task.kind] = m
+    drawn = [found[0], *(m for m in chosen.values() if m is not found[0])]
+    result = []
+    for m in drawn:
+        problem = ProblemSpec(name=m.task.problem, options=m.task.options).load().dense(DRAWN)
+        assert problem is not None and problem.signals is not None  # a phase has both; for the type checker
+        arrays: Mapping[str, Array] = problem.signals(np.array(list(m.x.values())), problem.p).arrays
+        result.append(Path3(label=title(m), hip=arrays["hip"], foot=arrays["right_foot"]))
+    return result
+
+
+def path_figure(drawn: Sequence[Path3]) -> Figure:
+    """Hip from above and from the side, and the swing foot from the side if it moves."""
+    swings = bool(np.ptp(drawn[0].foot[:, 0]) > 0.0)
+    colours = (COLOURS["ipopt"], *(colour for colour, _, _ in LOOKS.values()))
+    with style():
+        figure = new_figure(6.3 if swings else 4.6, 2.4)
+        panels: Sequence[Axes] = figure.subplots(1, 3 if swings else 2)
+        for path, colour, line in zip(drawn, colours, ("--", "-", "-"), strict=False):
+            x, y, z = 1e3 * path.hip.T
+            panels[0].plot(x, y, line, color=colour, label=path.label)
+            panels[1].plot(x, z, line, color=colour)
+            if swings:
+                panels[2].plot(1e3 * path.foot[:, 0], 1e3 * path.foot[:, 2], line, color=colour)
+        names = [("hip x [mm]", "hip y [mm]"), ("hip x [mm]", "hip height [mm]"), ("foot x [mm]", "foot height [mm]")]
+        for axes, (along, up) in zip(panels, names, strict=False):
+            axes.set(xlabel=along, ylabel=up)
+        legend_below(figure)
+    return figure
+
+
+def write_motions(folder: Path, found: Sequence[Motion], problem: str) -> list[Path]:
+    """Write table and pictures; returns their paths."""
+    stem = folder / f"{problem}-motions"
+    table = stem.with_name(f"{stem.name}.csv")
+    write_text(table, motions_csv(found))
+    power = save(power_figure(found), stem)
+    return [table, *power, *save(path_figure(paths(found)), folder / f"{problem}-motions-paths")]

@@ -1,0 +1,208 @@
+"""What the papers' cubics cost: least power over motions of rising order, with free joints, and for other objectives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compare.judge import Evaluation, evaluate
+from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError
+from nlp_gait.files import read_json, writable_folder, write_json
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problems.nao.curves import SPANS
+from nlp_gait.problems.nao.single_support_free import fitted_start
+from nlp_gait.symbolic.splines import finer
+
+# A study of many variables may take longer than a single solve of few.
+TIME_LIMIT_S, ITERATIONS = 3600.0, 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Optimum of one task.
+
+    Attributes:
+        task: what was solved.
+        seed: of the random starts.
+        variables: number of them.
+        status: in words.
+        success: at least one start converged to a feasible point.
+        power_W: on the problem's own samples.
+        dense_power_W: on the judge's dense grid.
+        objectives: values by name of all that is or could be minimised, with units in the names.
+        worst: row that the dense grid finds violated most, with the amount; empty if none is.
+        converged: starts that ended in a feasible optimum, of ``attempts``.
+        attempts: number of starts.
+        powers_W: power at the end of each start, the one from the simpler motion first; None where it is infeasible.
+        iterations: of the start that is reported.
+        time_s: wall time of IPOPT, all starts.
+        x: by variable name.
+    """
+
+    task: MotionTask
+    seed: int
+    variables: int
+    status: str
+    success: bool
+    power_W: float
+    dense_power_W: float
+    objectives: Mapping[str, float]
+    worst: str
+    converged: int
+    attempts: int
+    powers_W: tuple[float | None, ...] = field(default=())
+    iterations: int
+    time_s: float
+    x: Mapping[str, float]
+
+    @property
+    def coefficients(self) -> int:
+        """Variables beyond the paper's."""
+        return sum("[" in name for name in self.x)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries, lists and numbers."""
+        return asdict(self)
+
+
+def motions(
+    study: Sequence[MotionTask], folder: Path, *, seed: int = 0, progress: Callable[[str], None] | None = None
+) -> list[Motion]:
+    """Solve all tasks; those whose results lie in the folder already are read from there.
+
+    Args:
+        study: see ``tasks``.
+        folder: for one JSON file each.
+        seed: of the random starts.
+        progress: called after each task with its label.
+
+    Raises:
+        InputError: a file in the folder belongs to another study.
+    """
+    writable_folder(folder)
+    found: list[Motion] = []
+    for task in study:
+        path = folder / f"{task.problem}-{task.label}.json"
+        if path.exists():
+            found.append(_stored(path, task, seed))
+        else:
+            found.append(_solved(task, found, seed))
+            write_json(path, found[-1].to_json())
+        if progress is not None:
+            progress(task.label)
+    return found
+
+
+def _stored(path: Path, task: MotionTask, seed: int) -> Motion:
+    data = read_json(path, "motion")
+    expected = {"task": asdict(task), "seed": seed}
+    if not isinstance(data, dict) or {key: data.get(key) for key in expected} != expected:
+        raise InputError(
+            f"{str(path)!r} holds the result of another study; delete it or choose another folder with --out"
+        )
+    return Motion(**{**data, "task": task, "powers_W": tuple(data["powers_W"])})
+
+
+def _solved(task: MotionTask, earlier: Sequence[Motion], seed: int) -> Motion:
+    problem = ProblemSpec(name=task.problem, options=task.options).load()
+    x0 = _start(task, problem, earlier)
+    solution = solve(
+        problem,
+        starts=task.starts + 1,
+        seed=seed,
+        x0=x0,
+        settings=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
+    )
+    x = np.array(list(solution.x.values()))
+    verdict = evaluate(problem, x)
+    dense = verdict.dense or {}
+    return Motion(
+        task=task,
+        seed=seed,
+        variables=len(problem.names),
+        status=solution.status,
+        success=solution.success,
+        power_W=verdict.indexes["power_W"],
+        dense_power_W=dense["power_W"],
+        objectives=_objectives(task, x),
+        worst=_worst(verdict),
+        converged=sum(start.success for start in solution.starts),
+        attempts=len(solution.starts),
+        powers_W=tuple(start.objective if start.success else None for start in solution.starts),
+        iterations=solution.iterations,
+        time_s=solution.time_s.solve,
+        x=solution.x,
+    )
+
+
+def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) -> Array | None:
+    """Start point from the richest earlier motion that this one contains, or if there is none, fitted to a planned one."""
+    spans = SPANS[task.trajectory]
+    solved = [m for m in reversed(earlier) if m.success and m.task.kind in (PLANNED, FREED)]
+    for motion in solved:
+        if SPANS[motion.task.trajectory] <= spans and _contains(problem, motion.task, task.trajectory):
+            return _embedded(motion.x, problem.names, spans)
+    for motion in solved if task.kind == FREED else ():
+        planned = ProblemSpec(name=motion.task.problem, options=motion.task.options).load()
+        return fitted_start(task.trajectory, planned, np.array(list(motion.x.values())))  # type: ignore[arg-type]
+    return None
+
+
+def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> bool:
+    """Whether a problem has all curves of a simpler one."""
+    same = ProblemSpec(name=simpler.problem, options={**simpler.options, "trajectory": trajectory}).load()
+    return set(same.names) <= set(problem.names)
+
+
+def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:
+    """The same motion with more spans, and with curves at zero that it has not."""
+    curves: dict[str, list[float]] = {}
+    for name, value in x.items():
+        curves.setdefault(name.partition("[")[0], []).append(value)
+    found = [np.array(curves[name]) for name in names if "[" not in name]
+    for curve in dict.fromkeys(name.partition("[")[0] for name in names if "[" in name):
+        found.append(finer(np.array(curves.get(curve, [])), spans))
+    return np.concatenate(found)
+
+
+def _objectives(task: MotionTask, x: Array) -> dict[str, float]:
+    """Jerk and torque rate of a motion, where the study minimises these."""
+    if task.trajectory != SMOOTH_ORDER or task.kind not in (PLANNED, SMOOTHED):
+        return {}
+    found: dict[str, float] = {}
+    for name in SMOOTH:
+        problem = ProblemSpec(name=task.problem, options={**task.options, "objective": name}).load()
+        found[f"{problem.objective.name} [{problem.objective.unit}]"] = float(
+            exact_model(problem).function(x, problem.p)[0]
+        )
+    return found
+
+
+def _worst(verdict: Evaluation) -> str:
+    if not verdict.dense_violations:
+        return ""
+    row = verdict.dense_violations[0]
+    return f"{row.name} by {row.violation:.2g} {row.unit}"
+
+
+def limit(powers: Sequence[float]) -> float | None:
+    """Where a sequence goes whose differences shrink by a constant factor, from its last three terms.
+
+    None if they do not shrink, and if it would be farther away than the last two terms are apart.
+
+    Source:
+        Aitken's extrapolation, which is Richardson's for an unknown order.
+    """
+    if len(powers) < 3:
+        return None
+    first, second = powers[-3] - powers[-2], powers[-2] - powers[-1]
+    return powers[-1] - second**2 / (first - second) if 0.0 < second <= first / 2 else None

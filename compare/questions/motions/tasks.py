@@ -1,0 +1,81 @@
+"""What is solved to compare motions: orders of the plan, free joints, a coarse grid and other objectives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from nlp_gait.errors import InputError
+from nlp_gait.problems.nao.curves import SPANS
+
+PHASES = ("nao-ssp", "nao-dsp")
+FREE = {"nao-ssp": "nao-ssp-free", "nao-dsp": "nao-dsp-free"}
+ORDERS = tuple(SPANS)[:-1]
+FREE_ORDERS = ("spline-2", "spline-4", "spline-8", "spline-16")
+# Samples in each interval, so that no motion bends between them: with 4, free joints on 16 spans hide a tenth of their power.
+SAMPLES, FREE_SAMPLES = 4, 8
+SMOOTH_ORDER = "spline-4"
+SMOOTH = ("jerk", "torque-smoothness")
+# A grid with as many samples as the papers', on which a spline can hide.
+COARSE = 1
+PLANNED, COARSE_KIND, SMOOTHED, FREED = "planned", "coarse", "smooth", "free"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionTask:
+    """One problem of the study.
+
+    Attributes:
+        kind: ``"planned"``, the same ``"coarse"`` with the papers' number of samples, ``"smooth"``, or ``"free"``.
+        problem: name.
+        options: what it is built with.
+        starts: random starts beside the one from a simpler motion's optimum.
+    """
+
+    kind: str
+    problem: str
+    options: Mapping[str, Any]
+    starts: int
+
+    @property
+    def trajectory(self) -> str:
+        """Order of its curves."""
+        return str(self.options["trajectory"])
+
+    @property
+    def label(self) -> str:
+        """File name without ending."""
+        return "-".join(str(part) for part in (self.kind, self.trajectory, self.options.get("objective", "power")))
+
+
+def tasks(
+    phase: str,
+    *,
+    orders: Sequence[str] = ORDERS,
+    free_orders: Sequence[str] = FREE_ORDERS,
+    robot: str = "nao-v5",
+    starts: int = 1,
+) -> list[MotionTask]:
+    """The study of one phase, in an order in which each task can start from an earlier one.
+
+    Raises:
+        InputError: another phase, or orders that do not rise.
+    """
+    if phase not in PHASES:
+        raise InputError(f"motions are compared for {' and '.join(PHASES)}, got {phase!r}")
+    for given, known in ((orders, tuple(SPANS)), (free_orders, tuple(SPANS))):
+        if list(given) != [order for order in known if order in given]:
+            raise InputError(f"orders must rise and be among {', '.join(known)}, got {', '.join(given)}")
+    if not orders:
+        raise InputError("there must be at least one order")
+
+    def task(kind: str, trajectory: str, problem: str = phase, starts: int = 0, **more: Any) -> MotionTask:
+        options = {"robot": robot, "trajectory": trajectory, "samples_per_interval": SAMPLES, **more}
+        return MotionTask(kind=kind, problem=problem, options=options, starts=starts)
+
+    planned = [task(PLANNED, order, starts=starts) for order in orders]
+    coarse = [task(COARSE_KIND, orders[-1], samples_per_interval=COARSE)]
+    smooth = [task(SMOOTHED, SMOOTH_ORDER, objective=name) for name in SMOOTH if SMOOTH_ORDER in orders]
+    free = [task(FREED, order, FREE[phase], samples_per_interval=FREE_SAMPLES) for order in free_orders]
+    return [*planned, *coarse, *smooth, *free]

@@ -1,0 +1,154 @@
+"""What the real motors change: the optimum of a NAO phase under one feature of theirs after the other."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Array
+from nlp_gait.problem.registry import GaitProblem, problem_maker
+from nlp_gait.problem.solution import Solution
+
+# Each variant with the features of ``nao_motors``; the first is the paper's.
+VARIANTS: Mapping[str, str] = {
+    "as published": "",
+    "+ speed and torque limits": "limits",
+    "+ coupled ankles": "limits,ankle",
+    "with these, braking is free": "limits,ankle,free-braking",
+    "with these, braking gives back": "limits,ankle,regeneration",
+    "with these, K of each motor": "limits,ankle,heat",
+    "with these, K and free braking": "limits,ankle,heat,free-braking",
+}
+# Rows of the problem with limits, and what their largest share of the limit is called.
+USES = {
+    "speed": ("joint_speed",),
+    "torque against speed": ("torque_forwards", "torque_backwards"),
+    "continuous torque": ("continuous_torque",),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Use:
+    """Largest share of one kind of limit that a gait uses, and where."""
+
+    share: float
+    row: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """One way to reckon with the motors.
+
+    Attributes:
+        name: in words.
+        features: as in the option ``motors``.
+        success: whether IPOPT converged to a feasible point.
+        status: in words.
+        power_W: at the optimum, as this variant reckons it.
+        unchanged_power_W: at the published optimum, as this variant reckons it.
+        unchanged_violation: of the published optimum under this variant's limits, 0 if it keeps them.
+        published_power_W: at this variant's optimum, as the paper reckons it.
+        x: by variable name.
+        moved: distance of x* from the published one, in units of the variables' ranges: the largest, and whose it is.
+        uses: by kind of limit, at this optimum, whether or not the variant has the limits.
+    """
+
+    name: str
+    features: str
+    success: bool
+    status: str
+    power_W: float
+    unchanged_power_W: float
+    unchanged_violation: float
+    published_power_W: float
+    x: Mapping[str, float]
+    moved: tuple[float, str]
+    uses: Mapping[str, Use]
+
+
+def motor_variants(
+    spec: ProblemSpec, *, starts: int = 10, seed: int = 0, progress: Callable[[str], None] | None = None
+) -> tuple[Variant, ...]:
+    """Optimum under each variant.
+
+    Args:
+        spec: a NAO phase, without the option ``motors``.
+        starts: random starts of IPOPT for each.
+        seed: of the starts.
+        progress: called after each variant with its name.
+
+    Raises:
+        InputError: a problem without motors, or one that has the option already.
+        Interrupted: Ctrl-C; carries the variants that were solved until then.
+    """
+    published = spec.load()
+    if "motors" in spec.options:
+        raise InputError("the command goes through all variants of motors itself; leave out --option motors")
+    if "motors" not in inspect.signature(problem_maker(spec.name)).parameters:
+        raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
+    limited = _with(spec, "limits")
+    found: list[Variant] = []
+    try:
+        for name, features in VARIANTS.items():
+            problem = _with(spec, features)
+            first = np.array(list(found[0].x.values())) if found else None
+            solution = solve(problem, starts=starts, seed=seed, x0=first)
+            found.append(_variant(name, problem, solution, first, published, limited))
+            if progress is not None:
+                progress(name)
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted after {len(found)} of {len(VARIANTS)} variants", tuple(found)) from None
+    return tuple(found)
+
+
+def _variant(
+    name: str,
+    problem: GaitProblem,
+    solution: Solution,
+    first: Array | None,
+    published: GaitProblem,
+    limited: GaitProblem,
+) -> Variant:
+    """A variant from its solution, beside the published optimum ``first`` (n,), which None says it is itself."""
+    x = np.array([solution.x[variable] for variable in problem.names])
+    first = x if first is None else first
+    moves = np.abs(x - first) / problem.scale
+    unchanged, violation, *_ = exact_model(problem).function(first, problem.p)
+    return Variant(
+        name=name,
+        features=VARIANTS[name],
+        success=solution.success,
+        status=solution.status,
+        power_W=solution.objective,
+        unchanged_power_W=float(unchanged),
+        unchanged_violation=float(violation),
+        published_power_W=float(exact_model(published).function(x, published.p)[0]),
+        x=solution.x,
+        moved=(float(moves.max()), problem.names[int(moves.argmax())]),
+        uses=limit_uses(limited, x),
+    )
+
+
+def limit_uses(limited: GaitProblem, x: np.ndarray) -> dict[str, Use]:
+    """Largest shares of the motors' limits that x (n,) uses, in a problem with ``motors=limits``."""
+    exact = exact_model(limited)
+    _, _, value, lower, upper, _ = (np.array(part).ravel() for part in exact.function(x, limited.p))
+    uses = {}
+    for kind, groups in USES.items():
+        rows = [i for i, name in enumerate(exact.row_names) if name.split("[")[0] in groups]
+        shares = [value[i] / (upper[i] if value[i] > 0.0 else lower[i]) for i in rows]
+        largest = int(np.argmax(shares))
+        uses[kind] = Use(share=float(shares[largest]), row=exact.row_names[rows[largest]])
+    return uses
+
+
+def _with(spec: ProblemSpec, features: str) -> GaitProblem:
+    return replace(spec, options={**spec.options, **({"motors": features} if features else {})}).load()

@@ -1,0 +1,1 @@
+"""Power against stability: fronts by gradient and by search."""

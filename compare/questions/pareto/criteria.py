@@ -1,0 +1,210 @@
+"""What is traded against power: a balance margin or the walking speed, each as a limit, a number and an expression."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from casadi import MX
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.kernel.compiled import CompiledObjective
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.problem.gait_problem import Array, Assembly, GaitProblem, Objective, Parameter, Point
+from nlp_gait.problem.solution import Solution
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+POWER, SPEED = "power", "speed"
+MARGINS = ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min")
+REWARD = "reward_W_per_unit"
+
+
+class Criterion(Protocol):
+    """A quantity that is to be large, and whose least value can be demanded by a parameter."""
+
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+
+    def demanded(self, problem: GaitProblem) -> float:
+        """Least value that the problem as it is demands; -inf if none."""
+
+    def freed(self, problem: GaitProblem) -> GaitProblem:
+        """The problem without a demand on it."""
+
+    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
+        """The problem with a least value."""
+
+    def value(self, problem: GaitProblem, x: Array) -> float:
+        """Exact value at x (n,)."""
+
+    def values(self, objective: CompiledObjective, X: Array) -> Array:
+        """(P,) values of candidates (P, n)."""
+
+    def expression(self, point: Point, assembly: Assembly) -> MX:
+        """Scalar."""
+
+    def price(self, solution: Solution) -> float:
+        """Change of the least power per unit of the demand [W/unit]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """A dynamic balance margin: the mean over the samples or the least one, along x or across y."""
+
+    name: str
+    unit: str = "m"
+
+    @property
+    def parameter(self) -> str:
+        """The limit's name."""
+        return f"{self.name}_limit_m"
+
+    def demanded(self, problem: GaitProblem) -> float:
+        """See ``Criterion``."""
+        return problem.value(self.parameter)
+
+    def freed(self, problem: GaitProblem) -> GaitProblem:
+        """Only zero is demanded: the ZMP within the soles' box."""
+        return problem.with_values(**{self.parameter: 0.0})
+
+    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
+        """See ``Criterion``."""
+        return problem.with_values(**{self.parameter: least})
+
+    def value(self, problem: GaitProblem, x: Array) -> float:
+        """See ``Criterion``."""
+        exact = exact_model(problem)
+        indexes = np.array(exact.function(x, problem.p)[-1]).ravel()
+        return float(indexes[exact.index_names.index(f"{self.name}_m")])
+
+    def values(self, objective: CompiledObjective, X: Array) -> Array:
+        """See ``Criterion``."""
+        rows = [i for i, name in enumerate(objective.row_names) if name.partition("[")[0] == self._group]
+        margins: Array = objective.constraints(X)[:, rows].min(axis=1)
+        return margins
+
+    def expression(self, point: Point, assembly: Assembly) -> MX:
+        """See ``Criterion``; the mean margins only, which are smooth but for the jump that is smoothed anyway."""
+        if not self.name.endswith("_mean"):
+            raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
+        return next(c.value for c in assembly.constraints if c.name == self.name)
+
+    def price(self, solution: Solution) -> float:
+        """See ``Criterion``."""
+        return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self._group), 0.0)
+
+    @property
+    def _group(self) -> str:
+        """Constraint rows that carry the limit."""
+        return self.name.removesuffix("_min")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Speed:
+    """Mean speed of the hip over the phase: the way that the phase prescribes, divided by the time that it takes.
+
+    Attributes:
+        duration: variable that holds the phase's duration.
+        way_m: of the hip along x.
+    """
+
+    duration: str
+    way_m: float
+    name: str = SPEED
+    unit: str = "m/s"
+
+    def demanded(self, problem: GaitProblem) -> float:
+        """See ``Criterion``."""
+        return self.way_m / problem.value(f"{self.duration}.upper")
+
+    def freed(self, problem: GaitProblem) -> GaitProblem:
+        """The phase may last as long as the problem's own bound allows: no speed is demanded beyond that."""
+        return problem
+
+    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
+        """See ``Criterion``."""
+        end = f"{self.duration}.upper"
+        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.way_m / least)})
+
+    def value(self, problem: GaitProblem, x: Array) -> float:
+        """See ``Criterion``."""
+        return self.way_m / float(x[problem.variable_index(self.duration)])
+
+    def values(self, objective: CompiledObjective, X: Array) -> Array:
+        """See ``Criterion``."""
+        return self.way_m / X[:, objective.names.index(self.duration)]
+
+    def expression(self, point: Point, assembly: Assembly) -> MX:
+        """See ``Criterion``."""
+        return self.way_m / point[self.duration]
+
+    def price(self, solution: Solution) -> float:
+        """See ``Criterion``: dP/dv = dP/dT dT/dv with T = way / v."""
+        per_second = sum(
+            a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
+        )
+        return -per_second * solution.x[self.duration] ** 2 / self.way_m
+
+
+def criterion(name: str, problem: GaitProblem) -> Criterion:
+    """Criterion of a NAO phase by name.
+
+    Raises:
+        UnknownNameError: no such criterion.
+        InputError: the problem has no power, margins and duration to trade.
+    """
+    durations = [v.name for v in problem.variables if v.name.endswith("_support_time_s")]
+    if problem.objective.name != POWER or len(durations) != 1 or problem.signals is None:
+        raise InputError(f"{problem.name} trades no power against balance or speed; allowed are nao-ssp and nao-dsp")
+    if name in MARGINS:
+        return Margin(name=name)
+    if name != SPEED:
+        raise unknown("objective beside power", name, (*MARGINS, SPEED))
+    middle = (problem.lower + problem.upper) / 2
+    hip = problem.signals(middle, problem.p).arrays["hip"]
+    return Speed(duration=durations[0], way_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
+
+
+def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
+    """The problem that minimises power less a reward for the criterion, whose size is the parameter ``reward_W_per_unit``."""
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        assembly = problem.assemble(point, ops)
+        cost = assembly.objective - point[REWARD] * criterion.expression(point, assembly)
+        return replace(assembly, objective=cost)
+
+    reward = Parameter(
+        name=REWARD, unit=f"W/({criterion.unit})", default=0.0, description=f"reward for {criterion.name}", minimum=0.0
+    )
+    return replace(
+        problem,
+        name=f"{problem.name}-{criterion.name}",
+        own_parameters=(*problem.own_parameters, reward),
+        objective=Objective(name="rewarded_power", unit="W"),
+        assemble=assemble,
+        refine=None,
+        signals=None,
+        _built={},
+    )
+
+
+def parse_objectives(text: str) -> Sequence[str]:
+    """Criteria beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
+
+    Raises:
+        InputError: power is missing, or a name stands twice, or there are less than two or more than three.
+    """
+    names = [part.strip() for part in text.split(",")]
+    others = [name for name in names if name != POWER]
+    if names.count(POWER) != 1 or len(set(others)) != len(others) or not 1 <= len(others) <= 2:
+        raise InputError(
+            f"--objectives takes power and one or two of {', '.join((*MARGINS, SPEED))}, separated by commas; got {text!r}"
+        )
+    return others

@@ -1,0 +1,193 @@
+"""The true front of power against one criterion, by epsilon-constraint: least power for each demanded value of the criterion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.questions.pareto.criteria import REWARD, Criterion, rewarding
+from nlp_gait.backends.optima.continuation import Attempt, Continuation, best_end
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+
+# The front ends where another hundredth of the criterion would cost ten times the least power.
+LARGEST_TRADE_OFF = 1000.0
+LEAST_POINTS = 5
+# Random starts are tried at every third point of the first, evenly spaced ones.
+CHECK_EVERY = 3
+# Planned at least, for IPOPT: functions are worth compiling.
+SOLVES = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontPoint:
+    """A point of the front.
+
+    Attributes:
+        demanded: least value of the criterion that was demanded.
+        value: exact value of the criterion, at least that.
+        power_W: exact power.
+        price: slope of the front, from the multiplier of the demand [W per unit of the criterion].
+        violation: exact total violation.
+        x: (n,) as plain numbers.
+    """
+
+    demanded: float
+    value: float
+    power_W: float
+    price: float
+    violation: float
+    x: tuple[float, ...]
+
+
+def pareto_front(
+    problem: GaitProblem,
+    criterion: Criterion,
+    *,
+    points: int = 40,
+    starts: int = 5,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda note: None,
+) -> list[FrontPoint]:
+    """Points of the front, by rising criterion, about evenly spaced along it.
+
+    Half of the points are spaced evenly over the criterion, from its value at the least power to the end of the front; the
+    others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours and
+    at some from random starts, and the whole is then walked there and back, so that a better local optimum found anywhere
+    spreads as far as it is the better one.
+
+    Args:
+        problem: with its other limits; its demand on the criterion is dropped.
+        criterion: what is traded against power.
+        points: at least five.
+        starts: random starts at both ends and at every third point.
+        seed: of the random starts.
+        progress: told what is done.
+
+    Raises:
+        InputError: too few points, or the least power or the largest criterion cannot be found.
+    """
+    if points < LEAST_POINTS:
+        raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
+    free = criterion.freed(problem)
+    low, high = front_ends(free, criterion, starts, seed)
+    settings = IpoptSettings()
+    ipopt = ipopt_for(free, settings, SOLVES)
+    rng = np.random.default_rng(seed)
+    found: dict[float, list[Attempt]] = {}
+
+    def attempt(at: float, x0: Array) -> None:
+        limited = criterion.limited(free, at)
+        x0 = np.clip(x0, limited.lower, limited.upper)
+        found.setdefault(at, []).append(Attempt(x0, ipopt.run(limited, x0)))
+
+    def walk(order: Sequence[float], path_seed: int) -> None:
+        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=SOLVES)
+        for at in order:
+            limited = criterion.limited(free, at)
+            found[at] = found.get(at, []) + path.run(limited, found.get(at, []))
+            progress(f"{criterion.name} {at:.5g} {criterion.unit}")
+
+    grid = np.linspace(low.value, high.value, max(LEAST_POINTS, points // 2)).tolist()
+    for point, at in ((low, grid[0]), (high, grid[-1])):
+        attempt(at, np.array(point.x))
+    for at in grid[::CHECK_EVERY]:
+        for _ in range(starts):
+            attempt(at, criterion.limited(free, at).start_point(rng))
+        progress(f"random starts at {criterion.name} {at:.5g} {criterion.unit}")
+    walk(grid, seed)
+    walk(grid[::-1], seed + 1)
+    while len(found) < points:
+        at, neighbours = _largest_gap(found)
+        limited = criterion.limited(free, at)
+        for end in neighbours:
+            x0 = np.clip(end.x, limited.lower, limited.upper)
+            found.setdefault(at, []).append(Attempt(x0, ipopt.run_from(limited, end.guess)))
+        if best_end(found[at]) is None:
+            for end in neighbours:
+                attempt(at, end.x)
+        progress(f"{criterion.name} {at:.5g} {criterion.unit}")
+    walk(sorted(found), seed)
+    walk(sorted(found, reverse=True), seed + 1)
+    path = Continuation(settings=settings, solves=SOLVES)
+    return nondominated([p for at in sorted(found) if (p := _point(path, free, criterion, at, found[at])) is not None])
+
+
+def point_at(free: GaitProblem, criterion: Criterion, least: float, x0: Array) -> FrontPoint | None:
+    """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
+    limited = criterion.limited(free, least)
+    x0 = np.clip(x0, limited.lower, limited.upper)
+    settings = IpoptSettings()
+    end = ipopt_for(free, settings, SOLVES).run(limited, x0)
+    path = Continuation(settings=settings, solves=SOLVES)
+    return _point(path, free, criterion, least, [Attempt(x0, end)])
+
+
+def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
+    """Points by rising criterion without those that another equals or betters in both; of equals the first stays."""
+    kept: list[FrontPoint] = []
+    for point in sorted(points, key=lambda p: (-p.value, p.power_W)):
+        if not kept or point.power_W < kept[-1].power_W:
+            kept.append(point)
+    return kept[::-1]
+
+
+def front_ends(free: GaitProblem, criterion: Criterion, starts: int, seed: int) -> tuple[FrontPoint, FrontPoint]:
+    """Least power, and the point beyond which the criterion is too dear."""
+    solution = solve(free, starts=2 * starts, seed=seed)
+    if not solution.success:
+        raise InputError(f"{free.name} has no front: {solution.status}")
+    low = _at(free, criterion, np.array(list(solution.x.values())))
+    reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
+    ending = rewarding(free, criterion).with_values(**{REWARD: reward})
+    solution = solve(ending, starts=2 * starts, seed=seed)
+    if not solution.success:
+        raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
+    return low, _at(free, criterion, np.array(list(solution.x.values())))
+
+
+def _at(problem: GaitProblem, criterion: Criterion, x: Array) -> FrontPoint:
+    from compare.judge import evaluate
+
+    judged = evaluate(problem, x)
+    value = criterion.value(problem, x)
+    return FrontPoint(
+        demanded=value,
+        value=value,
+        power_W=float(judged.objective["value"]),
+        price=0.0,
+        violation=judged.violation,
+        x=tuple(x.tolist()),
+    )
+
+
+def _largest_gap(found: dict[float, list[Attempt]]) -> tuple[float, list[End]]:
+    """Middle of the longest gap between neighbours that were solved, and their ends."""
+    solved = [(at, end) for at in sorted(found) if (end := best_end(found[at])) is not None]
+    at = np.array([a for a, _ in solved])
+    cost = np.array([end.cost for _, end in solved])
+    lengths = np.hypot(np.diff(at) / np.ptp(at), np.diff(cost) / np.ptp(cost))
+    k = int(np.argmax(lengths))
+    return float((at[k] + at[k + 1]) / 2), [solved[k][1], solved[k + 1][1]]
+
+
+def _point(
+    path: Continuation, free: GaitProblem, criterion: Criterion, at: float, attempts: list[Attempt]
+) -> FrontPoint | None:
+    solution = path.solution(criterion.limited(free, at), attempts)
+    if not solution.success:
+        return None
+    x = np.array(list(solution.x.values()))
+    return FrontPoint(
+        demanded=at,
+        value=criterion.value(free, x),
+        power_W=solution.objective,
+        price=criterion.price(solution),
+        violation=solution.violation,
+        x=tuple(x.tolist()),
+    )

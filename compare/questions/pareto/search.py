@@ -1,0 +1,134 @@
+"""Fronts that evolutionary searches find, by exact functions, and how far they stop from the true one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compare.questions.pareto.criteria import Criterion
+from compare.questions.pareto.front import FrontPoint, nondominated
+from compare.study.steps import Steps, fingerprint
+from metaheuristics.interface import Array
+from metaheuristics.multi_objective import MultiObjective, minimize_many
+from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+from nlp_gait.problem.gait_problem import GaitProblem
+
+# The corner that is dominated by every counted point, with the ranges of the true front as 1: a tenth beyond its worst values.
+REFERENCE = 1.1
+
+
+class Scale:
+    """Power and criterion as numbers to be minimised, 0 at the best and 1 at the worst value on the true front."""
+
+    def __init__(self, front: Sequence[FrontPoint]) -> None:
+        powers, values = ([getattr(p, key) for p in front] for key in ("power_W", "value"))
+        self.least_power, self.power_range = min(powers), max(powers) - min(powers)
+        self.largest, self.range = max(values), max(values) - min(values)
+
+    def __call__(self, values: Array, powers: Array) -> Array:
+        """(P, 2) from criterion (P,) and power (P,)."""
+        return np.column_stack([(powers - self.least_power) / self.power_range, (self.largest - values) / self.range])
+
+    def back(self, F: Array) -> tuple[Array, Array]:
+        """Criterion and power of (P, 2)."""
+        return self.largest - self.range * F[:, 1], self.least_power + self.power_range * F[:, 0]
+
+
+class PowerAndCriterion:
+    """The compiled objective with a criterion beside the power; see ``metaheuristics.multi_objective.ManyObjectives``."""
+
+    def __init__(self, objective: CompiledObjective, criterion: Criterion, scale: Scale) -> None:
+        self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
+        self._objective, self._criterion, self._scale = objective, criterion, scale
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Objectives (P, 2) and violations (P,)."""
+        power, violation = self._objective(X)
+        return self._scale(self._criterion.values(self._objective, X), power), violation
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SearchFront:
+    """Feasible nondominated points of one run after a budget.
+
+    Attributes:
+        algorithm: of pymoo.
+        run: number.
+        budget: evaluations allowed.
+        values: (k,) criterion.
+        powers: (k,) [W].
+        X: (k, n).
+    """
+
+    algorithm: str
+    run: int
+    budget: int
+    values: Array
+    powers: Array
+    X: Array
+
+
+def search_fronts(
+    problem: GaitProblem,
+    criterion: Criterion,
+    scale: Scale,
+    out: Path,
+    *,
+    algorithms: Sequence[str],
+    budgets: Sequence[int],
+    runs: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> list[SearchFront]:
+    """Fronts of all runs; each run is kept as a file when it is done.
+
+    Args:
+        problem: with the criterion's demand dropped.
+        criterion: beside power.
+        scale: of both, so that no algorithm's distances are dominated by one of them.
+        out: folder.
+        algorithms: of pymoo.
+        budgets: evaluations, rising.
+        runs: run k uses seed + k.
+        seed: of the first run.
+        progress: told which run is done.
+
+    Raises:
+        SearchError: an algorithm or a budget that cannot be.
+        OutputError: a run cannot be kept.
+    """
+    steps = Steps(out, lambda note: None)
+    compiled = PowerAndCriterion(compile_objective(problem), criterion, scale)
+    ranges = [scale.least_power, scale.power_range, scale.largest, scale.range]
+    identity = {**fingerprint(problem), "criterion": criterion.name, "budgets": list(budgets), "scale": ranges}
+    fronts = []
+    for name in algorithms:
+        algorithm = MultiObjective(algorithm=name)
+        for run in range(runs):
+            inputs = {**identity, "algorithm": repr(algorithm), "seed": seed + run}
+
+            def compute(algorithm: MultiObjective = algorithm, run: int = run) -> list[dict[str, Any]]:
+                snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed + run)
+                return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
+
+            kept = steps(f"{name.lower()}-{run}", inputs, compute)
+            for budget, snapshot in zip(budgets, kept, strict=True):
+                values, powers = scale.back(np.array(snapshot["F"]).reshape(-1, 2))
+                X = np.array(snapshot["X"]).reshape(-1, len(problem.names))
+                fronts.append(SearchFront(algorithm=name, run=run, budget=budget, values=values, powers=powers, X=X))
+            progress(f"{name}, run {run}")
+    return fronts
+
+
+def best_of_all(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
+    """Points of all runs that none of them betters: if these are on or behind a front, all points are."""
+    points = [
+        FrontPoint(demanded=v, value=v, power_W=w, price=0.0, violation=0.0, x=tuple(x))
+        for front in fronts
+        for v, w, x in zip(front.values.tolist(), front.powers.tolist(), front.X.tolist(), strict=True)
+    ]
+    return nondominated(points)

@@ -1,0 +1,169 @@
+"""Power against a balance margin or speed: the true front, its knees, and how near evolutionary searches come to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from compare.questions.pareto import front as front_module
+from compare.questions.pareto.compare import Challenge, Quality, challenge, quality
+from compare.questions.pareto.criteria import Criterion, criterion
+from compare.questions.pareto.front import FrontPoint, pareto_front
+from compare.questions.pareto.knees import Bends, bends
+from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
+from compare.study.steps import Steps, fingerprint
+from metaheuristics.multi_objective import MultiObjective
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import GaitProblem
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParetoStudy:
+    """Result of a study.
+
+    Attributes:
+        problem: with its demand on the criterion dropped.
+        criterion: beside power.
+        front: the true one, with the points that were solved to answer the searches.
+        bends: its knees.
+        searches: fronts of all runs.
+        qualities: one row for each algorithm and budget.
+        challenge: None without searches.
+    """
+
+    problem: GaitProblem
+    criterion: Criterion
+    front: tuple[FrontPoint, ...]
+    bends: Bends
+    searches: tuple[SearchFront, ...]
+    qualities: tuple[Quality, ...]
+    challenge: Challenge | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; the points that searches found stay in their files."""
+        outcome = None
+        if self.challenge is not None:
+            outcome = {key: value for key, value in asdict(self.challenge).items() if key != "front"}
+        return {
+            "problem": self.problem.name,
+            "options": dict(self.problem.options),
+            "parameters": dict(self.problem.values),
+            "criterion": {"name": self.criterion.name, "unit": self.criterion.unit},
+            "front": [asdict(point) for point in self.front],
+            "knees": asdict(self.bends),
+            "searches": [asdict(row) for row in self.qualities],
+            "challenge": outcome,
+        }
+
+
+def pareto_study(
+    problem: GaitProblem,
+    name: str,
+    out: Path,
+    *,
+    points: int,
+    starts: int,
+    searches: Mapping[str, Sequence[int]],
+    runs: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> ParetoStudy:
+    """The front, and the searches beside it; what is done is kept under ``out`` and not done again.
+
+    Args:
+        problem: of the front.
+        name: of the criterion beside power.
+        out: folder.
+        points: of the front.
+        starts: random starts at some of its points.
+        searches: budgets by algorithm of pymoo; none for the front alone.
+        runs: of each algorithm.
+        seed: of starts and of the first run.
+        progress: told what is done.
+
+    Raises:
+        UnknownNameError: no such criterion.
+        InputError: the problem trades nothing, or its front cannot be found.
+        SearchError: no such algorithm, a budget that cannot be, or pymoo is not installed.
+    """
+    beside = criterion(name, problem)
+    for algorithm, budgets in searches.items():
+        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # said now, not after the front
+    free = beside.freed(problem)
+    steps = Steps(out, progress, code=[front_module])
+    identity = {**fingerprint(free), "criterion": name}
+
+    def solved() -> list[dict[str, Any]]:
+        return [
+            asdict(p) for p in pareto_front(problem, beside, points=points, starts=starts, seed=seed, progress=progress)
+        ]
+
+    inputs = {**identity, "points": points, "starts": starts, "seed": seed}
+    front = _points(steps(f"front-{name}", inputs, solved))
+    if not searches:
+        return _study(free, beside, front, (), None)
+    scale = Scale(front)
+    found: list[SearchFront] = []
+    for algorithm, budgets in searches.items():
+        found += search_fronts(
+            free,
+            beside,
+            scale,
+            out,
+            algorithms=[algorithm],
+            budgets=list(budgets),
+            runs=runs,
+            seed=seed,
+            progress=progress,
+        )
+    best = best_of_all(found)
+
+    def answered() -> dict[str, Any]:
+        return asdict(challenge(free, beside, front, best, progress=progress))
+
+    asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
+    kept = steps(f"challenge-{name}", asked, answered)
+    outcome = Challenge(**{**kept, "front": tuple(_points(kept["front"]))})
+    return _study(free, beside, outcome.front, found, outcome)
+
+
+def _study(
+    free: GaitProblem,
+    beside: Criterion,
+    front: Sequence[FrontPoint],
+    found: Sequence[SearchFront],
+    outcome: Challenge | None,
+) -> ParetoStudy:
+    return ParetoStudy(
+        problem=free,
+        criterion=beside,
+        front=tuple(front),
+        bends=bends(front),
+        searches=tuple(found),
+        qualities=tuple(quality(front, found)) if found else (),
+        challenge=outcome,
+    )
+
+
+def _points(rows: Sequence[Mapping[str, Any]]) -> list[FrontPoint]:
+    return [FrontPoint(**{**row, "x": tuple(row["x"])}) for row in rows]
+
+
+def parse_searches(texts: Sequence[str]) -> dict[str, tuple[int, ...]]:
+    """Budgets by algorithm from ``NSGA2=10000,100000``; the text ``none`` alone for no search.
+
+    Raises:
+        InputError: anything else.
+    """
+    if list(texts) == ["none"]:
+        return {}
+    searches: dict[str, tuple[int, ...]] = {}
+    for text in texts:
+        name, _, numbers = text.partition("=")
+        try:
+            searches[name.strip()] = tuple(int(number) for number in numbers.split(","))
+        except ValueError:
+            raise InputError(f"--search takes NAME=BUDGET,BUDGET or none, got {text!r}") from None
+    return searches

@@ -1,0 +1,158 @@
+"""Three objectives: least power over a grid of demands on two criteria, each point solved from its neighbours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from compare.drawing.figures import new_figure, save, style
+from compare.drawing.labels import axis_label
+from compare.questions.pareto.criteria import Criterion, criterion
+from compare.questions.pareto.front import front_ends
+from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import GaitProblem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfacePoint:
+    """Least power for two demands.
+
+    Attributes:
+        demanded: of each criterion.
+        values: reached, at least that.
+        power_W: exact.
+        violation: exact total violation.
+        x: (n,) as plain numbers.
+    """
+
+    demanded: tuple[float, float]
+    values: tuple[float, float]
+    power_W: float
+    violation: float
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Feasible points of the grid; where two demands cannot be met together there is none.
+
+    Attributes:
+        problem: with its demands on both criteria dropped.
+        criteria: two.
+        points: in the order in which they were solved.
+        infeasible: demands that no solution was found for.
+    """
+
+    problem: GaitProblem
+    criteria: tuple[Criterion, Criterion]
+    points: tuple[SurfacePoint, ...]
+    infeasible: tuple[tuple[float, float], ...]
+
+
+def pareto_surface(
+    problem: GaitProblem,
+    names: Sequence[str],
+    *,
+    points: int,
+    starts: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> Surface:
+    """Least power over a square grid of at least so many points, from the cheapest values of both criteria to the largest.
+
+    Args:
+        problem: of the surface.
+        names: of two criteria.
+        points: at least so many demands.
+        starts: random starts at both ends of the walk over the grid.
+        seed: of these.
+        progress: told after each solve.
+    """
+    first, second = (criterion(name, problem) for name in names)
+    free = second.freed(first.freed(problem))
+    side = math.ceil(math.sqrt(points))
+    grids = []
+    for beside in (first, second):
+        low, high = front_ends(free, beside, starts, seed)
+        grids.append(np.linspace(low.value, high.value, side).tolist())
+    walk = [(a, b) for row, b in enumerate(grids[1]) for a in (grids[0] if row % 2 == 0 else reversed(grids[0]))]
+    limited = [second.limited(first.limited(free, a), b) for a, b in walk]
+    solutions = solve_both_ways(limited, starts=starts, seed=seed, progress=lambda: progress("surface"))
+    found, infeasible = [], []
+    for at, solution in zip(walk, solutions, strict=True):
+        if not solution.success:
+            infeasible.append(at)
+            continue
+        x = np.array(list(solution.x.values()))
+        found.append(
+            SurfacePoint(
+                demanded=at,
+                values=(first.value(free, x), second.value(free, x)),
+                power_W=solution.objective,
+                violation=solution.violation,
+                x=tuple(x.tolist()),
+            )
+        )
+    # A point that meets more than is demanded of another one answers that demand too, and may be the better optimum.
+    better = [min((q for q in found if _meets(q, p)), key=lambda q: q.power_W) for p in found]
+    found = [replace(q, demanded=p.demanded) for p, q in zip(found, better, strict=True)]
+    if not found:
+        raise InputError(f"no pair of demands on {names[0]} and {names[1]} of {problem.name} can be met")
+    return Surface(problem=free, criteria=(first, second), points=tuple(found), infeasible=tuple(infeasible))
+
+
+def _meets(point: SurfacePoint, other: SurfacePoint) -> bool:
+    """Whether a point is at least as good as another one in both criteria, or has its demands."""
+    reached = all(value >= demand for value, demand in zip(point.values, other.demanded, strict=True))
+    return reached or point.demanded == other.demanded
+
+
+def surface_json(surface: Surface) -> dict[str, Any]:
+    """Plain data."""
+    return {
+        "problem": surface.problem.name,
+        "options": dict(surface.problem.options),
+        "parameters": dict(surface.problem.values),
+        "criteria": [{"name": c.name, "unit": c.unit} for c in surface.criteria],
+        "points": [asdict(point) for point in surface.points],
+        "infeasible": [list(at) for at in surface.infeasible],
+    }
+
+
+def surface_figure(surface: Surface) -> Figure:
+    """Lines of equal demand on the second criterion, coloured by it: power over the first one."""
+    first, second = surface.criteria
+    with style():
+        import matplotlib
+        from matplotlib.colors import Normalize
+
+        figure = new_figure(5.6, 3.4)
+        axes = figure.subplots()
+        levels = sorted({p.demanded[1] for p in surface.points})
+        norm = Normalize(levels[0], levels[-1] if levels[-1] > levels[0] else levels[0] + 1.0)
+        colours = matplotlib.colormaps["viridis"]
+        for level in levels:
+            line = sorted((p.values[0], p.power_W) for p in surface.points if p.demanded[1] == level)
+            axes.plot(*zip(*line, strict=True), "o-", color=colours(0.9 * norm(level)), markersize=3)
+        axes.set_xlabel(axis_label(first.name, first.unit))
+        axes.set_ylabel("least power [W]")
+        axes.set_ylim(bottom=0.0)
+        shades = matplotlib.colors.ListedColormap(colours(np.linspace(0.0, 0.9, 256)))
+        bar = figure.colorbar(matplotlib.cm.ScalarMappable(norm, shades), ax=axes)
+        bar.set_label(f"at least this {axis_label(second.name, second.unit)}")
+    return figure
+
+
+def write_surface(folder: Path, surface: Surface) -> list[Path]:
+    """Write the picture of a surface; returns its paths."""
+    names = "-".join(c.name for c in surface.criteria)
+    return list(save(surface_figure(surface), folder / f"{surface.problem.name}-surface-{names}"))

@@ -1,0 +1,234 @@
+"""What holds an optimum back, and which error of the model would change it most: derivatives, checked by solving again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
+from compare.questions.prices.price import STANDS, Price, Prices
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.optima.continuation import Continuation, best_end
+from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
+from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.solvers.ipopt import ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.errors import InputError
+from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.robots import load_robot
+from nlp_gait.robots.perturbation import perturbed_name, quantities, split_name
+
+# A limit whose natural step changes the optimum by less than this share of it costs nothing.
+FREE = 1e-9
+# The check solves again this share of a natural step away, less where x* turns before, down to the smaller one.
+CHECK_SHARE, LEAST_CHECK_SHARE = 1e-3, 1e-6
+# Derivative and difference quotient agree to this, relative: where x* turns on the way the quotient is in between.
+AGREEMENT = 1e-4
+# Half-width of the central differences over rebuilt models: masses enter the objective almost linearly.
+MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
+
+
+class Solved(NamedTuple):
+    """An optimum with IPOPT's end, from which neighbours are solved."""
+
+    problem: GaitProblem
+    end: End
+    optimum: Optimum
+
+
+def solved(problem: GaitProblem, starts: int, seed: int) -> Solved:
+    """Best optimum from random starts, to machine precision.
+
+    Raises:
+        InputError: none converged to a feasible point, or the problem is too large.
+    """
+    end = best_end(Continuation(starts=starts, seed=seed).run(problem))
+    if end is None:
+        raise InputError(
+            f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
+            "try more --starts, or relax the limits that `nlp-gait solve` names"
+        )
+    return Solved(problem, end, optimum(problem, end))
+
+
+def prices(
+    spec: ProblemSpec,
+    *,
+    starts: int = 10,
+    seed: int = 0,
+    checks: int = 3,
+    progress: Callable[[str], None] | None = None,
+) -> Prices:
+    """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
+
+    Args:
+        spec: the problem.
+        starts: random starts of IPOPT.
+        seed: of the starts.
+        checks: how many of the robot's dearest quantities are checked by solving again; of the parameters all are.
+        progress: called with a note as the work goes on.
+
+    Raises:
+        InputError: no optimum was found, or the problem is too large.
+    """
+    note = progress or (lambda _: None)
+    problem = spec.load()
+    note("solving")
+    base = solved(problem, starts, seed)
+    found = base.optimum
+    limits, free = list[Price](), 0
+    robot: list[Price] = []
+    if found.reason is None:
+        every = _ranked(_parameter_prices(found))
+        limits = [price for price in every if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
+        free = len(every) - len(limits)
+        limits = [_checked(base, price, note, partial(_moved, problem, price)) for price in limits]
+        if isinstance(problem.options.get("robot"), str):
+            robot = _ranked(_robot_prices(spec, found, note))
+            robot[:checks] = [
+                _checked(base, price, note, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
+            ]
+    return Prices(
+        problem=problem.name,
+        objective_name=problem.objective.name,
+        unit=problem.objective.unit,
+        sense=problem.objective.sense,
+        objective=found.objective,
+        x=problem.by_name(found.x),
+        limits=tuple(limits),
+        free=free,
+        robot=tuple(robot),
+        weak=found.weak,
+        dependent=found.dependent,
+        residual=found.residual,
+        reason=found.reason,
+    )
+
+
+def robot_changes(spec: ProblemSpec) -> Iterator[tuple[str, float, float, NaturalStep]]:
+    """Name, value without a change, half-width of the differences and natural step of a robot's quantities."""
+    robot = str(spec.load().options["robot"])
+    _, changes = split_name(robot)
+    for name in quantities(load_robot(robot)):
+        if name.endswith("mass"):
+            yield name, changes.get(name, 1.0), MASS_DIFFERENCE, MASS
+        else:
+            yield name, changes.get(name, 0.0), LENGTH_DIFFERENCE_M, LENGTH
+
+
+def _parameter_prices(found: Optimum) -> list[Price]:
+    """Prices of all parameters; both bounds of a fixed variable are one, under the variable's name."""
+    derivatives, problem = parameter_sensitivities(found), found.problem
+    sides = found.side[-len(problem.names) :]
+    prices = []
+    for i, (q, value) in enumerate(zip(problem.parameters, map(float, problem.p), strict=True)):
+        stem, _, end = q.name.rpartition(".")
+        name = q.name
+        if stem in problem.names and problem.value(f"{stem}.lower") == problem.value(f"{stem}.upper"):
+            if (sides[problem.variable_index(stem)] > 0) != (end == "upper"):
+                continue
+            name = stem
+        prices.append(_price(problem, derivatives, i, name, q.unit, value, natural_step(q, value)))
+    return prices
+
+
+def _robot_prices(spec: ProblemSpec, found: Optimum, note: Callable[[str], None]) -> list[Price]:
+    changes = list(robot_changes(spec))
+
+    def pairs() -> Iterator[tuple[GaitProblem, GaitProblem, float]]:
+        for name, value, half, _ in changes:
+            note(f"robot with another {name}")
+            yield _with_robot(spec, name, value + half), _with_robot(spec, name, value - half), 2 * half
+
+    derivatives = model_sensitivities(found, pairs())
+    return [
+        _price(found.problem, derivatives, i, name, "1" if step is MASS else "m", value, step)
+        for i, (name, value, _, step) in enumerate(changes)
+    ]
+
+
+def _price(
+    problem: GaitProblem, derivatives: Sensitivities, i: int, name: str, unit: str, value: float, step: NaturalStep
+) -> Price:
+    return Price(
+        name=name,
+        unit=unit,
+        value=value,
+        slope=float(derivatives.objective[i]),
+        step=step.size,
+        words=step.words,
+        reach=(float(derivatives.reach[0, i]), float(derivatives.reach[1, i])),
+        x=problem.by_name(derivatives.x[:, i]) if derivatives.defined[i] else None,
+    )
+
+
+def _ranked(found: Sequence[Price]) -> list[Price]:
+    return sorted(found, key=lambda price: -abs(price.per_step))
+
+
+def _moved(problem: GaitProblem, price: Price, change: float) -> GaitProblem | None:
+    """The problem with a parameter changed, or None where that is not allowed."""
+    ends = [f"{price.name}.{end}" for end in ("lower", "upper")] if price.name in problem.names else [price.name]
+    try:
+        return problem.with_values(**dict.fromkeys(ends, price.value + change))
+    except InputError:
+        return None
+
+
+def _with_changed_robot(spec: ProblemSpec, price: Price, change: float) -> GaitProblem:
+    return _with_robot(spec, price.name, price.value + change)
+
+
+def _with_robot(spec: ProblemSpec, quantity: str, value: float) -> GaitProblem:
+    """The problem with another robot under the same limits: a robot's error does not move them."""
+    problem = spec.load()
+    name, changes = split_name(str(problem.options["robot"]))
+    other = replace(spec, options={**spec.options, "robot": perturbed_name(name, {**changes, quantity: value})})
+    limits = {q.name: float(v) for q, v in zip(problem.parameters, problem.p, strict=True)}
+    return other.load().with_values(**limits)
+
+
+def _checked(
+    base: Solved, price: Price, note: Callable[[str], None], changed: Callable[[float], GaitProblem | None]
+) -> Price:
+    """A price with what solving again says, from the unchanged optimum, a little and a natural step away."""
+    note(f"solving again with another {price.name}")
+    turn = min(abs(reach) for reach in price.reach)
+    small = min(CHECK_SHARE * price.step, max(turn / 2, LEAST_CHECK_SHARE * price.step))
+    low, high, less, more = (_neighbour(base, changed(d)) for d in (-small, small, -price.step, price.step))
+    sign, objective = base.problem.objective.sign, base.optimum.objective
+    steps = tuple(None if end is None else sign * end.cost - objective for end in (less, more))
+    checked = replace(price, one_step=(steps[0], steps[1]))
+    if low is None or high is None:
+        return checked
+    return replace(
+        checked,
+        resolved=sign * (high.cost - low.cost) / (2 * small),
+        x_error=_x_error(base.problem, price, low, high, small),
+    )
+
+
+def _x_error(problem: GaitProblem, price: Price, low: End, high: End, small: float) -> float | None:
+    if price.x is None:
+        return None
+    expected = np.array(list(price.x.values())) / problem.scale
+    largest = np.abs(expected).max()
+    if largest * price.step < STANDS:
+        return None
+    return float(np.abs((high.x - low.x) / (2 * small) / problem.scale - expected).max() / largest)
+
+
+def _neighbour(base: Solved, problem: GaitProblem | None) -> End | None:
+    """Optimum of a neighbour, None if there is none or IPOPT does not get there."""
+    if problem is None:
+        return None
+    ipopt = ipopt_for(problem, SHARP)
+    end = ipopt.run_from(problem, base.end.guess)
+    if not end.success:
+        end = ipopt.run(problem, np.clip(base.end.x, problem.lower, problem.upper))
+    return end if end.success and math.isfinite(end.cost) else None

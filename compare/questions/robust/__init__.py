@@ -1,0 +1,1 @@
+"""One gait for a family of robots and grounds."""

@@ -1,0 +1,84 @@
+"""The nominal and the robust gait played in MuJoCo on the robots for which they differ (extra ``sim``)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compare.questions.robust.study import Robust
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.problem.result import Result
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import averaged_pressure
+from nlp_gait.simulation.plan import SIDES, Plan, plan_of
+from nlp_gait.simulation.playback import Trace, play
+
+MARGIN = "dbm_y_mean_m"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Played:
+    """One gait on one robot, open loop.
+
+    Attributes:
+        gait: ``"nominal"`` or ``"robust"``.
+        robot: its name, with its changes.
+        fell_at_s: None if it stayed up.
+        largest_tilt_deg: of the torso.
+        margin_m: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the
+            nearer edge of the supporting soles.
+        predicted_margin_m: the same of the model's ZMP on this robot.
+    """
+
+    gait: str
+    robot: str
+    fell_at_s: float | None
+    largest_tilt_deg: float
+    margin_m: float
+    predicted_margin_m: float
+
+
+def played(spec: ProblemSpec, found: Robust, progress: Callable[[str], None] | None = None) -> tuple[Played, ...]:
+    """Both gaits on every robot of the scenario problem.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    runs = []
+    for robot in found.robots:
+        for gait, x in (("nominal", found.nominal_x), ("robust", found.x)):
+            runs.append(_play(spec, robot, gait, x))
+            if progress is not None:
+                progress(f"{gait} gait on {robot[:40]}")
+    return tuple(runs)
+
+
+def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> Played:
+    problem = replace(spec, options={**spec.options, "robot": robot}).load()
+    point = np.array([x[name] for name in problem.names])
+    plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
+    trace = play(plan, drive=drive)
+    model = exact_model(problem)
+    indexes = np.array(model.function(point, problem.p)[5]).ravel()
+    return Played(
+        gait=gait,
+        robot=robot,
+        fell_at_s=trace.fell_at_s,
+        largest_tilt_deg=math.degrees(float(trace.tilt.max())),
+        margin_m=lateral_margin(plan, trace, drive),
+        predicted_margin_m=float(indexes[model.index_names.index(MARGIN)]),
+    )
+
+
+def lateral_margin(plan: Plan, trace: Trace, drive: Drive) -> float:
+    """Mean over the phase of the centre of pressure's distance to the nearer side of the supporting soles [m]."""
+    feet = [
+        (plan.at(f"{side}_foot", np.zeros(1))[0, 1], plan.robot.feet[side]) for side in SIDES if side in plan.supports
+    ]
+    left, right = max(y + foot.left_m for y, foot in feet), min(y - foot.right_m for y, foot in feet)
+    y = averaged_pressure(trace, drive.period_s)[trace.t <= plan.duration_s, 1]
+    return float(np.nanmean(np.minimum(left - y, y - right)))

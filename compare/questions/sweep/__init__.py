@@ -1,0 +1,1 @@
+"""How does the optimum move with one or two parameters?"""

@@ -1,0 +1,1 @@
+"""Runs of solvers on problems: what to run, running it, and the records that stay."""

@@ -1,0 +1,146 @@
+"""``study.json``: what a folder of records was made from, where, by which versions and which command."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from compare.study.settings import StudySettings, settings_from
+from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
+from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.files import read_json, write_json
+
+SCHEMA = 1
+FILE = "study.json"
+REMEDY = "delete it, the records are still good"
+PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """One call that ran a part of a study.
+
+    Attributes:
+        command: as it was given.
+        started: date and time, UTC.
+        machine: processor, system, processors that may be used.
+        versions: of Python and of the packages that are there.
+        kernel: compiler and flags of the objective, or why it is interpreted.
+        jobs: worker processes, or the address of the scheduler.
+    """
+
+    command: str
+    started: str
+    machine: Mapping[str, str]
+    versions: Mapping[str, str]
+    kernel: str
+    jobs: str
+
+    @classmethod
+    def now(cls, command: str, jobs: str) -> Session:
+        """Session that begins now, in this process."""
+        return cls(
+            command=command,
+            started=datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
+            machine={
+                "processor": _processor(),
+                "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+                "processors": str(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()),
+            },
+            versions={"python": sys.version.split()[0], **_versions()},
+            kernel=_kernel(),
+            jobs=jobs,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest:
+    """Settings of a study, None if a program made it, and the sessions that ran it."""
+
+    settings: StudySettings | None
+    sessions: tuple[Session, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kept:
+    """Content of the file."""
+
+    schema: int
+    study: Mapping[str, Any]
+    sessions: tuple[Session, ...]
+
+
+def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
+    """Add a session to the folder's manifest.
+
+    Raises:
+        InputError: the folder holds another study.
+    """
+    sessions: Sequence[Session] = ()
+    if (folder / FILE).exists():
+        known = read_manifest(folder)
+        sessions = known.sessions
+        if known.settings is not None and known.settings.to_json() != settings.to_json():
+            raise InputError(
+                f"{str(folder)!r} holds another study; continue that one with --resume alone, choose another folder with "
+                "--out, or delete it"
+            )
+    data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
+    write_json(folder / FILE, data)
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Manifest of a folder; empty if the folder has none.
+
+    Raises:
+        InputError: it is damaged or of another schema.
+    """
+    path = folder / FILE
+    if not os.path.lexists(path):
+        return Manifest(settings=None, sessions=())
+    raw = read_json(path, "manifest", remedy=REMEDY)
+    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(found) is not int or found != SCHEMA:
+        raise InputError(f"manifest {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {REMEDY}")
+    try:
+        kept = decoded(_Kept, raw)
+    except ValueError as error:
+        raise InputError(f"manifest {str(path)!r} is damaged: {error}; {REMEDY}") from error
+    return Manifest(settings=settings_from(kept.study, f"manifest {str(path)!r}"), sessions=kept.sessions)
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _kernel() -> str:
+    lanes = native_lanes()
+    try:
+        return " ".join([find_compiler().summary, *BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"])
+    except CompilerError as error:
+        return f"interpreted: {error}"
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"

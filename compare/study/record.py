@@ -1,0 +1,222 @@
+"""One finished run as plain data and as one JSON file."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from compare.judge import Evaluation
+from compare.study.task import LABEL
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import InputError
+from nlp_gait.files import read_json, without_nan, write_json
+from nlp_gait.problem.gait_problem import Objective
+from nlp_gait.problem.solution import ActiveConstraint, Evaluations
+
+SCHEMA = 2
+CALLS = frozenset(field.name for field in fields(Evaluations))
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """Best so far over a run.
+
+    Attributes:
+        evaluations: calls of f until then.
+        objective: in the problem's sense; None while nothing was feasible.
+    """
+
+    evaluations: tuple[int, ...]
+    objective: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Times:
+    """Wall time [s]: all that differs between two equal runs.
+
+    Attributes:
+        build: symbolic problem and NLP, near 0 where the process had them already.
+        compile: compiled objective, or derivatives and solver; likewise.
+        solve: the run itself.
+        objective: part of it in the objective; NaN where it is not known.
+        history: at each entry of the history, from the beginning of the solve.
+    """
+
+    build: float
+    compile: float
+    solve: float
+    objective: float
+    history: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What the judge finds at a run's point.
+
+    Attributes:
+        objective: exact value, in the problem's sense; NaN without a point.
+        violation: exact total violation; infinite without a point.
+        feasible: on the problem's own samples.
+        indexes: performance figures.
+        dense: the same on the dense grid, if there is one.
+        dense_feasible: no row violated on the dense grid; None without one.
+        violated: names of the worst violated rows with the amount, own samples first.
+    """
+
+    objective: float
+    violation: float
+    feasible: bool
+    indexes: Mapping[str, float]
+    dense: Mapping[str, float] | None
+    dense_feasible: bool | None
+    violated: tuple[str, ...]
+
+    @classmethod
+    def of(cls, evaluation: Evaluation) -> Verdict:
+        """Verdict from a full evaluation."""
+        worst = [*evaluation.violations[:5], *evaluation.dense_violations[:5]]
+        return cls(
+            objective=float(evaluation.objective["value"]),
+            violation=evaluation.violation,
+            feasible=evaluation.feasible,
+            indexes=evaluation.indexes,
+            dense=evaluation.dense,
+            dense_feasible=None if evaluation.dense is None else not evaluation.dense_violations,
+            violated=tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
+        )
+
+    @classmethod
+    def without_point(cls) -> Verdict:
+        """Verdict on a run that failed before it had a point."""
+        return cls(
+            objective=math.nan,
+            violation=math.inf,
+            feasible=False,
+            indexes={},
+            dense=None,
+            dense_feasible=None,
+            violated=(),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRecord:
+    """A run of one solver on one problem: its claim, the judge's verdict, its cost.
+
+    Attributes:
+        problem: label, or name without one.
+        algorithm: label, or name without one.
+        run: number within the study.
+        seed: of this run alone: it repeats the run.
+        definition: all that the result depends on.
+        settings: of the algorithm, defaults included.
+        status: why it ended, in words.
+        success: the solver itself claims a feasible result.
+        x: by variable name; empty if the run failed before it had a point.
+        objective: as claimed, in the problem's sense; None if there is none.
+        violation: as claimed; None if there is none.
+        verdict: of the judge.
+        evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
+        failed_evaluations: calls that gave NaN or infinity.
+        iterations: generations of a population, iterations of an NLP solver.
+        active_constraints: bounds with a price, dearest first, where the solver knows prices.
+        history: best so far.
+        time_s: wall times; the only part that two equal runs do not share.
+    """
+
+    problem: str
+    algorithm: str
+    run: int
+    seed: int
+    definition: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    status: str
+    success: bool
+    x: Mapping[str, float]
+    objective: float | None
+    violation: float | None
+    verdict: Verdict
+    evaluations: Mapping[str, int]
+    failed_evaluations: int
+    iterations: int
+    active_constraints: tuple[ActiveConstraint, ...]
+    history: History
+    time_s: Times
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
+        return {"schema": SCHEMA, **without_nan(asdict(self))}
+
+    def write(self, path: Path) -> None:
+        """One file, whole or absent."""
+        write_json(path, self.to_json())
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Problem:
+    """What a definition says of the problem."""
+
+    name: str
+    options: Mapping[str, str | int | float | bool]
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Definition:
+    """Shape of a definition, see ``Task.definition``."""
+
+    problem: _Problem
+    objective: Objective
+    algorithm: str | Mapping[str, Any]
+    settings: Mapping[str, Any]
+    seed: int
+    handling: Mapping[str, Any] | None = None
+    stop: Mapping[str, Any] | None = None
+    polishes: Mapping[str, Any] | None = None
+
+
+def read_record(path: Path) -> RunRecord:
+    """Record from its file.
+
+    Raises:
+        InputError: the file is damaged or of another schema.
+    """
+    raw = read_json(path, "record", remedy="delete it to have it made anew")
+    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(found) is not int or found != SCHEMA:
+        newer = type(found) is int and found > SCHEMA
+        remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
+        raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
+    try:
+        return _checked(decoded(RunRecord, {key: value for key, value in raw.items() if key != "schema"}))
+    except ValueError as error:
+        raise InputError(f"record {str(path)!r} is damaged: {error}; delete it to have it made anew") from error
+
+
+def _checked(record: RunRecord) -> RunRecord:
+    """The record, if its parts agree with each other."""
+    objective = decoded(_Definition, record.definition, "definition").objective
+    for text in (objective.name, objective.unit):
+        if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
+            raise ValueError(f"{text!r} is no name or unit of an objective")
+    for title in (record.problem, record.algorithm):
+        if not LABEL.fullmatch(title):  # names of files are made from it
+            raise ValueError(f"{title!r} is no label of a problem or solver")
+    history, times, verdict = record.history, record.time_s, record.verdict
+    if not len(history.evaluations) == len(history.objective) == len(times.history):
+        raise ValueError("the columns of the history differ in length")
+    counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
+    if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
+        raise ValueError("counts must be at least 0, and those of the history ascend")
+    if "f" not in record.evaluations or not CALLS.issuperset(record.evaluations):
+        raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
+    if record.definition["seed"] != record.seed:
+        raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
+    if verdict.feasible and not math.isfinite(verdict.objective):
+        raise ValueError("a feasible verdict without an objective")
+    violation = math.inf if math.isnan(verdict.violation) else verdict.violation
+    return replace(record, verdict=replace(verdict, violation=violation))

@@ -1,0 +1,1 @@
+"""One kind of solver a file: from a task to its record."""

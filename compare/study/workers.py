@@ -1,0 +1,98 @@
+"""Runs in this process, in worker processes, or on a Dask cluster; the results are the same."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
+
+from compare.study.record import RunRecord
+from compare.study.runner import attempt
+from compare.study.task import Task
+from nlp_gait.backends.interrupts import deaf_children, remembered_interrupts
+from nlp_gait.errors import InputError, WorkerError
+
+# A study goes on in new processes when one dies, unless they die so often without finishing any run.
+DEATHS_WITHOUT_PROGRESS = 3
+CONNECT_TIMEOUT = "10s"
+
+Job = tuple[Task, RunRecord | None]
+"""A task, and the run that it polishes if it does."""
+
+
+def default_jobs() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[int, RunRecord]]:
+    """Position and record of each job, as it finishes.
+
+    Args:
+        jobs: in the order in which they begin.
+        workers: processes; with 1 all runs in this process.
+        scheduler: address of a Dask scheduler, whose workers do the runs instead.
+
+    Raises:
+        WorkerError: worker processes keep dying.
+        InputError: no Dask scheduler answers at the address, or Dask is not installed.
+    """
+    if scheduler is None and (workers == 1 or len(jobs) <= 1):
+        for position, job in enumerate(jobs):
+            with remembered_interrupts() as check:
+                record = attempt(*job)
+                check()
+            yield position, record
+        return
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    waiting = dict(enumerate(jobs))
+    deaths = 0
+    with ExitStack() as stack:
+        if scheduler is not None:
+            stack.enter_context(_dask(scheduler))
+        while waiting:
+            try:
+                for position, record in _parallel(list(waiting.items()), None if scheduler else workers):
+                    del waiting[position]
+                    deaths = 0
+                    yield position, record
+            except TerminatedWorkerError as error:
+                deaths += 1
+                if deaths == DEATHS_WITHOUT_PROGRESS:
+                    raise WorkerError(
+                        f"a worker process died {deaths} times in a row, out of memory perhaps; finished runs are kept: "
+                        "continue with fewer --jobs"
+                    ) from error
+
+
+def _parallel(jobs: list[tuple[int, Job]], workers: int | None) -> Iterator[tuple[int, RunRecord]]:
+    from joblib import Parallel, delayed  # costs 0.1 s to import
+
+    parallel = Parallel(n_jobs=workers if workers is not None else -1, return_as="generator_unordered", batch_size=1)
+    with deaf_children():
+        results = parallel(delayed(_numbered)(position, job) for position, job in jobs)
+    yield from results
+
+
+def _numbered(position: int, job: Job) -> tuple[int, RunRecord]:
+    return position, attempt(*job)
+
+
+def _dask(address: str) -> AbstractContextManager[object]:
+    """Connection to a scheduler, with joblib's backend set to it."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("--scheduler needs Dask: pip install 'nlp-gait[cluster]'") from error
+    from joblib import parallel_config
+
+    stack = ExitStack()
+    try:
+        stack.enter_context(Client(address, timeout=CONNECT_TIMEOUT, set_as_default=True))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {address!r}: {error}; start one with `dask scheduler`"
+        ) from error
+    stack.enter_context(parallel_config(backend="dask"))
+    return stack

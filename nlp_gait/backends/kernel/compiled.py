@@ -1,0 +1,200 @@
+"""A problem's exact functions as a batch objective for search algorithms: compiled if there is a compiler, else interpreted."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
+from nlp_gait.backends.kernel.interpreted import InterpretedKernel
+from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.kernel.native_kernel import NativeKernel
+from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+
+LOG = logging.getLogger("nlp_gait")
+# Of a wrong library, not of rounding: compiled and interpreted values agree to some 1e-12.
+CHECK_TOLERANCE = 1e-6
+CHECK_POINTS = 5
+LANE_COUNTS = (1, 2, 4, 8)
+# A second thread takes part once it has this much to do; handing over the work costs some 0.05 ms.
+LEAST_THREAD_TIME_S = 3e-4
+
+
+class CompiledObjective:
+    """Objective and total violation of many candidates at once.
+
+    Attributes:
+        problem: with the parameter values that are used.
+        names: (n,) variables.
+        lower: (n,) current lower bounds.
+        upper: (n,) current upper bounds.
+        row_names: (m,) constraint rows, in the order of ``constraints``.
+        backend: ``"compiled"`` or ``"interpreted"``.
+        description: backend, compiler and lane count, for people.
+    """
+
+    def __init__(self, problem: GaitProblem, evaluator: NativeKernel | InterpretedKernel, threads: int) -> None:
+        """Use ``compile_objective`` instead."""
+        kernel = kernel_of(problem)
+        self.problem = problem
+        self.names = problem.names
+        self.lower = problem.lower
+        self.upper = problem.upper
+        self.row_names = kernel.model.row_names
+        self.backend: Literal["compiled", "interpreted"] = (
+            "compiled" if isinstance(evaluator, NativeKernel) else "interpreted"
+        )
+        self.description = evaluator.description
+        self._evaluator = evaluator
+        self._lower, self._upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+        self._p = np.array(problem.p)
+        self._threads = threads
+        self._time_per_row_s = 0.0
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Evaluate candidates.
+
+        Args:
+            X: (P, n) candidates, one a row.
+
+        Returns:
+            (P,) cost, which is to be minimised: the objective, negated if the problem maximises it; and (P,) violation
+            summed over all constraint rows and bounds, each in units of its scale, zero if feasible. Both are infinite
+            where a row of X is not finite.
+
+        Raises:
+            InputError: X has another shape, or is not made of numbers.
+        """
+        X = self._checked(X)
+        f, violation = np.empty(len(X)), np.empty(len(X))
+        self._evaluate(X, f, violation, None)
+        return f, violation
+
+    def constraints(self, X: Array) -> Array:
+        """(P, m) values of all constraint rows, named by ``row_names``; bounds of the variables are the last n."""
+        X = self._checked(X)
+        f, violation, g = np.empty(len(X)), np.empty(len(X)), np.empty((len(X), len(self.row_names)))
+        self._evaluate(X, f, violation, g)
+        return g
+
+    def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
+        rows = len(X)
+        parts = min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S))
+        started = time.perf_counter()
+        if parts <= 1:
+            self._part(X, f, violation, g)
+        else:
+            edges = [rows * i // parts for i in range(parts + 1)]
+            cuts = [slice(a, b) for a, b in zip(edges, edges[1:], strict=False)]
+            jobs = [
+                self._pool.submit(self._part, X[cut], f[cut], violation[cut], None if g is None else g[cut])
+                for cut in cuts[1:]
+            ]
+            self._part(X[cuts[0]], f[cuts[0]], violation[cuts[0]], None if g is None else g[cuts[0]])
+            wait(jobs)
+            for job in jobs:
+                job.result()
+        if rows:
+            self._time_per_row_s = (time.perf_counter() - started) * max(parts, 1) / rows
+
+    def _part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
+        self._evaluator(X, self._p, self._lower, self._upper, f, violation, g)
+
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
+
+    def _checked(self, X: Array) -> Array:
+        """X as contiguous, aligned doubles, copied only if it is not that already."""
+        try:
+            array = np.require(X, dtype=np.float64, requirements=("C", "A"))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"X of {self.problem.name} must be numbers, got {type(X).__name__}: {error}") from error
+        if array.ndim != 2 or array.shape[1] != len(self.names):
+            raise InputError(
+                f"X of {self.problem.name} must have one candidate a row and {len(self.names)} columns "
+                f"({', '.join(self.names)}), got shape {array.shape}"
+            )
+        return array
+
+
+def compile_objective(
+    problem: GaitProblem, *, require_compiler: bool = False, threads: int | None = None, lanes: int | None = None
+) -> CompiledObjective:
+    """Exact objective and violation of a problem for batches of candidates.
+
+    The library is built once and kept in the user's cache folder; other parameter values, bounds or fixed variables need
+    no other library.
+
+    Args:
+        problem: with the parameter values to use.
+        require_compiler: raise rather than fall back to the interpreter.
+        threads: at most so many take part in a large batch; None for all cores. Results do not depend on it.
+        lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
+
+    Raises:
+        InputError: a thread or lane count that cannot be, or a problem that is not searchable.
+        CompilerError: ``require_compiler``, and there is no compiler or it fails.
+    """
+    if not problem.searchable:
+        raise InputError(
+            f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can meet; use solve"
+        )
+    if threads is not None and threads < 1:
+        raise InputError(f"threads must be at least 1, got {threads}")
+    if lanes is not None and lanes not in LANE_COUNTS:
+        raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
+    kernel = kernel_of(problem)
+    count = native_lanes() if lanes is None else lanes
+    evaluator: NativeKernel | InterpretedKernel
+    try:
+        evaluator = _native(problem, kernel, find_compiler(), count)
+    except CompilerError as error:
+        if require_compiler:
+            raise
+        LOG.warning("the objective is interpreted, many times slower: %s", error)
+        evaluator = problem.built("interpreted kernel", lambda: InterpretedKernel(kernel))
+        threads = 1  # the virtual machine does not let go of Python's lock
+    return CompiledObjective(problem, evaluator, threads or _available_cores())
+
+
+def _native(problem: GaitProblem, kernel: Kernel, compiler: Compiler, lanes: int) -> NativeKernel:
+    return problem.built(
+        f"native kernel {lanes} {compiler}", lambda: _verified(NativeKernel(kernel, compiler, lanes), problem, kernel)
+    )
+
+
+def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
+    """The native kernel, if it computes what the virtual machine does, at most points at least.
+
+    Not at all of them: where rounding decides a jump, as in the quantised drive of a tracked step, both may be right.
+
+    Raises:
+        CompilerError: it does not: the compiler is broken, or not for this machine.
+    """
+    X = np.random.default_rng(0).uniform(problem.lower, problem.upper, (CHECK_POINTS, len(problem.names)))
+    lower, upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+    f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(lower)))
+    native(X, np.array(problem.p), lower, upper, f, violation, g)
+    found = np.column_stack([f, g])
+    expected = np.array([np.concatenate([np.array(v).ravel() for v in kernel.function(x, problem.p)]) for x in X])
+    alike = np.isclose(found, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
+    if 2 * np.count_nonzero(alike) <= CHECK_POINTS:
+        raise CompilerError(
+            f"{native.library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
+        )
+    return native
+
+
+def _available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,74 @@
+"""C++ source of a problem's kernel: CasADi's generated code over a vector type, and a loop over candidates."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib.resources import files
+
+import casadi as ca
+
+from nlp_gait.backends.exact import ExactModel, exact_model
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+
+SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Kernel:
+    """What is evaluated for each candidate, apart from what depends on parameters only.
+
+    Attributes:
+        function: (x, p) to cost and g (m,).
+        bounds: p to lower and upper (m,).
+        weights: (m,) 1 / scale of each row.
+        model: the exact model that both are part of.
+    """
+
+    function: ca.Function
+    bounds: ca.Function
+    weights: Array
+    model: ExactModel
+
+
+def kernel_of(problem: GaitProblem) -> Kernel:
+    """Kernel of a problem, built once for all copies that differ in parameter values only."""
+    return problem.built("kernel", lambda: _kernel(problem))
+
+
+def _kernel(problem: GaitProblem) -> Kernel:
+    model = exact_model(problem)
+    x, p = model.function.mx_in()
+    cost, _, g, lower, upper, _ = model.function.call([x, p], True, False)
+    return Kernel(
+        function=ca.Function("kernel", [x, p], [cost, g]),
+        bounds=ca.Function("bounds", [p], [lower, upper]),
+        weights=1.0 / model.row_scales,
+        model=model,
+    )
+
+
+def kernel_source(function: ca.Function) -> str:
+    """C++ source; the lane count is the macro LANES.
+
+    Args:
+        function: (x, p) to cost and g.
+    """
+    generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
+    generator.add(function)
+    generated = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
+    native = files("nlp_gait.backends.kernel") / "native"
+    sizes = {
+        "VARIABLES": function.size1_in(0),
+        "PARAMETERS": function.size1_in(1),
+        "ROWS": function.size1_out(1),
+    }
+    return "\n".join(
+        [
+            (native / "lanes.hpp").read_text(encoding="utf-8"),
+            "#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp",
+            generated,
+            *(f"#define {name} {size}" for name, size in sizes.items()),
+            (native / "batch.hpp").read_text(encoding="utf-8"),
+        ]
+    )

@@ -1,0 +1,195 @@
+"""A local optimum to machine precision, with the bounds that hold it and how firmly they do.
+
+IPOPT stops near an optimum, with every multiplier a little off zero. Here the bounds with a price are taken as equations and the
+first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is let go, one that is
+violated is taken in, until nothing changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kkt_step
+from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+
+# Tolerance at which IPOPT tells bounds with a price from those without one: at kinks of |power| both are small.
+SHARP = IpoptSettings(tolerance=1e-12)
+ROUNDS = 30
+# The conditions hold to this, in units of cost per range of a variable, and of the rows.
+RESIDUAL = 1e-9
+# A multiplier or a slack below this is zero: the bound is weakly active, and x* may move differently to both sides.
+WEAK = 1e-8
+# Dense linear algebra: beyond this number of unknowns it takes minutes.
+LARGEST = 2_500
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """Point that satisfies the first-order conditions.
+
+    Attributes:
+        problem: that it belongs to.
+        functions: its first-order conditions.
+        w: scaled variables and lifted ones.
+        width: of the sigmoid.
+        multipliers: (m,) of all rows and bounds; positive at an upper bound.
+        side: (m,) 1 where a row holds at its upper bound, -1 at its lower one, else 0.
+        weak: names of the bounds that hold without a price, or nearly hold.
+        residual: largest violation of the conditions.
+        freedom: dimension of the space in which x* and the lifted variables could move along the active bounds.
+        dependent: number of active rows that follow from the others: their multipliers are not unique.
+        reason: why no derivative can be had, or None.
+    """
+
+    problem: GaitProblem
+    functions: KktFunctions
+    w: Array
+    width: float
+    multipliers: Array
+    side: Array
+    weak: tuple[str, ...]
+    residual: float
+    freedom: int
+    dependent: int
+    reason: str | None
+
+    @property
+    def x(self) -> Array:
+        """(n,) decision variables."""
+        model = self.functions.model
+        return np.asarray(model.offset + model.scale * self.w[: model.variables])
+
+    @property
+    def objective(self) -> float:
+        """In the problem's own sense."""
+        return self.problem.objective.sign * float(self.functions.values(self.w, self.parameters)[0])
+
+    @property
+    def active(self) -> np.ndarray[Any, np.dtype[np.intp]]:
+        """Indexes of the rows that hold as equations."""
+        return np.asarray(np.flatnonzero(self.side))
+
+    @cached_property
+    def parameters(self) -> Array:
+        """Parameters and sigmoid width."""
+        return np.append(self.problem.p, self.width)
+
+    @cached_property
+    def matrices(self) -> tuple[Array, Array]:
+        """Hessian of L and Jacobian of all rows."""
+        hessian, jacobian = self.functions.matrices(self.w, self.parameters, self.multipliers)
+        return np.array(hessian), np.array(jacobian)
+
+    @cached_property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """Values of all rows with their lower and upper bounds."""
+        _, values, lower, upper = (column(part) for part in self.functions.values(self.w, self.parameters))
+        return values, lower, upper
+
+
+def optimum(problem: GaitProblem, end: End) -> Optimum:
+    """The optimum near which IPOPT ended.
+
+    Raises:
+        InputError: the problem has too many variables for dense linear algebra.
+    """
+    functions = kkt_functions(problem)
+    if len(end.guess.primal) > LARGEST:
+        raise InputError(
+            f"{problem.name} has {len(end.guess.primal)} variables; prices and sensitivities are made for at most {LARGEST}: "
+            "fewer intervals may help"
+        )
+    sharper = ipopt_for(problem, SHARP).run_from(problem, end.guess)
+    return _with_flat_lifts_held(_converged(problem, functions, sharper if sharper.success else end))
+
+
+def _converged(problem: GaitProblem, functions: KktFunctions, end: End) -> Optimum:
+    """Newton's method on the active rows, which change until all signs are right."""
+    guess = end.guess
+    w, p = guess.primal.copy(), np.append(problem.p, guess.width)
+    lam = np.concatenate([guess.rows, guess.bounds[: functions.model.variables]])
+    _, values, lower, upper = (column(part) for part in functions.values(w, p))
+    equation = upper - lower <= 0.0
+    side = np.where(lam > upper - values, 1, np.where(-lam > values - lower, -1, 0))
+    side[equation] = np.where(lam[equation] >= 0.0, 1, -1)
+    reason: str | None = "the set of active bounds did not settle"
+    residual, step = np.inf, None
+    for _ in range(ROUNDS):
+        active = np.flatnonzero(side)
+        lam[side == 0] = 0.0
+        gradient = column(functions.gradient(w, p, lam))
+        hessian, jacobian = (np.array(part) for part in functions.matrices(w, p, lam))
+        gap = (np.where(side > 0, upper, lower) - values)[active]
+        step = kkt_step(hessian, jacobian[active], -gradient, gap, functions.model.variables)
+        if not np.isfinite(step.w).all():
+            reason = "Newton's method diverged"
+            break
+        w, lam[active] = w + step.w, lam[active] + step.multipliers
+        _, values, lower, upper = (column(part) for part in functions.values(w, p))
+        wrong = (lam * side < -WEAK) & ~equation
+        beyond = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
+        if wrong.any() or beyond.any():
+            side = np.where(wrong, 0, side + beyond)
+            continue
+        gap = (np.where(side > 0, upper, lower) - values)[active]
+        slope = column(functions.gradient(w, p, lam))
+        residual = max(float(np.abs(slope).max()), float(np.abs(gap).max(initial=0.0)))
+        if residual <= RESIDUAL:
+            reason = step.reason
+            break
+    slack = np.minimum(upper - values, values - lower)
+    weak = np.where(side == 0, np.abs(slack) < WEAK, np.abs(lam) < WEAK) & ~equation
+    names = row_names(problem, functions)
+    return Optimum(
+        problem=problem,
+        functions=functions,
+        w=w,
+        width=guess.width,
+        multipliers=lam,
+        side=side,
+        weak=tuple(names[i] for i in np.flatnonzero(weak)),
+        residual=residual,
+        freedom=0 if step is None else step.freedom,
+        dependent=0 if step is None else step.dependent,
+        reason=reason,
+    )
+
+
+def _with_flat_lifts_held(found: Optimum) -> Optimum:
+    """Lifted variables that nothing holds, for no bound on them has a price, set to the values that they stand for.
+
+    The row that ties such a one to its value then counts as an equation, so that it follows x.
+    """
+    model, n = found.functions.model, found.functions.model.variables
+    if found.reason is not None or model.lifted == 0:
+        return found
+    hessian, jacobian = found.matrices
+    nothing = np.zeros(len(found.active))
+    flat = kkt_step(hessian, jacobian[found.active], np.zeros(len(found.w)), nothing, n).flat
+    loose = np.flatnonzero(flat[n:])
+    if not loose.size:
+        return found
+    w, side = found.w.copy(), found.side.copy()
+    w[n + loose] = column(model.lift_start(w[:n], *np.split(found.parameters, [-1])))[loose]
+    moved = replace(found, w=w)
+    values, lower, _ = moved.rows
+    first, last = len(model.row_names), len(model.row_names) + len(model.tie_upper)
+    ties = np.arange(first, last)
+    for j in loose:
+        own = ties[(jacobian[first:last, n + j] != 0.0) & (side[first:last] == 0)]
+        if own.size:
+            side[own[np.argmin((values - lower)[own])]] = -1
+    return replace(moved, side=side)
+
+
+def row_names(problem: GaitProblem, functions: KktFunctions) -> tuple[str, ...]:
+    """Names of all rows: the problem's, those that tie lifted variables, and the variables' bounds."""
+    ties = (f"lifted[{i}]" for i in range(len(functions.model.tie_upper)))
+    return (*functions.model.row_names, *ties, *(f"bounds[{name}]" for name in problem.names))

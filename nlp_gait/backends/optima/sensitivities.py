@@ -1,0 +1,156 @@
+"""How an optimum answers to its parameters and to another model: derivatives of the objective and of x*.
+
+The objective's derivative is that of the Lagrangian at fixed x* and multipliers (envelope theorem); x* moves by the linearised
+first-order conditions with the active bounds held (implicit function theorem).
+
+Source:
+    Fiacco (1983), Introduction to Sensitivity and Stability Analysis in Nonlinear Programming, theorem 3.2.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nlp_gait.backends.optima.kkt import column, kkt_functions, kkt_step
+from nlp_gait.backends.optima.optimum import WEAK, Optimum
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+
+# Dependent active rows may contradict each other by this share of a row's change.
+CONTRADICTION = 1e-6
+# A bound that is approached more slowly than this for each unit of a quantity is not approached.
+STILL = 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivities:
+    """Derivatives at an optimum, one column for each quantity that may change.
+
+    Attributes:
+        objective: (k,) of the optimal objective, in the problem's own sense.
+        x: (n, k) of x*.
+        defined: (k,) False where dependent active bounds contradict each other: no derivative exists.
+        reach: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes
+            active or an active one is let go: beyond it x* turns.
+    """
+
+    objective: Array
+    x: Array
+    defined: Array
+    reach: Array
+
+
+class _Change(NamedTuple):
+    """Derivatives at fixed w and multipliers, one column for each quantity: of cost, rows, their bounds, gradient of L."""
+
+    cost: Array
+    values: Array
+    lower: Array
+    upper: Array
+    gradient: Array
+
+
+def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
+    """Derivatives with respect to every parameter of the problem, in their order and units.
+
+    Raises:
+        InputError: the optimum has none, and why.
+    """
+    _require(optimum)
+    parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
+    cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
+    return _answer(optimum, _Change(cost[0], *others))
+
+
+def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
+    """Derivatives with respect to what the problem was built with, for example a robot's masses.
+
+    By central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
+    problems are evaluated, not solved. Of their own parameter values nothing is taken.
+
+    Args:
+        optimum: of the unchanged problem.
+        pairs: for each quantity the problem with more of it, with less of it, and the difference in that quantity.
+
+    Raises:
+        InputError: the optimum has no sensitivities, and why; another model has other constraints.
+    """
+    _require(optimum)
+    columns = []
+    for more, less, difference in pairs:
+        high, low = (_evaluated(optimum, problem) for problem in (more, less))
+        columns.append([(a - b) / difference for a, b in zip(high, low, strict=True)])
+    cost, *others = (np.array(part).T for part in zip(*columns, strict=True))
+    return _answer(optimum, _Change(cost, *others))
+
+
+def _evaluated(optimum: Optimum, problem: GaitProblem) -> _Change:
+    """What a change is the difference of, for another model at the same x, multipliers and parameter values."""
+    functions = kkt_functions(problem)
+    own, other, n = optimum.functions.model, functions.model, optimum.functions.model.variables
+    if own.row_names != other.row_names or own.lifted != other.lifted:
+        raise InputError(f"{problem.name}: the other model has other constraints; sensitivities need the same ones")
+    stretch = own.scale / other.scale  # its variables may be scaled to another range
+    w, lam = optimum.w.copy(), optimum.multipliers.copy()
+    w[:n] = (optimum.x - other.offset) / other.scale
+    lam[-n:] /= stretch
+    cost, values, lower, upper = (column(part) for part in functions.values(w, optimum.parameters))
+    gradient = column(functions.gradient(w, optimum.parameters, lam))
+    gradient[:n] *= stretch
+    for part in (values, lower, upper):  # x and its bounds are the same
+        part[-n:] = 0.0
+        part[~np.isfinite(part)] = 0.0
+    return _Change(cost[0], values, lower, upper, gradient)
+
+
+def _answer(optimum: Optimum, change: _Change) -> Sensitivities:
+    model, side, active = optimum.functions.model, optimum.side, optimum.active
+    hessian, jacobian = optimum.matrices
+    held = (change.values - np.where(side[:, None] > 0, change.upper, change.lower))[active]
+    step = kkt_step(hessian, jacobian[active], -change.gradient, -held, model.variables)
+    return Sensitivities(
+        objective=optimum.problem.objective.sign * (change.cost + optimum.multipliers[active] @ held),
+        x=model.scale[:, None] * step.w[: model.variables],
+        defined=step.inconsistent <= CONTRADICTION * np.maximum(1.0, np.abs(held).max(axis=0, initial=0.0)),
+        reach=_reach(optimum, change, jacobian @ step.w, step.multipliers),
+    )
+
+
+def _reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) -> Array:
+    """How far each quantity may change, down and up, before the set of active bounds does.
+
+    Args:
+        optimum: where it starts.
+        change: of rows and bounds at fixed w.
+        moved: (m, k) change of the rows by that of w.
+        multipliers: (a, k) change of the active rows' multipliers.
+    """
+    values, lower, upper = optimum.rows
+    inactive, active = optimum.side == 0, optimum.active
+    priced = np.abs(optimum.multipliers[active]) > WEAK
+    rate = change.values + moved
+    room = [
+        (upper - values)[inactive],
+        (values - lower)[inactive],
+        (optimum.multipliers * optimum.side)[active][priced],
+    ]
+    shrinks = [
+        (rate - change.upper)[inactive],
+        (change.lower - rate)[inactive],
+        -(optimum.side[active][:, None] * multipliers)[priced],
+    ]
+    distance, speed = np.maximum(np.concatenate(room), 0.0)[:, None], np.concatenate(shrinks)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.where(np.abs(speed) > STILL, distance / speed, np.inf)
+    up = np.where(at > 0.0, at, np.inf).min(axis=0, initial=np.inf)
+    down = np.where(at < 0.0, at, -np.inf).max(axis=0, initial=-np.inf)
+    return np.array([down, up])
+
+
+def _require(optimum: Optimum) -> None:
+    if optimum.reason is not None:
+        raise InputError(f"{optimum.problem.name}: no sensitivities at this point, for {optimum.reason}")

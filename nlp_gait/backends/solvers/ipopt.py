@@ -1,0 +1,216 @@
+"""IPOPT on a problem's NLP: one run from one start point, in stages of narrowing sigmoid width."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.interrupts import deferred_interrupts, never
+from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.solvers.derivatives import WORTHWHILE_STARTS, compiled_nlp, one_direction_at_a_time
+from nlp_gait.backends.solvers.ipopt_end import CONVERGED, End, Guess
+from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
+from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, TIME_IS_UP, IterationWatch
+from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.solution import Evaluations
+
+LOG = logging.getLogger("nlp_gait")
+
+# Sigmoid widths of the stages, in units of the switch (metres for a balance margin); each stage starts from the last one.
+# The narrower ones are tried only if the exact functions find the point infeasible.
+WIDTHS = (1e-2, 5e-4)
+NARROWER_WIDTHS = (1e-4, 2e-5)
+# Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
+# Over the 50 points of nao-ssp's swing heights 1e-5 takes 574 iterations, 1e-8 takes 138; over its durations 584 and 332.
+WARM_BARRIER = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class IpoptSettings:
+    """Settings of one IPOPT run.
+
+    Attributes:
+        tolerance: IPOPT's ``tol``.
+        iterations: limit of iterations for each stage.
+        time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
+        hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
+        compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
+            is a compiler.
+        linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is refused: IPOPT
+            never takes another one in its place.
+    """
+
+    tolerance: float = 1e-8
+    iterations: int = 300
+    time_limit_s: float = 300.0
+    hessian: str | None = None
+    compiled: bool | None = None
+    linear_solver: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what IPOPT would refuse late."""
+        if not 0.0 < self.tolerance < 1.0:
+            raise InputError(f"tolerance must be within (0, 1), got {self.tolerance}")
+        if self.iterations < 1 or not self.time_limit_s > 0.0:
+            raise InputError(
+                f"iterations and time_limit_s must be positive, got {self.iterations}, {self.time_limit_s}"
+            )
+        if self.hessian not in (None, "exact", "limited-memory"):
+            raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
+        if self.linear_solver not in (None, *LINEAR_SOLVERS):
+            raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
+
+
+class Ipopt:
+    """IPOPT for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only.
+
+    Attributes:
+        model: the NLP.
+        linear_solver: the one that IPOPT really uses.
+        compiled: whether it calls compiled functions.
+        create_s: time to generate derivatives and solvers, and to compile them [s].
+    """
+
+    def __init__(self, model: NlpModel, settings: IpoptSettings, *, long_derivatives: bool = False) -> None:
+        started = time.perf_counter()
+        self.linear_solver = linear_solver(settings.linear_solver)
+        self._time_limit_s = settings.time_limit_s
+        self._watch = IterationWatch(model.nlp)
+        options: dict[str, Any] = {
+            **QUIET,
+            "iteration_callback": self._watch,
+            "ipopt.mu_strategy": "adaptive",
+            "ipopt.tol": settings.tolerance,
+            "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits by what IPOPT relaxes them
+            "ipopt.max_iter": settings.iterations,
+            "ipopt.max_wall_time": settings.time_limit_s,
+            "ipopt.hessian_approximation": settings.hessian,
+            **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
+        }
+        self.model = model
+        self.compiled = bool(settings.compiled)
+        one_by_one = self.compiled and long_derivatives
+        with one_direction_at_a_time() if one_by_one else nullcontext():
+            nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
+        if self.compiled:
+            nlp, ready = compiled_nlp(self._cold, model.nlp, optimise=one_by_one)
+            options |= ready
+            self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
+        derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
+        if settings.hessian == "exact":
+            derivatives["hess_lag"] = "nlp_hess_l"
+        warm_options: dict[str, Any] = {
+            **options,
+            **{option: self._cold.get_function(name) for option, name in derivatives.items()},
+            "ipopt.mu_strategy": "monotone",
+            "ipopt.mu_init": WARM_BARRIER,
+            "ipopt.warm_start_init_point": "yes",
+            "ipopt.warm_start_bound_push": 1e-6,
+            "ipopt.warm_start_slack_bound_push": 1e-6,
+            "ipopt.warm_start_mult_bound_push": 1e-6,
+        }
+        self._warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
+        self.create_s = time.perf_counter() - started
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> End:
+        """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
+        z0 = (x0 - self.model.offset) / self.model.scale
+        widths = WIDTHS if self.model.smoothed else WIDTHS[-1:]
+        primal = np.concatenate([z0, np.array(self.model.lift_start(z0, problem.p, widths[0])).ravel()])
+        return self._stages(problem, {"x0": primal}, widths, stop, cold=True)
+
+    def run_from(self, problem: GaitProblem, guess: Guess, stop: Callable[[], bool] = never) -> End:
+        """The last stage alone, from the end of a neighbouring problem."""
+        start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
+        return self._stages(problem, start, WIDTHS[-1:], stop, cold=False)
+
+    def _stages(
+        self,
+        problem: GaitProblem,
+        start: dict[str, Array],
+        widths: tuple[float, ...],
+        stop: Callable[[], bool],
+        cold: bool,
+    ) -> End:
+        """Stages of a run. Where the caller does not ask to stop, Ctrl-C ends the iterations and is raised after them."""
+        model, exact, p, n = self.model, exact_model(problem), problem.p, self.model.variables
+        bounds = model.bounds(problem)
+        iterations, evaluations = 0, Evaluations()
+        started = time.perf_counter()
+        with deferred_interrupts() if stop is never else nullcontext(stop) as asked:
+            self._watch.begin(asked, started + self._time_limit_s)
+            for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
+                solver = self._cold if cold and stage == 0 else self._warm
+                result = solver(p=np.append(p, width), **start, **bounds)
+                stats = solver.stats()
+                iterations += int(stats["iter_count"])
+                evaluations += _counts(stats)
+                z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
+                start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
+                status = self._watch.reason or str(stats["return_status"])
+                if stage + 1 < len(widths) and status not in (INTERRUPTED, TIME_IS_UP):
+                    continue
+                x = np.clip(model.offset + model.scale * z[:n], problem.lower, problem.upper)
+                cost, violation = (float(value) for value in exact.function(x, p)[:2])
+                if status not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
+                    break
+        if stop is never and asked():
+            raise KeyboardInterrupt
+        return End(
+            x=x,
+            cost=cost,
+            violation=violation,
+            row_multipliers=rows[: len(model.row_names)],
+            bound_multipliers=multipliers[:n],
+            return_status=status,
+            iterations=iterations,
+            evaluations=evaluations,
+            time_s=time.perf_counter() - started,
+            guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
+        )
+
+
+def ipopt_for(problem: GaitProblem, settings: IpoptSettings, solves: int = 1) -> Ipopt:
+    """IPOPT for a problem, made once for all its copies.
+
+    Args:
+        problem: any copy.
+        settings: where the problem has a say, None.
+        solves: how many are planned, which decides whether compiling pays if the settings leave it open.
+
+    Raises:
+        CompilerError: compiled functions are demanded, and there is no compiler or it fails.
+    """
+    worthwhile = problem.long_derivatives or solves >= WORTHWHILE_STARTS
+    compiled = worthwhile if settings.compiled is None else settings.compiled
+    chosen = replace(settings, hessian=settings.hessian or problem.hessian, compiled=compiled)
+
+    def make() -> Ipopt:
+        return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
+
+    try:
+        return problem.built(f"ipopt {chosen}", make)
+    except CompilerError as error:
+        if settings.compiled:
+            raise
+        LOG.warning("IPOPT's functions are interpreted: %s", error)
+        return ipopt_for(problem, replace(settings, compiled=False))
+
+
+def _counts(stats: Mapping[str, int]) -> Evaluations:
+    return Evaluations(
+        f=int(stats.get("n_call_nlp_f", 0)),
+        g=int(stats.get("n_call_nlp_g", 0)),
+        gradient=int(stats.get("n_call_nlp_grad_f", 0)),
+        jacobian=int(stats.get("n_call_nlp_jac_g", 0)),
+        hessian=int(stats.get("n_call_nlp_hess_l", 0)),
+    )

@@ -1,0 +1,1 @@
+"""What a gait problem is."""

@@ -1,0 +1,228 @@
+"""NAO's single support phase: least mean power (Gupta, Pratihar, Deb 2023, sections 3.1 and 4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from casadi import MX, SX, fmax, vertcat
+
+from nlp_gait.problem.gait_problem import GaitProblem, Variable
+from nlp_gait.problems.nao.body import (
+    GRAVITY,
+    LEAST_DURATION,
+    leg_joints,
+    nao,
+    upright_links,
+)
+from nlp_gait.problems.nao.curve_limits import Criterion, Swing, with_motion
+from nlp_gait.problems.nao.curves import (
+    Splines,
+    Trajectory,
+    arm_motions,
+    hip_and_arm_units,
+    hip_on_spline,
+    motion_options,
+    samples_in_interval,
+)
+from nlp_gait.problems.nao.legs import check_step_length, hip_variables, leg_geometry
+from nlp_gait.problems.nao.limits import phase_problem
+from nlp_gait.problems.nao.motors import motor_options, with_motors
+from nlp_gait.problems.nao.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.balance import zmp_of_wrench
+from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, plus, stack
+
+# Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
+MEAN_DBM_SHARES = (1 / 3, 1 / 4)
+ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
+    "LShoulderPitch": (2.0, 1.0),
+    "LElbowRoll": (-0.42, -0.64),
+    "RShoulderPitch": (1.0, 2.0),
+    "RElbowRoll": (0.64, 0.42),
+}
+
+# Curves that can be splines; the swing foot stays on its line across the walking direction.
+UNITS = hip_and_arm_units(ARM_SWING) | {"foot_x": "m", "foot_z": "m"}
+
+OWN_VARIABLES = (
+    Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
+    Variable(name="single_support_time_s", unit="s", lower=0.4, upper=4.0, description="x9"),
+)
+
+
+def nao_ssp(
+    *,
+    robot: str = "nao-v5",
+    intervals: int = 10,
+    derivatives: Derivatives = "analytic",
+    rotational_inertia: bool = True,
+    step_length_m: float = 0.06,
+    samples_per_interval: int = 0,
+    trajectory: Trajectory = "cubic",
+    objective: Criterion = "power",
+    motors: str = "",
+) -> GaitProblem:
+    """Single support of NAO.
+
+    Args:
+        robot: name or file of the robot.
+        intervals: equal parts of the phase over which torques may change by the limit.
+        derivatives: analytic, or finite differences of the sampled angles as in the paper.
+        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
+        step_length_m: from foot to foot; the swing foot moves by twice as much.
+        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
+            cubics, 4 with splines, which would else bend between the samples.
+        trajectory: of hip, swing foot and arms: the paper's cubics, or more coefficients on top of them.
+        objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
+        motors: what of the real motors is taken into account, separated by commas, see ``nao_motors``; nothing by default.
+    """
+    check_step_length(step_length_m)
+    model = nao(robot, rotational_inertia)
+    foot = model.feet["left"]
+    stance = stance_of(model, step_length_m)
+    own = (*hip_variables(model), *OWN_VARIABLES)
+    splines = Splines(trajectory=trajectory, units=UNITS, first=len(own))
+    variables = (*own, *splines.variables)
+    samples = samples_in_interval(trajectory, samples_per_interval)
+    phase = Phase(
+        robot=model,
+        variables=len(variables),
+        duration="single_support_time_s",
+        plan=single_support_plan(model, stance, splines),
+        loads=single_support_loads(model),
+        intervals=intervals,
+        samples_per_interval=samples,
+        derivatives=derivatives,
+    )
+    problem = phase_problem(
+        name="nao-ssp",
+        title="NAO, single support: least mean power",
+        variables=variables,
+        phase=phase,
+        margins=lambda zmp, ops: single_support_margins(zmp, stance.support_xy, foot, ops),
+        mean_dbm_m=single_support_mean_margins(foot),
+        make=nao_ssp,
+        options={
+            "robot": robot,
+            "intervals": intervals,
+            "derivatives": derivatives,
+            "rotational_inertia": rotational_inertia,
+            "step_length_m": step_length_m,
+            **motion_options(trajectory, objective, samples),
+            **motor_options(motors),
+        },
+    )
+
+    def arms(x: SX, s: SX) -> dict[str, Motion]:
+        duration = single_support_duration(x)
+        return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
+
+    def path(x: SX, s: SX) -> SX:
+        return _swing(x, stance, splines.motions(x, single_support_duration(x), s), 0.0, s).position
+
+    swing = Swing(path, sum(stance.swing_x) / 2, "swing_height_m")
+    moved = with_motion(problem, phase, splines, objective, arms, swing)
+    return with_motors(moved, phase, motors)
+
+
+class Stance(NamedTuple):
+    """Where the left foot stands, and paths of the right foot and of the hip [m]."""
+
+    support_xy: tuple[float, float]
+    swing_x: tuple[float, float]
+    swing_y: float
+    hip_x: tuple[float, float]
+    hip_y: tuple[float, float]
+
+
+def stance_of(robot: Robot, step: float) -> Stance:
+    """Each foot below its own hip joint, the hip halfway to the supporting one (section 4.1, Table 3)."""
+    left, right = (leg_geometry(robot, side).hip_m[1] for side in "LR")
+    return Stance((step, left), (0.0, 2 * step), right, (step / 2, 1.5 * step), (left / 2, left / 2))
+
+
+def single_support_mean_margins(foot: Foot) -> tuple[float, float]:
+    """Least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
+    along, across = MEAN_DBM_SHARES
+    return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
+
+
+def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Planner:
+    """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
+    ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
+
+    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
+        duration = single_support_duration(x)
+        more = splines.motions(x, duration, phase)
+        hip = hip_on_spline(x, more, stance.hip_x, stance.hip_y, duration, phase)
+        support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
+        swing = _swing(x, stance, more, ankle_heights[1], phase)
+        left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
+        right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
+        return Plan(
+            joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
+            hip=hip.position,
+            ankles={"L": support.position, "R": swing.position},
+            reach=vertcat(left_reach, right_reach),
+        )
+
+    return plan
+
+
+def single_support_duration(x: SX) -> SX:
+    """Time of the phase [s] from x (n,), never zero."""
+    return fmax(x[8], LEAST_DURATION)
+
+
+def _swing(x: SX, stance: Stance, more: Mapping[str, Motion], ankle_height: float, phase: SX) -> Motion:
+    """Motion of the right ankle (3,) [m]: the paper's, and what its curves add."""
+    duration = single_support_duration(x)
+    swing = swing_foot(
+        SX(stance.swing_x[0]), SX(stance.swing_x[1]), stance.swing_y, ankle_height, x[7], duration, phase
+    )
+    return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
+
+
+def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
+    """Motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
+    forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
+    rise = parabola_lift(forward, start_x, end_x, lift)
+    return stack(forward, constant(y), rise._replace(position=rise.position + ankle_height))
+
+
+def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -> Loader:
+    """Torques of the whole tree from the left foot, which supports it, and the ZMP from the ground's wrench on that foot.
+
+    Args:
+        robot: with links welded that never move.
+        upright: links that never turn; None for those of a robot whose torso is upright and whose soles are flat.
+    """
+    foot = robot.feet["left"]
+    tree, upright = tree_from(robot, foot.link), upright_links(robot) if upright is None else upright
+
+    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:
+        q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
+        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
+        offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
+        return Loads(torques, feet["L"] + offset)
+
+    return loads
+
+
+def single_support_margins(zmp: MX, support_xy: tuple[float, float], foot: Foot, ops: Nonsmooth) -> tuple[MX, MX]:
+    """Balance margins in x and y, (1, N + 1) each [m].
+
+    In x the distance to the sole's edge on that side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.
+    Outside the sole the paper's zero is continued below zero, so that an infeasible gait says how far outside it is.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (21), (22).
+    """
+    x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
+    dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
+    dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T
+    return dbm_x, dbm_y

@@ -1,0 +1,1 @@
+"""A biped of nine links with toes that climbs stairs."""

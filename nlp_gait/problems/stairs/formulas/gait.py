@@ -1,0 +1,205 @@
+"""Planned motion of swing foot and hip on stairs: double support about toe and sole, Bezier bridge, cycloid, arc of the hip.
+
+A step has four phases. Time enters as the four fractions of them that have passed, so a formula holds in every phase
+without a branch: fractions of later phases are zero, of earlier ones one. Origin: the rear ankle at the start.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from nlp_gait.problems.stairs.formulas.profile import Stair
+from nlp_gait.symbolic.trajectories import Motion
+
+PHASES = ("heel rises", "sole rises", "catch the cycloid", "track the cycloid")
+LEAST_DURATION = 1e-3  # [s]
+# Newton steps for the cycloid's first angle; from the cube root as guess, five reach machine precision.
+_NEWTON_STEPS = 6
+# Flat stairs begin their cycloid at its first point, where the root has no slope: at 2e-5 rad instead.
+_LEAST_CYCLOID_ARGUMENT = 1e-15
+# Keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2].
+_LEAST_ROOT_SQUARED = 1e-6
+# Time passes t3 only in plans whose knots are out of order; by more than this it does not drive the hip further [s].
+_LATEST = 1.0
+
+
+class StairPlan(NamedTuple):
+    """Governing parameters of a step (Tables III and IV).
+
+    Attributes:
+        hip_height: z_Ci, of the hip above the rear ankle at the start [m].
+        hip_start: x of the hip at the start, from the rear ankle [m].
+        zmp_start: planned ZMP at the start, from the rear ankle [m].
+        zmp_end: planned ZMP at the end, from the stance ankle [m].
+        end_rate: rate of the cycloid's angle at the end [rad/s].
+        torso_pitch: from the forward axis, counter-clockwise [rad].
+        t1: end of the first phase [s].
+        t2: end of the double support [s].
+        t_bc: end of the Bezier bridge [s].
+        foot_pitch: upward pitch of the foot while it tracks the cycloid [rad].
+        t3: end of the step [s].
+        sole_angle: theta_a, largest angle of the sole [rad].
+        toe_angle: theta_b, of the toe at the end of the double support [rad].
+        catch_angle: Delta theta_c0, half of what the bridge covers on the cycloid [rad].
+    """
+
+    hip_height: SX
+    hip_start: SX
+    zmp_start: SX
+    zmp_end: SX
+    end_rate: SX
+    torso_pitch: SX
+    t1: SX
+    t2: SX
+    t_bc: SX
+    foot_pitch: SX
+    t3: SX
+    sole_angle: SX
+    toe_angle: SX
+    catch_angle: SX
+
+    @property
+    def durations(self) -> SX:
+        """(4,) of the phases [s]; a phase of no or negative duration counts as a millisecond."""
+        ends = ca.vertcat(0, self.t1, self.t2, self.t_bc, self.t3)
+        return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
+
+
+class Foot(NamedTuple):
+    """Lengths of a foot: ankle to sole joint, sole joint to tip of the toe [m]."""
+
+    sole: float
+    toe: float
+
+
+def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
+    """Angles of sole and toe, theta_6 and theta_7 [rad], from the fractions s (4,) of the phases.
+
+    In the air the foot straightens and pitches up by ``foot_pitch``, and lands as it left: toe first.
+
+    Source:
+        Bhardwaj et al., eqs. (3), (4), with (t - t1) / (t2 - t1) as argument of the second piece: as printed they are
+        continuous only if t2 = 2 t1. In the air eq. (20) holds theta_6 = 0 and theta_7 = theta_b, with which the toe cuts
+        through the edge of both steps; eqs. (15)-(18) have a straight foot.
+    """
+    straight = _smooth(s[2]) - s[3] ** 4 * (5 - 4 * s[3])
+    sole = plan.sole_angle * (_smooth(s[0]) - _smooth(s[1]))  # (eq. 3)
+    toe = plan.toe_angle * _smooth(s[1])  # (eq. 4)
+    return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
+
+
+def ankle_on_toe(foot: Foot, sole: SX, toe: SX) -> SX:
+    """(2,) ankle from where it is with the foot flat [m], while the tip of the toe stands still.
+
+    Source:
+        Bhardwaj et al., eqs. (1), (2).
+    """
+    return ca.vertcat(
+        foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
+        foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)
+    )
+
+
+def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
+    """Angles of sole and toe of the foot that landed last [rad], during the next step's double support.
+
+    They go the rear foot's way backwards in time: about the tip of the toe, then about the sole; ``ankle_on_toe`` has the
+    ankle.
+
+    Args:
+        plan: of the next step.
+        s: (4,) fractions of the next step's phases.
+    """
+    first, second = ca.vertsplit(plan.durations[:2])
+    remaining = first * (1 - s[0]) + second * (1 - s[1])
+    back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
+    return foot_angles(plan, back)
+
+
+def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
+    """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
+
+    Source:
+        Bhardwaj et al., eqs. (1), (2), (5)-(14). Changed: the Bezier curve has its binomial factors, its third control point
+        lies on the cycloid's tangent and its argument is 2 u^2 - u^3, so that the velocity is continuous at both ends; the
+        cycloid ends so far ahead that the foot, once flat, stands exactly two treads on. Where pi r is less than the distance
+        the printed foot slides along the ground first, into the edge of the step; here the cycloid is stretched instead.
+    """
+    rising = ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
+    lift_off = ankle_on_toe(foot, SX(0), plan.toe_angle)
+    radius = stair.rise  # half of the double rise
+    distance = 2 * stair.tread
+    # A stair flatter than 2 / pi stretches the cycloid over the whole distance.
+    width = ca.fmax(radius, distance / ca.pi)
+    first = _first_cycloid_angle(ca.pi - distance / width)
+    caught = first + 2 * plan.catch_angle
+
+    def cycloid(angle: SX) -> SX:
+        x = distance + width * (angle - ca.sin(angle) - ca.pi)  # (eqs. 5, 7)
+        return lift_off + ca.vertcat(x, radius * (1 - ca.cos(angle)))  # (eq. 6)
+
+    p1, p4 = lift_off, cycloid(caught)
+    p2 = lift_off + ca.vertcat(0, radius * (1 - ca.cos(first)))  # (eqs. 8, 9)
+    p3 = p4 - plan.catch_angle * ca.vertcat(width * (1 - ca.cos(caught)), radius * ca.sin(caught))
+    b = s[2] ** 2 * (2 - s[2])
+    bridge = (1 - b) ** 3 * p1 + 3 * (1 - b) ** 2 * b * p2 + 3 * (1 - b) * b**2 * p3 + b**3 * p4  # (eqs. 10, 11)
+
+    # Angle of the cycloid: cubic from the bridge's end velocity to the end rate (eqs. 12-14).
+    _, _, bridge_time, track_time = ca.vertsplit(plan.durations)
+    start_rate = 3 * plan.catch_angle / bridge_time
+    v0, v1, rise = start_rate * track_time, plan.end_rate * track_time, ca.pi - caught
+    c = s[3]
+    angle = caught + c * (v0 + c * (3 * rise - 2 * v0 - v1 + c * (v0 + v1 - 2 * rise)))
+    return rising + (bridge - p1) + (cycloid(angle) - p4)
+
+
+def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX) -> SX:
+    """(2,) position of the hip [m], from the fractions s (4,) of the phases.
+
+    Source:
+        Bhardwaj et al., eqs. (21)-(26), with the arc of (25) as z_Ci + R - sqrt(R^2 - (x - x_start)^2): as printed it does
+        not pass through its own ends.
+    """
+    t = ca.dot(plan.durations, s)
+    rate = ca.sqrt(gravity / plan.hip_height)  # (eq. 24)
+    planned_rise = stair.tread + plan.zmp_end - plan.zmp_start
+    a2, a3 = 3 * planned_rise / plan.t3**2, -2 * planned_rise / plan.t3**3  # (eq. 26)
+
+    def particular(time: SX) -> SX:
+        return plan.zmp_start + a2 * time**2 + a3 * time**3 + (6 * a3 * time + 2 * a2) / rate**2  # (eq. 23)
+
+    start = plan.hip_start - particular(SX(0))
+    end = plan.hip_start + stair.tread - particular(plan.t3)
+    # C1 exp(w t) + C2 exp(-w t), written so that neither exponential is large.
+    fading = ca.exp(-rate * plan.t3)
+    ahead = (end - start * fading) / (1 - fading**2)
+    behind = (start - end * fading) / (1 - fading**2)
+    x = particular(t) + ahead * ca.exp(rate * ca.fmin(t - plan.t3, _LATEST)) + behind * ca.exp(-rate * t)
+
+    arc = 2 * ca.atan2(stair.rise, stair.tread)
+    radius = stair.tread / ca.sin(arc)
+    root = ca.sqrt(ca.fmax(radius**2 - (x - plan.hip_start) ** 2, _LEAST_ROOT_SQUARED))
+    return ca.vertcat(x, plan.hip_height + radius - root)  # (eq. 25)
+
+
+def in_time(position: SX, s: SX, rates: SX) -> Motion:
+    """Motion of a position that depends on the fractions s (4,), which pass at constant ``rates`` (4,) [1/s]."""
+    velocity = ca.jtimes(position, s, rates)
+    return Motion(position, velocity, ca.jtimes(velocity, s, rates))
+
+
+def _smooth(s: SX) -> SX:
+    """Cubic from 0 to 1 at rest at both ends."""
+    return s**2 * (3 - 2 * s)
+
+
+def _first_cycloid_angle(m: SX) -> SX:
+    """Root of theta - sin theta = m by Newton's method; all but 0 where m is negative (eq. 7)."""
+    m = ca.fmax(m, _LEAST_CYCLOID_ARGUMENT)
+    theta = (6 * m) ** (1 / 3)
+    for _ in range(_NEWTON_STEPS):
+        theta = theta - (theta - ca.sin(theta) - m) / (1 - ca.cos(theta))
+    return theta

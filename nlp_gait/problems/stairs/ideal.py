@@ -1,0 +1,184 @@
+"""Climbing one step at least effort: full trajectory optimisation, the floor under every planner and controller."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem.blocks import Block, Layout
+from nlp_gait.problem.gait_problem import Array, GaitProblem, Objective, Parameter, Signals
+from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
+from nlp_gait.problems.stairs.ideal_model import IdealModel
+from nlp_gait.problems.stairs.ideal_start import planned_angles
+from nlp_gait.problems.stairs.stair import ANGLE_LIMITS, STAIR_PARAMETERS, joint_signals, values_of
+
+RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
+FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
+# Shares of the step's time: the rear sole lifts at t1 = 0.5 s, the toe at t2 = 1.4 s of 3.5 s (Table III).
+SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
+# A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
+NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
+
+PARAMETERS = (
+    *STAIR_PARAMETERS,
+    Parameter(name="step_time_s", unit="s", default=3.5, description="t3, time of the step", minimum=0.1),
+    Parameter(
+        name="torque_weight", unit="1/(N m)^2/s", default=0.01, description="cost of squared torque", minimum=0.0
+    ),
+    Parameter(
+        name="acceleration_weight",
+        unit="s^3/rad^2",
+        default=1e-3,
+        description="cost of squared link acceleration",
+        minimum=0.0,
+    ),
+    Parameter(name="friction", unit="1", default=0.6, description="mu below the rear foot", minimum=0.0),
+    Parameter(
+        name="stance_friction",
+        unit="1",
+        default=10.0,
+        description="mu below the stance foot; the default does not bind",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
+    ),
+    Parameter(
+        name="zmp_margin_m",
+        unit="m",
+        default=0.0,
+        description="least distance of the stance foot's ZMP from its ends",
+        minimum=0.0,
+        maximum=0.08,
+    ),
+    Parameter(
+        name="clearance_m",
+        unit="m",
+        default=-0.002,
+        description="least height of foot points above the smoothed stair",
+    ),
+)
+
+
+def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
+    """Trajectory optimisation of one step.
+
+    States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
+    accelerations and the ground's forces on sole and toe of the rear foot.
+
+    Args:
+        intervals: equal parts of the step.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
+    """
+    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 10:
+        raise InputError(f"intervals must be a whole number >= 10, got {intervals!r}")
+    sole_off, toe_off = round(SOLE_SHARE * intervals), round(TOE_SHARE * intervals)
+    layout = _layout(intervals, sole_off, toe_off)
+    model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off)
+
+    def start(p: Array, rng: np.random.Generator) -> Array:
+        return _start(layout, intervals, values_of(PARAMETERS, p), rng)
+
+    def signals(x: Array, p: Array) -> Signals:
+        values = layout.values(x)
+        step_time = values_of(PARAMETERS, p)["step_time_s"]
+        loads = model.loads_at(values)
+
+        def held(columns: Array) -> Array:
+            """What holds during an interval, at its first instant; the last instant repeats the last interval."""
+            return np.concatenate([columns, columns[:, -1:]], axis=1).T
+
+        return Signals(
+            joints=JOINTS,
+            arrays={
+                "t": np.linspace(0.0, step_time, intervals + 1),
+                **joint_signals(values["angle"].T, values["rate"].T, held(values["acceleration"])),
+                "tau": held(loads.torque),
+                "stance_force": held(loads.stance_force),
+                "zmp": held(loads.stance_pressure)[:, 0],
+            },
+        )
+
+    return GaitProblem(
+        name="stairs-ideal",
+        title="Stairs, full trajectory optimisation: least effort",
+        options={"intervals": intervals},
+        variables=layout.variables,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="effort", unit="1"),
+        assemble=model.assemble,
+        signals=signals,
+        start=start,
+        starts=3,
+        searchable=False,
+    )
+
+
+def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
+    """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
+    links = len(MOVING)
+
+    def force(point: str, columns: int) -> Block:
+        return Block(
+            quantity=f"{point}_force",
+            unit="N",
+            rows=("x", "z"),
+            columns=columns,
+            limits=FORCE_LIMITS,
+            description=f"force of the ground on the rear {point} along",
+        )
+
+    return Layout(
+        blocks=(
+            Block(
+                quantity="angle",
+                unit="rad",
+                rows=MOVING,
+                columns=intervals + 1,
+                limits=tuple(ANGLE_LIMITS[link] for link in MOVING),
+                description="absolute angle of link",
+            ),
+            Block(
+                quantity="rate",
+                unit="rad/s",
+                rows=MOVING,
+                columns=intervals + 1,
+                limits=((-RATE_LIMIT, RATE_LIMIT),) * links,
+                description="rate of link",
+            ),
+            Block(
+                quantity="acceleration",
+                unit="rad/s^2",
+                rows=MOVING,
+                columns=intervals,
+                limits=((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * links,
+                description="acceleration of link",
+            ),
+            force("toe", toe_off),
+            force("sole", sole_off),
+        )
+    )
+
+
+def _start(layout: Layout, intervals: int, values: dict[str, float], rng: np.random.Generator) -> Array:
+    """Planned angles with noise, rates and accelerations by differences, a share of the weight behind."""
+    tread = values["stair_length_m"] / 2
+    angle = planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
+    angle += NOISE * rng.standard_normal(angle.shape)
+    step = values["step_time_s"] / intervals
+    rate = np.gradient(angle, step, axis=1)
+    blocks = {block.quantity: block for block in layout.blocks}
+    return layout.join(
+        {
+            "angle": angle,
+            "rate": rate,
+            "acceleration": np.diff(rate, axis=1) / step,
+            "toe_force": np.tile([[0.0], [TOE_LOAD]], blocks["toe_force"].columns),
+            "sole_force": np.tile([[0.0], [SOLE_LOAD]], blocks["sole_force"].columns),
+        }
+    )

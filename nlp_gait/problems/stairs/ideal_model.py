@@ -1,0 +1,209 @@
+"""Objective and constraints of ``stairs-ideal``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.problem.blocks import Layout, labels
+from nlp_gait.problem.gait_problem import Array, Assembly, Constraint, Point
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, Loads, link_angles, loads
+from nlp_gait.problems.stairs.formulas.planar_biped import points
+from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
+from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.stair import GRAVITY, KNEE_LIMITS, KNEES, SETBACK, knee_angles, stair_of
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
+AXES = ("x", "z")
+
+
+class Places(NamedTuple):
+    """Points of the swing leg at every instant [m]: each (2, N + 1), origin at the stance ankle; heights above the stair."""
+
+    toe: MX
+    sole: MX
+    ankle: MX
+    hip: MX
+    heights: MX  # (3, N + 1), in the order toe, sole, ankle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class IdealModel:
+    """Mathematics of one step.
+
+    Attributes:
+        layout: of the variables.
+        intervals: N, equal parts of the step.
+        sole_off: number of intervals in which the rear sole bears.
+        toe_off: number of intervals in which the rear toe bears: the double support.
+    """
+
+    layout: Layout
+    intervals: int
+    sole_off: int
+    toe_off: int
+
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
+        """Objective and constraints; everything is smooth."""
+        x = self.layout.split(point)
+        step = point["step_time_s"] / self.intervals
+        torque, stance, pressure = self._loads(x)
+        effort = point["torque_weight"] * ca.sumsqr(torque)
+        effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
+        rate = DM(JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
+        return Assembly(
+            objective=step * effort,
+            constraints=(
+                *self._motion(x, step),
+                *self._feet(x, point),
+                *self._ground(x, stance, pressure, point),
+                _limits("knee", knee_angles(x["angle"]), tuple(KNEES), range(self.intervals + 1), KNEE_LIMITS),
+            ),
+            indexes={
+                "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
+                "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
+                "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0],
+            },
+        )
+
+    def loads_at(self, values: Mapping[str, Array]) -> Loads[Array]:
+        """Torques, stance force and its centre of pressure in every interval, from numbers: columns are intervals."""
+        symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
+        return Loads(*(np.array(ca.evalf(part)) for part in symbolic))
+
+    def _loads(self, x: Mapping[str, MX]) -> Loads[MX]:
+        n = self.intervals
+        toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
+        return Loads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
+
+    @cached_property
+    def _interval(self) -> ca.Function:
+        q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
+        toe, sole = SX.sym("toe", 2), SX.sym("sole", 2)
+        found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
+        return ca.Function("loads", [q, qd, qdd, toe, sole], ca.cse(list(found)))
+
+    @cached_property
+    def _instant(self) -> ca.Function:
+        q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
+        found = points(load_biped().rods, link_angles(q), SX(2, 1))
+        swing = [found[name] for name in "TSA"]
+        stair = Stair(size[0], size[1])
+        heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in swing]
+        return ca.Function("places", [q, size], ca.cse([*swing, found["H"], ca.vertcat(*heights)]))
+
+    def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
+        """Quantised dynamics (eqs. 44, 45), rest at both ends, a still torso."""
+        n = self.intervals
+        q, v, a = x["angle"], x["rate"], x["acceleration"]
+        rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
+        angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
+        steps = range(1, n + 1)
+        torso = v[MOVING.index("UH"), 1:n]
+        return (
+            _equal("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
+            _equal("angle_continuity", angles, MOVING, steps, "rad", 0.1),
+            _equal("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0),
+            _equal("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
+        )
+
+    def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Where the swing foot stands, and how far it stays above the stair."""
+        n, lift = self.intervals, self.toe_off
+        stair = stair_of(point)
+        size = ca.vertcat(stair.tread, stair.rise)
+        q = x["angle"]
+        places = Places(*self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1)))
+        flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
+        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(load_biped().foot_m, 0) - size, 1, lift)
+        ends = ca.horzcat(places.ankle[:, 0] + size, places.ankle[:, n] - size)
+        advance = places.hip[:, n] - places.hip[:, 0] - size
+        in_support, in_swing = range(lift), range(lift + 1, n + 1)
+
+        def above(name: str, heights: MX, rows: tuple[str, ...], instants: range) -> Constraint:
+            return Constraint(
+                name=name,
+                labels=labels(rows, instants),
+                unit="m",
+                scale=0.01,
+                value=ca.vec(heights),
+                lower=point["clearance_m"],
+            )
+
+        return (
+            _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
+            _equal("toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1),
+            _equal("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
+            _equal("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
+            _equal("hip_advance", advance, AXES, (n,), "m", 0.01),
+            above("clearance_in_support", places.heights[1:, :lift], ("sole", "ankle"), in_support),
+            above("clearance_in_swing", places.heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
+        )
+
+    def _ground(self, x: Mapping[str, MX], stance: MX, pressure: MX, point: Point) -> tuple[Constraint, ...]:
+        """Friction, load and centre of pressure."""
+        intervals = range(self.intervals)
+        margin = point["zmp_margin_m"]
+        return (
+            _friction("friction_toe", x["toe_force"], point["friction"]),
+            _friction("friction_sole", x["sole_force"], point["friction"]),
+            _friction("friction_stance", stance, point["stance_friction"]),
+            Constraint(
+                name="stance_load",
+                labels=labels(("z",), intervals),
+                unit="N",
+                scale=100.0,
+                value=stance[1, :].T,
+                lower=point["least_stance_force_N"],
+            ),
+            Constraint(
+                name="stance_zmp",
+                labels=labels(("x",), intervals),
+                unit="m",
+                scale=0.01,
+                value=pressure.T,
+                lower=margin,
+                upper=load_biped().foot_m - margin,
+            ),
+        )
+
+
+def _equal(
+    name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
+) -> Constraint:
+    """Rows value == 0."""
+    return Constraint(
+        name=name, labels=labels(rows, columns), unit=unit, scale=scale, value=ca.vec(value), lower=MX(0), upper=MX(0)
+    )
+
+
+def _limits(name: str, value: MX, rows: tuple[str, ...], columns: range, limits: tuple[float, float]) -> Constraint:
+    return Constraint(
+        name=name,
+        labels=labels(rows, columns),
+        unit="rad",
+        scale=0.1,
+        value=ca.vec(value),
+        lower=MX(limits[0]),
+        upper=MX(limits[1]),
+    )
+
+
+def _friction(name: str, force: MX, coefficient: MX) -> Constraint:
+    """|F_x| <= mu F_z as two rows."""
+    grip = coefficient * force[1, :]
+    return Constraint(
+        name=name,
+        labels=labels(("forward", "backward"), range(force.shape[1])),
+        unit="N",
+        scale=100.0,
+        value=ca.vec(ca.vertcat(grip - force[0, :], grip + force[0, :])),
+        lower=MX(0),
+    )

@@ -1,0 +1,161 @@
+"""A planned step, sampled phase by phase: posture, torques, ground force and clearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.problem.gait_problem import Array, Point
+from nlp_gait.problems.stairs.formulas.gait import PHASES, StairPlan
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
+from nlp_gait.problems.stairs.formulas.planar_biped import points
+from nlp_gait.problems.stairs.formulas.posture import Posture, posture
+from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
+from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
+from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
+# The swing foot is checked against the stair this often per interval, and not while the toe leaves or meets the ground.
+CLEARANCE_DENSITY = 4
+GROUND_SHARE = 0.1
+
+
+class Samples(NamedTuple):
+    """A step at its samples; columns are samples, both ends of each phase included.
+
+    Attributes:
+        time: (1, m) [s].
+        q: (7, m) link angles in the order of MOVING [rad], qd and qdd their derivatives.
+        qd: (7, m) [rad/s].
+        qdd: (7, m) [rad/s^2].
+        reach: (2, m) cosines of swing and stance knee.
+        torque: (7, m) of the joints [Nm], in the order of JOINTS.
+        power: (7, m) of the joints [W], signed.
+        stance_force: (2, m) of the ground on the stance foot [N].
+        stance_pressure: (1, m) its centre ahead of the stance ankle [m].
+        zmp: (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m].
+        hip: (2, m) [m].
+        ankle: (2, m) of the swing leg [m].
+    """
+
+    time: MX
+    q: MX
+    qd: MX
+    qdd: MX
+    reach: MX
+    torque: MX
+    power: MX
+    stance_force: MX
+    stance_pressure: MX
+    zmp: MX
+    hip: MX
+    ankle: MX
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedStep:
+    """Per-sample functions of a planned step and where they are evaluated.
+
+    Attributes:
+        per_phase: equal parts of each phase.
+    """
+
+    per_phase: int
+
+    @cached_property
+    def grid(self) -> tuple[Array, Array]:
+        """Fractions of the phases and the phase that passes, (4, m) each, at the samples."""
+        return phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
+
+    @cached_property
+    def clearance_grid(self) -> tuple[Array, Array]:
+        """The same where the swing foot is checked against the stair."""
+        fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
+        return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
+
+    def samples(self, point: Point, ops: Nonsmooth) -> Samples:
+        """The step at all samples."""
+        s, passing = self.grid
+        return Samples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
+
+    def clearances(self, point: Point, ops: Nonsmooth) -> MX:
+        """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
+        return self._mapped(clearance_function(ops), point, *self.clearance_grid)
+
+    def _mapped(self, function: ca.Function, point: Point, s: Array, passing: Array, *more: MX) -> MX:
+        stair = stair_of(point)
+        constants = (governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
+        columns = s.shape[1]
+        return function.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in constants))
+
+
+def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
+    """Fractions s (4, m) of all phases, and the phase that passes as a column with a single one (4, m).
+
+    Args:
+        fractions: for each phase the fractions of it at which to sample.
+    """
+    s = [np.repeat([[float(j < i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
+    passing = [np.repeat([[float(j == i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
+    for i, part in enumerate(fractions):
+        s[i][i] = part
+    return np.hstack(s), np.hstack(passing)
+
+
+def sample_function(ops: Nonsmooth) -> ca.Function:
+    """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``Samples``.
+
+    The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
+    """
+    inputs, plan, stair, step = _planned(ops)
+    rear_share = SX.sym("rear_share")
+    s = inputs[0]
+    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
+    toe = SX.sym("toe", 2)
+    found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    dynamics = ca.Function("loads", [q, qd, qdd, toe], list(found))
+
+    support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
+    share = rear_share * (1 - support**2 * (3 - 2 * support))
+    _, force, whole = dynamics(*step.q, SX(2, 1))
+    torque, stance_force, pressure = dynamics(*step.q, share * force)
+    slope = stair.rise / stair.tread
+    # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
+    zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
+    outputs = [
+        ca.dot(plan.durations, s),
+        *step.q,
+        step.reach,
+        torque,
+        torque * (DM(JOINT_RATES) @ step.q.velocity),
+        stance_force,
+        pressure,
+        zmp,
+        step.hip.position,
+        step.ankle.position,
+    ]
+    return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
+
+
+def clearance_function(ops: Nonsmooth) -> ca.Function:
+    """Heights (3,) of toe, sole and ankle above the stair, from the inputs of ``sample_function`` but the last."""
+    inputs, _, stair, step = _planned(ops)
+    found = points(load_biped().rods, link_angles(step.q.position), SX(2, 1))
+    heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
+    return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
+
+
+def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+    s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
+    size, margin = SX.sym("size", 2), SX.sym("margin")
+    plan, stair = plan_of(values), Stair(size[0], size[1])
+    rates = passing / plan.durations
+    step = posture(load_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
+    return [s, passing, values, size, margin], plan, stair, step

@@ -1,0 +1,114 @@
+"""The biped with toes that climbs stairs: nine slender rods in the sagittal plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+from nlp_gait.errors import RobotDataError
+from nlp_gait.files import read_json
+from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, Rod
+
+DEFAULT_FILE = resources.files("nlp_gait.problems.stairs") / "biped.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanarLink:
+    """Slender rod.
+
+    Attributes:
+        name: its two ends, for example ``"HK"``.
+        length_m: between them.
+        mass_kg: its mass, spread evenly.
+    """
+
+    name: str
+    length_m: float
+    mass_kg: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no rod."""
+        for what in ("length_m", "mass_kg"):
+            value = getattr(self, what)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+                raise RobotDataError(f"link {self.name!r}: {what} must be a number > 0, got {value!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToeFootBiped:
+    """Two legs of thigh, shank, sole and toe, and a torso.
+
+    Attributes:
+        name: of the robot.
+        source: of the numbers.
+        links: in the order of ``planar_biped.LINKS``; both legs are alike.
+
+    Source:
+        Bhardwaj, Mishra, Sukavanam, Balasubramanian, Table I. The paper gives no moments of inertia: m l^2 / 12.
+    """
+
+    name: str
+    source: str
+    links: tuple[PlanarLink, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse missing links and legs that differ."""
+        names = tuple(link.name for link in self.links)
+        if names != LINKS:
+            raise RobotDataError(f"robot {self.name!r}: links must be {', '.join(LINKS)}, got {', '.join(names)}")
+        for swing, stance in (("HK", "HK'"), ("KA", "K'A'"), ("AS", "A'S'"), ("ST", "S'T'")):
+            a, b = self.link(swing), self.link(stance)
+            if (a.length_m, a.mass_kg) != (b.length_m, b.mass_kg):
+                raise RobotDataError(f"robot {self.name!r}: links {swing} and {stance} must be alike")
+
+    def link(self, name: str) -> PlanarLink:
+        """Link by name."""
+        return self.links[LINKS.index(name)]
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the whole robot."""
+        return math.fsum(link.mass_kg for link in self.links)
+
+    @property
+    def sole_m(self) -> float:
+        """Ankle to sole joint."""
+        return self.link("AS").length_m
+
+    @property
+    def toe_m(self) -> float:
+        """Sole joint to tip of the toe."""
+        return self.link("ST").length_m
+
+    @property
+    def foot_m(self) -> float:
+        """Ankle to tip of the toe, flat."""
+        return self.sole_m + self.toe_m
+
+    @property
+    def rods(self) -> dict[str, Rod]:
+        """Lengths, masses and inertias for the symbolic model."""
+        return {
+            link.name: Rod(link.length_m, link.mass_kg, link.mass_kg * link.length_m**2 / 12) for link in self.links
+        }
+
+
+@cache
+def load_biped(file: str = "") -> ToeFootBiped:
+    """Biped from a JSON file; without one, the paper's.
+
+    Raises:
+        RobotDataError: the file cannot be read, or describes no such robot.
+    """
+    source = Path(file) if file else DEFAULT_FILE
+    data = read_json(Path(str(source)), "robot file", error=RobotDataError)
+    try:
+        links = tuple(PlanarLink(**link) for link in data["links"])
+        return ToeFootBiped(name=data["name"], source=data["source"], links=links)
+    except (KeyError, TypeError) as error:
+        raise RobotDataError(
+            f"robot file {str(source)!r} cannot be used: {error}; it needs name, source and links with name, length_m, mass_kg"
+        ) from error

@@ -1,0 +1,77 @@
+"""What the stair problems share: the stair as two parameters, gravity, limits of the links."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+from casadi import MX
+
+from nlp_gait.problem.gait_problem import Array, Parameter, Point, Variable
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING
+from nlp_gait.problems.stairs.formulas.profile import Stair
+
+GRAVITY = 9.81  # [m/s^2]
+PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
+SETBACK = 0.06  # an edge lies so far behind the ankle that stands on the step [m]
+
+# Stairs of Table IV by case: double tread ("stair length") [m], rise over run.
+CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
+
+# Absolute link angles [rad]: leg and foot clockwise from the forward axis, torso counter-clockwise.
+ANGLE_LIMITS = {
+    "HK": (0.2, 2.4),
+    "KA": (0.3, 3.2),
+    "HK'": (0.3, 2.4),
+    "K'A'": (0.8, 2.8),
+    "UH": (0.8, 1.75),
+    "AS": (-0.6, 1.2),
+    "ST": (-0.6, 1.2),
+}
+KNEE_LIMITS = (0.1, 2.5)  # [rad]
+KNEES = {"knee": ("HK", "KA"), "knee'": ("HK'", "K'A'")}
+
+STAIR_PARAMETERS = (
+    Parameter(
+        name="stair_length_m",
+        unit="m",
+        default=CASES[2][0],
+        description="length of a double step: two treads (Table IV)",
+        minimum=0.05,
+        maximum=2.0,
+    ),
+    Parameter(
+        name="rise_run_ratio", unit="1", default=CASES[2][1], description="rise over run", minimum=0.01, maximum=5.0
+    ),
+)
+
+
+def within(point: Point, variable: Variable) -> MX:
+    """Value of a variable for the mathematics: beyond its minimum and maximum, where no bound lies, that of the nearer one."""
+    return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
+
+
+def stair_of(point: Point) -> Stair[MX]:
+    """Tread and rise of one step from the problem's parameters."""
+    tread: MX = point["stair_length_m"] / 2
+    return Stair(tread, point["rise_run_ratio"] * tread)
+
+
+def values_of(own_parameters: Sequence[Parameter], p: Array) -> dict[str, float]:
+    """Values of a problem's own parameters by name, from its parameter vector (k,), in which they come first."""
+    return {parameter.name: float(value) for parameter, value in zip(own_parameters, p, strict=False)}
+
+
+def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
+    """Histories of joints (columns as JOINTS) from those of links (columns as MOVING, m rows), with the latter beside.
+
+    A joint's angle is the difference of its links' absolute angles, see ``JOINT_RATES``.
+    """
+    links = {"q": q, "qd": qd, "qdd": qdd}
+    joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
+    return {**joints, **{f"link_{name}": value for name, value in links.items()}}
+
+
+def knee_angles(q: MX) -> MX:
+    """(2, m) angles of the knees in the order of KNEES from link angles (7, m); positive when bent."""
+    return ca.vertcat(*(q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values()))

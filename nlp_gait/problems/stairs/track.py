@@ -1,0 +1,203 @@
+"""Tracking a planned step with a PD controller: gains and torso pitch of least cost (the paper's use of ant colonies)."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import (
+    Array,
+    GaitProblem,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+)
+from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
+from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
+from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
+from nlp_gait.problems.stairs.stair import STAIR_PARAMETERS, within
+from nlp_gait.problems.stairs.track_rows import track_rows
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+
+Gains = Literal["scalar", "per-link"]
+
+# Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
+PLAN = {
+    "hip_height_m": 0.6926,
+    "hip_start_m": 0.0918,
+    "zmp_start_m": 0.2434,
+    "zmp_end_m": 0.0923,
+    "end_rate_rad_s": 0.709,
+    "t1_s": 0.5763,
+    "t2_s": 0.7783,
+    "t_bc_s": 1.3287,
+    "foot_pitch_rad": 0.3169,
+}
+TORSO_PITCH = "torso_pitch_rad"
+# Start points scatter about gains and a torso pitch with which the robot stays near its plan (normal, in units of the ranges):
+# a rollout of a robot that falls has no gradient of use.
+PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
+SCATTER = 0.05
+
+PARAMETERS = (
+    *STAIR_PARAMETERS,
+    *(
+        Parameter(
+            name=v.name,
+            unit=v.unit,
+            default=PLAN[v.name],
+            description=v.description,
+            minimum=v.minimum,
+            maximum=v.maximum,
+        )
+        for v in GOVERNING_VARIABLES
+        if v.name != TORSO_PITCH
+    ),
+    *GIVEN_PARAMETERS,
+    REACH_MARGIN,
+    Parameter(
+        name="tracking_tolerance_rad",
+        unit="rad",
+        default=0.1,
+        description="largest error of a link angle at any time",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="zmp_weight",
+        unit="1/m",
+        default=100.0,
+        description="cost of the mean distance of the ZMP from the supporting polygon",
+        minimum=0.0,
+    ),
+    Parameter(
+        name="gravity_compensation",
+        unit="1",
+        default=1.0,
+        description="share of gravity that the controller compensates; 0 as printed",
+        minimum=0.0,
+        maximum=1.0,
+    ),
+    Parameter(
+        name="disturbance_Nm",
+        unit="N m",
+        default=1 / 70,
+        description="amplitude of the disturbance sin(2 t) on every link",
+    ),
+    Parameter(name="ground_stiffness_N_m", unit="N/m", default=5e4, description="k_s of a contact", minimum=0.0),
+    Parameter(name="ground_damping_N_s_m", unit="N s/m", default=500.0, description="k_d of a contact", minimum=0.0),
+    Parameter(name="friction", unit="1", default=0.6, description="mu of a contact", minimum=0.0),
+)
+
+
+def stairs_track(
+    *,
+    gains: Gains = "scalar",
+    scheme: Scheme = "implicit",
+    inverse_kinematics: InverseKinematics = "closed-form",
+    duration_s: float = 3.5,
+) -> GaitProblem:
+    """Closed loop over one planned step.
+
+    The plan is given by parameters; its torso pitch is a variable. The stance ankle is the base.
+
+    Args:
+        gains: one K_p and K_d for all links as in the paper, or one for each link.
+        scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
+        inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
+            quantum's pose within each evaluation (which makes one many times slower).
+        duration_s: of the rollout, in whole quanta of 0.01 s.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Bhardwaj et al., sections VII to X.
+    """
+    for option, value, allowed in (
+        ("gains", gains, get_args(Gains)),
+        ("scheme", scheme, get_args(Scheme)),
+        ("inverse_kinematics", inverse_kinematics, get_args(InverseKinematics)),
+    ):
+        if value not in allowed:
+            raise InputError(f"{option} must be one of {', '.join(allowed)}, got {value!r}")
+    if not QUANTUM <= duration_s <= 60.0:
+        raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
+    suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
+    loop = ClosedLoop(
+        quanta=round(duration_s / QUANTUM),
+        scheme=scheme,
+        gains=len(suffixes),
+        inverse_kinematics=inverse_kinematics,
+    )
+    variables = (
+        *_gain_variables("kp", "N m/rad", "K_p", suffixes),
+        *_gain_variables("kd", "N m s/rad", "K_d", suffixes),
+        *(v for v in GOVERNING_VARIABLES if v.name == TORSO_PITCH),
+    )
+
+    def rollout(point: Point, ops: Nonsmooth) -> Rollout:
+        return loop.rollout(point, ca.vertcat(*(within(point, variable) for variable in variables)), ops)
+
+    def start(_: Array, rng: np.random.Generator) -> Array:
+        gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
+        ranges = np.array([variable.upper - variable.lower for variable in variables])
+        return np.append(gains_about, PLAUSIBLE_TORSO) + SCATTER * ranges * rng.standard_normal(len(variables))
+
+    def signals(x: Array, p: Array) -> Signals:
+        point = problem.symbols()
+        outputs = list(rollout(point, Exact()))
+        desired, state, torque, zmp = (
+            np.array(part).T for part in ca.Function("rollout", [point.x, point.p], outputs)(x, p)
+        )
+        return Signals(
+            joints=LINKS,
+            arrays={
+                "t": np.linspace(QUANTUM, loop.quanta * QUANTUM, loop.quanta),
+                "q": state[:, :N],
+                "qd": state[:, N:],
+                "q_desired": desired[:, :N],
+                "qd_desired": desired[:, N:],
+                "tau": torque,
+                "zmp": zmp[:, 0],
+            },
+        )
+
+    problem = GaitProblem(
+        name="stairs-track",
+        title="Stairs, tracked step: PD gains and torso pitch of least cost",
+        options={
+            "gains": gains,
+            "scheme": scheme,
+            "inverse_kinematics": inverse_kinematics,
+            "duration_s": duration_s,
+        },
+        variables=variables,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="cost", unit="1"),
+        assemble=lambda point, ops: track_rows(point, rollout(point, ops), ops),
+        start=start,
+        starts=1,
+        long_derivatives=True,
+        signals=signals,
+    )
+    return problem
+
+
+def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            name=f"{name}{suffix}",
+            unit=unit,
+            lower=0.0,
+            upper=100.0,
+            description=f"{symbol} of {suffix.removeprefix('_') or 'all links'}",
+            minimum=0.0,
+            maximum=1e4,
+        )
+        for suffix in suffixes
+    )

@@ -1,0 +1,1 @@
+"""A biped of point masses with twelve joints that walks straight and on a circle."""

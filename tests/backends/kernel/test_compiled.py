@@ -1,0 +1,217 @@
+"""The compiled objective: the virtual machine's numbers at every lane count, whatever the batch, the threads or the memory."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+from nlp_gait.backends.kernel.compiler import native_lanes
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Array, GaitProblem
+from tests.backends.toys import corner, toy
+
+# glibc's vector functions are off by up to 4 units in the last place, and torques are sums of cancelling terms.
+COST_TOLERANCE, ROW_TOLERANCE = 1e-12, 1e-11
+CANDIDATES = 1000
+LANES = [lanes for lanes in (1, 2, 4, 8) if lanes <= native_lanes()]
+PROBLEMS = ("nao-ssp", "nao-dsp")
+
+
+@functools.cache
+def problem_named(name: str) -> GaitProblem:
+    return nlp_gait.load(name)
+
+
+@functools.cache
+def objective_of(name: str, lanes: int | None = None) -> CompiledObjective:
+    return compile_objective(problem_named(name), require_compiler=True, lanes=lanes, threads=1)
+
+
+def candidates(problem: GaitProblem, count: int = CANDIDATES, seed: int = 0) -> Array:
+    """Half of them within the bounds, half up to a range's width outside, mostly out of reach."""
+    rng = np.random.default_rng(seed)
+    inside = rng.uniform(problem.lower, problem.upper, (count // 2, len(problem.names)))
+    width = problem.upper - problem.lower
+    outside = rng.uniform(problem.lower - width, problem.upper + width, (count - count // 2, len(problem.names)))
+    return np.concatenate([inside, outside])
+
+
+@functools.cache
+def expected(name: str) -> tuple[Array, Array, Array]:
+    """Cost, violation and rows from CasADi's virtual machine."""
+    problem = problem_named(name)
+    exact = exact_model(problem).function.map(CANDIDATES)
+    cost, violation, g, *_ = exact(candidates(problem).T, np.repeat(problem.p[:, None], CANDIDATES, axis=1))
+    return np.array(cost).ravel(), np.array(violation).ravel(), np.array(g).T
+
+
+@pytest.mark.parametrize("lanes", LANES)
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_agrees_with_the_virtual_machine(name: str, lanes: int) -> None:
+    objective, X = objective_of(name, lanes), candidates(problem_named(name))
+    cost, violation, g = expected(name)
+    f, total = objective(X)
+    rows = objective.constraints(X)
+    assert np.isfinite(f).all() and np.isfinite(rows).all()
+    assert (violation[: CANDIDATES // 2] > 0).any()
+    np.testing.assert_allclose(f, cost, rtol=COST_TOLERANCE)
+    assert (np.abs(rows - g) <= ROW_TOLERANCE * np.abs(g).max(axis=0)).all()
+    np.testing.assert_allclose(total, violation, rtol=ROW_TOLERANCE, atol=ROW_TOLERANCE)
+
+
+@pytest.mark.parametrize("lanes", LANES)
+def test_batch_size_and_threads_change_no_bit(lanes: int) -> None:
+    problem = problem_named("nao-ssp")
+    objective, X = objective_of("nao-ssp", lanes), candidates(problem, 203)
+    f, violation = objective(X)
+    for size in (1, 3, 8, 50):
+        parts = [objective(X[i : i + size]) for i in range(0, len(X), size)]
+        assert np.array_equal(np.concatenate([part[0] for part in parts]), f)
+        assert np.array_equal(np.concatenate([part[1] for part in parts]), violation)
+
+
+def test_threads_change_no_bit() -> None:
+    problem = problem_named("nao-ssp")
+    X = candidates(problem, 5001)
+    f, violation = objective_of("nao-ssp")(X)
+    several = compile_objective(problem, threads=3)
+    for _ in range(3):  # the first call has no measured time yet and uses one thread
+        shared = several(X)
+        assert np.array_equal(shared[0], f)
+        assert np.array_equal(shared[1], violation)
+
+
+def test_takes_any_memory_and_leaves_it_as_it_was() -> None:
+    problem = problem_named("nao-ssp")
+    objective, X = objective_of("nao-ssp"), candidates(problem, 21)
+    f, violation = objective(X)
+    raw = np.zeros(X.nbytes + 1, dtype=np.uint8)
+    misaligned = raw[1:].view(np.float64).reshape(X.shape)
+    misaligned[:] = X
+    assert not misaligned.flags.aligned
+    strided = np.repeat(X, 2, axis=1)[:, ::2]
+    locked = X.copy()
+    locked.setflags(write=False)
+    for given in (misaligned, strided, np.asfortranarray(X), locked, X.astype(">f8")):
+        before = given.copy()
+        got = objective(given)
+        assert np.array_equal(got[0], f) and np.array_equal(got[1], violation)
+        assert np.array_equal(given, before)
+    single = X.astype(np.float32)
+    assert np.array_equal(objective(single)[0], objective(single.astype(float))[0])
+    assert objective(np.ones(X.shape, dtype=int))[0].shape == (21,)
+    assert objective(X.tolist())[0].tolist() == f.tolist()
+
+
+def test_an_empty_batch_gives_empty_results() -> None:
+    f, violation = objective_of("nao-ssp")(np.empty((0, 9)))
+    assert f.shape == violation.shape == (0,)
+    assert objective_of("nao-ssp").constraints(np.empty((0, 9))).shape == (0, len(objective_of("nao-ssp").row_names))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_row_that_is_not_finite_fails_alone(bad: float) -> None:
+    objective, X = objective_of("nao-ssp"), candidates(problem_named("nao-ssp"), 20)
+    f, violation = objective(X)
+    X[7, 3] = bad
+    got_f, got_violation = objective(X)
+    assert got_f[7] == got_violation[7] == np.inf
+    others = np.arange(20) != 7
+    assert np.array_equal(got_f[others], f[others])
+    assert np.array_equal(got_violation[others], violation[others])
+
+
+@pytest.mark.parametrize("X", [np.zeros(9), np.zeros((2, 8)), np.zeros((1, 2, 9))])
+def test_says_which_shape_it_wants(X: Array) -> None:
+    with pytest.raises(InputError, match="one candidate a row and 9 columns .*hip_height_m.*got shape"):
+        objective_of("nao-ssp")(X)
+
+
+def test_refuses_what_is_not_numbers() -> None:
+    with pytest.raises(InputError, match="must be numbers, got list"):
+        objective_of("nao-ssp")([["high"] * 9])  # type: ignore[arg-type]
+
+
+def test_refuses_impossible_settings() -> None:
+    with pytest.raises(InputError, match="threads must be at least 1, got 0"):
+        compile_objective(problem_named("nao-ssp"), threads=0)
+    with pytest.raises(InputError, match="lanes must be 1, 2, 4 or 8, got 3"):
+        compile_objective(problem_named("nao-ssp"), lanes=3)
+
+
+def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_named("nao-ssp")
+    before = objective_of("nao-ssp")
+    X = candidates(problem, 40)
+    f, violation = before(X)
+    monkeypatch.setattr("nlp_gait.backends.kernel.native_kernel.load_library", None)  # would raise if it were called
+    strict = compile_objective(problem.with_values(torque_change_limit_Nm=0.1, heat_loss_W_per_Nm2=0.05), threads=1)
+    strict_f, strict_violation = strict(X)
+    assert (strict_f > f).all() and (strict_violation > violation).all()
+    assert np.array_equal(before(X)[0], f)
+    fixed = compile_objective(problem.fix(swing_height_m=0.024), threads=1)
+    assert fixed.lower[7] == fixed.upper[7] == 0.024
+    assert fixed.names == problem.names
+    value = float(exact_model(problem).function(X[0], strict.problem.p)[0])
+    assert strict_f[0] == pytest.approx(value, rel=COST_TOLERANCE)
+
+
+def test_a_maximised_objective_is_negated() -> None:
+    problem = toy(lambda x, y, limit, ops: (x + 2 * y, ()), sense="maximise")
+    f, _ = compile_objective(problem, require_compiler=True)(np.array([[1.0, 2.0], [0.0, -1.0]]))
+    assert f.tolist() == [-5.0, 2.0]
+
+
+@pytest.mark.parametrize("lanes", LANES)
+def test_a_problem_solved_by_hand(lanes: int) -> None:
+    objective = compile_objective(toy(corner), require_compiler=True, lanes=lanes)
+    f, violation = objective(np.array([[1.0, 1.0], [2.0, 0.25], [-2.5, 1.0]]))
+    assert f == pytest.approx([0.0, 2.5, 3.5])
+    # In units of the scales: 0.1 m for the row, the width of the range (4 m) for x.
+    assert violation == pytest.approx([0.0, 2.5, 30.0 + 0.125])
+    assert objective.row_names == ("row", "bounds[x]", "bounds[y]")
+
+
+def test_interpreted_gives_the_same(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    problem = problem_named("nao-ssp")
+    X = candidates(problem, 70)
+    X[3, 0] = np.nan
+    compiled = objective_of("nao-ssp")
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setenv("CXX", "")
+    monkeypatch.setenv("CC", "")
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiler.find_spec", lambda name: None)
+    interpreted = compile_objective(problem)
+    assert (compiled.backend, interpreted.backend) == ("compiled", "interpreted")
+    assert len(caplog.messages) == 1
+    assert "no C++ compiler" in caplog.messages[0] and "pip install 'nlp-gait[compiler]'" in caplog.messages[0]
+    f, violation = interpreted(X)
+    expected_f, expected_violation = compiled(X)
+    np.testing.assert_allclose(f, expected_f, rtol=COST_TOLERANCE)
+    np.testing.assert_allclose(violation, expected_violation, rtol=ROW_TOLERANCE, atol=ROW_TOLERANCE)
+    others = np.arange(70) != 3
+    rows = compiled.constraints(X)[others]
+    assert (np.abs(interpreted.constraints(X)[others] - rows) <= ROW_TOLERANCE * np.abs(rows).max(axis=0)).all()
+    with pytest.raises(nlp_gait.GaitError, match="no C\\+\\+ compiler"):
+        compile_objective(problem, require_compiler=True)
+
+
+def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Undefined behaviour, misaligned access included, ends the process; the address sanitizer needs a run by hand."""
+    flags = ("-std=c++17", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-fvisibility=hidden", "-w")
+    monkeypatch.setattr("nlp_gait.backends.kernel.native_kernel.BASE_FLAGS", flags)
+    try:
+        objective = compile_objective(toy(corner), require_compiler=True)
+    except nlp_gait.GaitError:
+        pytest.skip("this compiler has no sanitizer")
+    raw = np.ones(2 * 8 * 21 + 1, dtype=np.uint8)
+    misaligned = raw[1:].view(np.float64).reshape(21, 2)
+    misaligned[:] = 1.0
+    for count in (1, 8, 21):
+        f, violation = objective(misaligned[:count])
+        assert (f == 0.0).all() and (violation == 0.0).all()

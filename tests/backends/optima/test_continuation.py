@@ -1,0 +1,79 @@
+"""Paths of neighbouring problems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait.backends.optima.continuation import Continuation, solve_both_ways
+from nlp_gait.backends.solvers import ipopt
+from nlp_gait.problem.gait_problem import Constraint, GaitProblem
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, row, toy
+
+TOLERANCE = 1e-6  # IPOPT's own is 1e-8
+
+
+def two_wells(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+    """Wells near x = -1 and x = 1; the right one is the lower one where the limit is negative."""
+    return (x**2 - 1) ** 2 + limit * x + y**2, (row(y, lower=MX(0)),)
+
+
+def path(problem: GaitProblem, limits: list[float]) -> list[GaitProblem]:
+    return [problem.with_values(limit=limit) for limit in limits]
+
+
+def true_depth(limit: float) -> float:
+    x = np.linspace(-2.0, 2.0, 400_001)
+    return float(((x**2 - 1) ** 2 + limit * x).min())
+
+
+def test_one_direction_stays_in_a_well_and_both_find_the_lower_one() -> None:
+    limits = np.linspace(-1.0, 1.0, 11).tolist()
+    problem = toy(two_wells)
+    truth = [true_depth(limit) for limit in limits]
+    one_way = Continuation(starts=8)
+    followed = [one_way.solve(problem).objective for problem in path(problem, limits)]
+    assert followed[0] == pytest.approx(truth[0], abs=TOLERANCE)
+    assert followed[7] > truth[7] + 0.1  # still in the well on the right
+    found = solve_both_ways(path(problem, limits), starts=8)
+    assert [solution.objective for solution in found] == pytest.approx(truth, abs=TOLERANCE)
+
+
+def test_infeasible_problems_are_named_and_the_path_goes_on() -> None:
+    limits = [0.5, 1.2, 5.0, 1.5, 2.0]  # x and y end at 2 and 3
+    calls: list[None] = []
+    found = solve_both_ways(path(toy(corner), limits), starts=2, progress=lambda: calls.append(None))
+    assert len(calls) == 2 * len(limits)
+    assert [solution.success for solution in found] == [True, True, False, True, True]
+    assert "in the way: row" in found[2].status
+    costs = [found[k].objective for k in (0, 1, 3, 4)]
+    assert costs == pytest.approx([0.0, 0.6, 1.5, 3.0], abs=TOLERANCE)
+    # Random starts are in vain once: a warm and a cold attempt each way, and the two random ones.
+    assert len(found[2].starts) == 2 * 2 + 2
+
+
+def test_one_problem_alone() -> None:
+    (solution,) = solve_both_ways(path(toy(corner), [1.5]), starts=1)
+    assert solution.success and solution.objective == pytest.approx(1.5, abs=TOLERANCE)
+
+
+def test_nothing_is_rebuilt_along_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    make = ipopt.Ipopt.__init__
+
+    def counted(self: ipopt.Ipopt, *arguments: object, **named: object) -> None:
+        made.append(self)
+        make(self, *arguments, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ipopt.Ipopt, "__init__", counted)
+    solve_both_ways(path(toy(corner), [0.5, 0.6, 0.7, 0.8]), starts=1)
+    assert len(made) == 1
+
+
+def test_a_warm_start_needs_fewer_iterations_than_a_cold_one() -> None:
+    problems = path(toy(corner), np.linspace(1.1, 1.9, 9).tolist())
+    warm = Continuation(starts=1)
+    first, *others = [warm.solve(problem).iterations for problem in problems]
+    assert max(others) < first

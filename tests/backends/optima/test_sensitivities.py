@@ -1,0 +1,174 @@
+"""Derivatives of optima: by hand, by solving again, and by CasADi's own."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait import load
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.optima.continuation import Continuation, best_end
+from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
+from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.solvers.ipopt import ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Constraint, GaitProblem
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, row, toy
+
+# IPOPT at its sharpest finds the optimal value to 1e-12, which over a step of 1e-6 is 1e-6 of a slope of one, and x* itself to
+# 1e-9 of its range.
+RESOLVED = 1e-5
+RESOLVED_X = 1e-3
+STEP = 1e-6
+
+
+def found(problem: GaitProblem) -> Optimum:
+    return solved(problem)[1]
+
+
+def solved(problem: GaitProblem) -> tuple[End, Optimum]:
+    end = best_end(Continuation(starts=3).run(problem))
+    assert end is not None
+    return end, optimum(problem, end)
+
+
+def slope(problem: GaitProblem, near: End, name: str) -> tuple[float, np.ndarray]:
+    """Of optimum and x*, by solving a little lower and higher."""
+    ends = []
+    for change in (-STEP, STEP):
+        moved = problem.with_values(**{name: problem.value(name) + change})
+        ends.append(ipopt_for(moved, SHARP).run_from(moved, near.guess))
+        assert ends[-1].success
+    low, high = ends
+    return problem.objective.sign * (high.cost - low.cost) / (2 * STEP), (high.x - low.x) / (2 * STEP)
+
+
+def test_a_corner_of_absolute_values_moves_with_its_limit() -> None:
+    """3 (limit - 1) at (limit, limit)."""
+    at = found(toy(corner, limit=1.5))
+    answer = parameter_sensitivities(at)
+    assert at.objective == pytest.approx(1.5)
+    np.testing.assert_allclose(answer.objective, [3.0, 0.0, 0.0, 0.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(answer.x[:, 0], [1.0, 1.0], atol=1e-8)
+    # Down to limit 1, where the kinks of |x - 1| and |y - 1| hold it, and up to x = 2, its bound.
+    np.testing.assert_allclose(answer.reach[:, 0], [-0.5, 0.5], atol=1e-6)
+
+
+def test_a_limit_that_does_not_bind_costs_nothing() -> None:
+    at = found(toy(corner, limit=0.5))
+    answer = parameter_sensitivities(at)
+    np.testing.assert_allclose(answer.objective, 0.0, atol=1e-8)
+    np.testing.assert_allclose(answer.x, 0.0, atol=1e-8)
+    assert answer.reach[1, 0] == pytest.approx(0.5)
+
+
+def test_a_maximised_objective_keeps_its_sign() -> None:
+    def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return -(x**2) - (y - 1) ** 2 - x * y, (row(x, lower=limit),)
+
+    problem = toy(hill, sense="maximise", limit=1.0)
+    at = found(problem)
+    answer = parameter_sensitivities(at)
+    # y* = 1 - x / 2 at x = limit, so that the objective is -(3/4) limit^2 - limit.
+    assert answer.objective[0] == pytest.approx(-2.5, abs=1e-8)
+    np.testing.assert_allclose(answer.x[:, 0], [1.0, -0.5], atol=1e-8)
+
+
+def test_rows_that_say_the_same_are_counted_and_harmless() -> None:
+    def twice(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return x**2 + y**2, (row(x, lower=limit), row(2 * x, lower=2 * limit))
+
+    at = found(toy(twice))
+    answer = parameter_sensitivities(at)
+    assert at.dependent == 1
+    assert answer.defined.all()
+    assert answer.objective[0] == pytest.approx(1.0, abs=1e-7)
+
+
+def test_rows_that_part_when_the_limit_moves_have_no_derivative() -> None:
+    def contrary(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return x**2 + y**2, (row(x, lower=limit), row(x, lower=1 - limit))
+
+    answer = parameter_sensitivities(found(toy(contrary, limit=0.5)))
+    assert not answer.defined[0]
+    assert answer.defined[1:].all()
+
+
+def test_a_flat_optimum_is_refused_with_the_reason() -> None:
+    def valley(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return (x + y) ** 2, (row(x, lower=-limit - 5),)
+
+    at = found(toy(valley))
+    assert at.reason is not None and "isolated" in at.reason
+    with pytest.raises(InputError, match="no sensitivities"):
+        parameter_sensitivities(at)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("nao-dsp", ("dbm_y_mean_limit_m", "hip_height_m.upper", "double_support_time_s.upper", "heat_loss_W_per_Nm2")),
+        ("walk12", ("step_length_m.upper", "lambda", "step_time_s")),
+    ],
+)
+def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...]) -> None:
+    problem = load(name)
+    near, at = solved(problem)
+    assert at.residual < 1e-12
+    answer = parameter_sensitivities(at)
+    names = [parameter.name for parameter in problem.parameters]
+    for parameter in parameters:
+        i = names.index(parameter)
+        objective, x = slope(problem, near, parameter)
+        assert answer.objective[i] == pytest.approx(objective, rel=RESOLVED)
+        largest = np.abs(answer.x[:, i] / problem.scale).max()
+        np.testing.assert_allclose(
+            answer.x[:, i] / problem.scale, x / problem.scale, atol=RESOLVED_X * max(largest, 1.0)
+        )
+
+
+def test_casadis_own_sensitivities_agree() -> None:
+    """Of its SQP method with an active-set QP solver, where no active rows depend on each other."""
+    problem = load("walk12")
+    at = found(problem)
+    model = nlp_model(problem)
+    silent = {"print_header": False, "print_iteration": False, "print_status": False, "print_time": False}
+    qp = {"print_iter": False, "print_header": False, "error_on_fail": False}
+    solver = ca.nlpsol("oracle", "sqpmethod", model.nlp, {**silent, "qpsol": "qrqp", "qpsol_options": qp})
+    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
+    bounds = {
+        "lbx": (problem.lower - model.offset) / model.scale,
+        "ubx": (problem.upper - model.offset) / model.scale,
+        "lbg": lower,
+        "ubg": upper,
+    }
+    solution = solver(x0=at.w, p=at.parameters, lam_g0=at.multipliers[: len(lower)], **bounds)
+    jacobian = solver.factory("jacobian", solver.name_in(), ["jac:x:p"])
+    by_casadi = jacobian(
+        x0=solution["x"], p=at.parameters, lam_x0=solution["lam_x"], lam_g0=solution["lam_g"], **bounds
+    )["jac_x_p"]
+    own = len(problem.own_parameters)  # the bounds of x are no parameters to CasADi
+    expected = model.scale[:, None] * np.array(by_casadi)[:, :own]
+    np.testing.assert_allclose(parameter_sensitivities(at).x[:, :own], expected, atol=1e-6)
+
+
+def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
+    problem = load("nao-dsp")
+    near, at = solved(problem)
+    heavier, lighter = (load("nao-dsp", robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP))
+    answer = model_sensitivities(at, [(heavier, lighter, 2 * STEP)])
+    ends = [ipopt_for(p, SHARP).run_from(p, near.guess) for p in (heavier, lighter)]
+    assert all(end.success for end in ends)
+    assert answer.objective[0] == pytest.approx((ends[0].cost - ends[1].cost) / (2 * STEP), rel=RESOLVED)
+    np.testing.assert_allclose(answer.x[:, 0], (ends[0].x - ends[1].x) / (2 * STEP), atol=RESOLVED_X)
+
+
+def test_a_model_with_other_rows_is_refused() -> None:
+    at = found(load("walk12"))
+    other = load("walk12", intervals=10)
+    with pytest.raises(InputError, match="other constraints"):
+        model_sensitivities(at, [(other, other, 1.0)])

@@ -1,0 +1,154 @@
+"""What IPOPT does silently is said: acceptable level, no convergence, NaN, a linear solver, and options from elsewhere."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
+from nlp_gait.backends.solvers.ipopt_end import CONVERGED, STATUS_WORDS, End, Guess
+from nlp_gait.backends.solvers.ipopt_installation import linear_solver
+from nlp_gait.problem.gait_problem import Constraint
+from nlp_gait.problem.solution import Evaluations
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import Mathematics, corner, row, toy
+
+Result = tuple[MX, tuple[Constraint, ...]]
+
+
+def rough(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> Result:
+    """Steep, flat, and with ripples below what the tolerance could resolve."""
+    return 1e6 * (x - 0.3) ** 2 + (y - 0.2) ** 4 + 1e-9 * ca.sin(1e7 * x), ()
+
+
+def test_an_acceptable_level_is_a_success_that_says_so() -> None:
+    solution = solve(toy(rough), settings=IpoptSettings(tolerance=1e-14))
+    assert solution.success
+    assert solution.status == "converged to IPOPT's acceptable level only"
+    assert solution.starts[0].status == solution.status
+
+
+def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
+    solution = solve(toy(corner), settings=IpoptSettings(tolerance=1e-30))
+    assert not solution.success
+    assert solution.violation == 0.0
+    assert solution.status == "no start converged; the best feasible one search direction became too small"
+
+
+def test_contradicting_limits_are_called_local_infeasibility() -> None:
+    solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(x**2 + y**2, upper=-2 * limit),))))
+    assert not solution.success
+    assert (
+        "the least infeasible one converged to a point of local infeasibility; in the way: row (by 1 m)"
+        in solution.status
+    )
+
+
+def test_too_many_equations_are_called_that(capfd: pytest.CaptureFixture[str]) -> None:
+    rows = [lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y]
+    problem = toy(lambda x, y, limit, ops: (x**2, tuple(row(f(x, y), limit, limit) for f in rows)))
+    assert "not enough degrees of freedom" in solve(problem).status
+    assert "3 equality constraints but only 2 variables" in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize(
+    ("mathematics", "objective"),
+    [
+        (lambda x, y, limit, ops: (ca.sqrt(-1 - x**2), ()), math.nan),
+        (lambda x, y, limit, ops: (1 / (x * 1e-200) ** 2, ()), math.inf),
+    ],
+    ids=["nan", "inf"],
+)
+def test_an_objective_without_a_value_is_no_success_and_no_noise(
+    mathematics: Mathematics, objective: float, capfd: pytest.CaptureFixture[str]
+) -> None:
+    solution = solve(toy(mathematics), starts=2)
+    assert not solution.success
+    assert "a function returned NaN or inf" in solution.status
+    assert solution.status.endswith(f"; cost is {objective} there")
+    assert "".join(capfd.readouterr()) == ""  # CasADi would warn at every call
+
+
+def test_starts_from_where_a_row_has_no_value_do_not_hide_the_others() -> None:
+    solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit),))), starts=4)
+    assert solution.success
+    assert solution.objective == pytest.approx(-0.75, abs=1e-6)  # sqrt(x) >= 0.5, y >= -1
+    assert {start.success for start in solution.starts} == {True, False}
+
+
+def test_a_row_without_a_value_is_violated_and_named() -> None:
+    problem = toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit), row(y, upper=limit))))
+    x = np.array([-1.0, 2.0])
+    assert math.isnan(float(exact_model(problem).function(x, problem.p)[1]))
+    rows = row_violations(problem, x)
+    assert [violated.name for violated in rows] == ["row", "row"]
+    assert math.isnan(rows[0].violation)
+    assert rows[1].violation == pytest.approx(1.5)
+
+
+def end(status: str, cost: float, violation: float) -> End:
+    """An end with what its rank depends on."""
+    none = np.zeros(0)
+    return End(
+        x=none,
+        cost=cost,
+        violation=violation,
+        row_multipliers=none,
+        bound_multipliers=none,
+        return_status=status,
+        iterations=0,
+        evaluations=Evaluations(),
+        time_s=0.0,
+        guess=Guess(primal=none, bounds=none, rows=none, width=1.0),
+    )
+
+
+def test_ends_rank_by_success_then_feasibility_then_violation() -> None:
+    ranked = [
+        end("Solve_Succeeded", 2.0, 0.0),
+        end("Solved_To_Acceptable_Level", 3.0, 1e-7),
+        end("Maximum_Iterations_Exceeded", 0.0, 0.0),
+        end("Restoration_Failed", 1.0, 1e-7),
+        end("Solve_Succeeded", 9.0, 0.1),
+        end("Restoration_Failed", 0.0, 0.2),
+        end("Invalid_Number_Detected", 0.0, math.nan),
+    ]
+    ranks = [item.rank for item in ranked]
+    assert ranks == sorted(ranks)
+    assert len(set(ranks)) == len(ranks)
+    assert [item.success for item in ranked] == [True, True, *[False] * 5]
+    assert not end("Solve_Succeeded", math.nan, 0.0).success
+    assert end("Solve_Succeeded", 9.0, 0.1).status == "converged, but the exact functions find it infeasible"
+    assert end("Restoration_Failed", 0.0, 0.2).status == "restoration of feasibility failed"
+    assert end("Insufficient_Memory", 0.0, 0.2).status == "insufficient memory"
+    assert set(CONVERGED) < set(STATUS_WORDS)
+
+
+def test_options_that_lie_in_the_working_folder_change_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """IPOPT reads ``ipopt.opt`` by itself; this one would stop at once, and leave a file."""
+    expected = solve(toy(corner))
+    (tmp_path / "ipopt.opt").write_text("acceptable_tol 1e10\nacceptable_iter 1\noutput_file left.txt\n")
+    monkeypatch.chdir(tmp_path)
+    linear_solver.cache_clear()
+    solution = solve(toy(corner))
+    assert (solution.x, solution.iterations) == (expected.x, expected.iterations)
+    assert solution.linear_solver == expected.linear_solver
+    assert [path.name for path in tmp_path.iterdir()] == ["ipopt.opt"]
+    assert "".join(capfd.readouterr()) == ""
+
+
+def test_the_linear_solver_is_the_one_that_ipopt_names(capfd: pytest.CaptureFixture[str]) -> None:
+    x = MX.sym("x")
+    ca.nlpsol("loud", "ipopt", {"x": x, "f": x**2}, {"ipopt.option_file_name": ""})(x0=1.0)
+    banner = capfd.readouterr().out
+    assert f"running with linear solver {linear_solver()}" in banner
+    assert ipopt_for(toy(corner), IpoptSettings()).linear_solver == linear_solver()

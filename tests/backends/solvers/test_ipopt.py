@@ -1,0 +1,204 @@
+"""Solutions by IPOPT: feasible by the exact functions, with true prices, and honest when there is none."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.problem.gait_problem import Constraint
+from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.solution import Solution, StartOutcome
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, toy
+
+# Step of a limit for the difference quotient; the optimum's curvature and IPOPT's tolerance of 1e-8 leave 1e-3 of a price.
+PRICE_STEP, PRICE_TOLERANCE = 1e-5, 5e-3
+TOY_TOLERANCE = 1e-6  # IPOPT's tolerance of 1e-8 times slopes of order ten
+
+
+@pytest.fixture(scope="module")
+def single_support() -> tuple[GaitProblem, Solution]:
+    problem = load("nao-ssp")
+    return problem, solve(problem, starts=2, seed=0)
+
+
+@pytest.fixture(scope="module")
+def double_support() -> tuple[GaitProblem, Solution]:
+    problem = load("nao-dsp")
+    return problem, solve(problem, starts=2, seed=0)
+
+
+def point(solution: Solution) -> np.ndarray:
+    return np.array(list(solution.x.values()))
+
+
+@pytest.mark.parametrize("phase", ["single_support", "double_support"])
+def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pytest.FixtureRequest) -> None:
+    problem, solution = request.getfixturevalue(phase)
+    cost, violation = (float(value) for value in exact_model(problem).function(point(solution), problem.p)[:2])
+    assert solution.success
+    assert solution.status == "converged"
+    assert violation <= FEASIBILITY_TOLERANCE
+    assert (solution.violation, solution.objective) == (violation, cost)
+    assert solution.worst_violations == ()
+    assert (point(solution) >= problem.lower).all()
+    assert (point(solution) <= problem.upper).all()
+
+
+@pytest.mark.parametrize("phase", ["single_support", "double_support"])
+def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.FixtureRequest) -> None:
+    """Each bound moved by a little, and the problem solved again from the optimum."""
+    problem, solution = request.getfixturevalue(phase)
+    prices = {f"{bound.name} {bound.side}": bound for bound in solution.active_constraints}
+    for key, parameter in (
+        ("dbm_y_mean lower", "dbm_y_mean_limit_m"),
+        ("bounds[hip_height_m] upper", "hip_height_m.upper"),
+    ):
+        bound = prices[key]
+        assert bound.bound == problem.value(parameter)
+        assert bound.price_unit == "W per m"
+        moved = problem.with_values(**{parameter: bound.bound + PRICE_STEP})
+        again = solve(moved, x0=point(solution))
+        assert again.success
+        assert (again.objective - solution.objective) / PRICE_STEP == pytest.approx(bound.price, rel=PRICE_TOLERANCE)
+
+
+def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Solution]) -> None:
+    _, solution = single_support
+    counts = dataclasses.asdict(solution.evaluations)
+    assert counts.keys() == {"f", "g", "gradient", "jacobian", "hessian"}
+    assert all(count >= solution.iterations > 0 for count in counts.values())
+    assert solution.time_s.build > 0
+    assert solution.time_s.compile > 0
+    assert solution.time_s.solve == pytest.approx(sum(start.time_s for start in solution.starts))
+    assert solution.linear_solver.lower().startswith(("mumps", "ma", "spral", "pardiso"))
+    assert [start.index for start in solution.starts] == [0, 1]
+    assert json.loads(json.dumps(solution.to_json()))["x"] == solution.x
+
+
+def test_the_same_seed_gives_the_same_start_and_the_same_end(double_support: tuple[GaitProblem, Solution]) -> None:
+    problem, first = double_support
+    second = solve(problem, starts=1, seed=0)
+    assert second.starts[0].x0 == first.starts[0].x0
+    assert second.starts[0].x == first.starts[0].x  # bit for bit
+    assert first.starts[1].x0 != first.starts[0].x0
+
+
+def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Solution]) -> None:
+    problem, free = double_support
+    held = solve(problem, x0=point(free), fix={"double_support_time_s": 1.0})
+    assert held.success
+    assert held.x["double_support_time_s"] == 1.0
+    assert held.objective > free.objective
+    assert held.parameters == {"double_support_time_s.lower": 1.0, "double_support_time_s.upper": 1.0}
+
+
+def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
+    problem = load("nao-dsp").with_values(dbm_y_mean_limit_m=0.2)  # the box of both soles is 0.18 m wide
+    solution = solve(problem, starts=1, settings=IpoptSettings(iterations=60))
+    assert not solution.success
+    assert solution.status.startswith("no start converged to a feasible point; the least infeasible one ")
+    assert "in the way: " in solution.status
+    assert "dbm_y_mean" in [row.name for row in solution.worst_violations]
+    assert solution.active_constraints == ()
+    assert solution.violation == min(start.violation for start in solution.starts)
+
+
+@pytest.mark.parametrize(("limit", "objective", "price"), [(0.5, 0.0, None), (1.5, 1.5, 3.0)])
+def test_a_corner_by_hand(limit: float, objective: float, price: float | None) -> None:
+    solution = solve(toy(corner).with_values(limit=limit), starts=2)
+    assert solution.success
+    assert solution.objective == pytest.approx(objective, abs=TOY_TOLERANCE)
+    assert list(solution.x.values()) == pytest.approx([max(limit, 1.0)] * 2, abs=TOY_TOLERANCE)
+    prices = {bound.name: (bound.side, bound.bound, bound.price_unit) for bound in solution.active_constraints}
+    assert prices == ({"row": ("lower", limit, "J per m")} if price else {})
+    assert [bound.price for bound in solution.active_constraints] == pytest.approx([price] if price else [], abs=1e-5)
+
+
+def test_a_corner_out_of_reach_is_missed_by_what_it_is_out_of_reach() -> None:
+    solution = solve(toy(corner).with_values(limit=2.5), starts=2)
+    assert not solution.success
+    (violation,) = solution.worst_violations
+    assert (violation.name, violation.lower, violation.unit) == ("row", 2.5, "m")
+    assert violation.violation == pytest.approx(0.5, abs=1e-4)  # x ends at 2, its upper bound
+    assert "row (by 0.5 m)" in solution.status
+    assert solution.status.endswith("relax these limits or widen the bounds")
+
+
+def test_what_is_maximised_has_prices_in_its_own_sense() -> None:
+    def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return 3 * ops.min(x, 10 + 0 * y) - ops.abs(y), ()
+
+    solution = solve(toy(mathematics, "maximise"), starts=2)
+    assert solution.objective == pytest.approx(6.0, abs=TOY_TOLERANCE)
+    (bound,) = solution.active_constraints
+    assert (bound.name, bound.side, bound.bound) == ("bounds[x]", "upper", 2.0)
+    assert bound.price == pytest.approx(3.0, abs=1e-5)  # a higher bound on x raises the objective
+
+
+def test_a_limit_changes_without_building_anything_anew() -> None:
+    problem = toy(corner)
+    solve(problem)
+    model = nlp_model(problem)
+    other = solve(problem.with_values(limit=1.25))
+    assert other.objective == pytest.approx(0.75, abs=TOY_TOLERANCE)
+    assert other.time_s.build == model.build_s
+    assert other.parameters == {"limit": 1.25}
+
+
+def test_start_points_come_from_the_bounds_and_x0_goes_first() -> None:
+    seen: list[StartOutcome] = []
+    solution = solve(
+        toy(corner).with_values(**{"x.upper": -1.0}), starts=5, seed=3, x0=[-1.5, 9.0], progress=seen.append
+    )
+    assert solution.starts == tuple(seen)
+    assert seen[0].x0 == {"x": -1.5, "y": 3.0}  # 9 is pushed to the bound
+    assert all(-2.0 <= start.x0["x"] <= -1.0 for start in seen)
+    assert len({start.x0["y"] for start in seen}) == 5
+
+
+def test_an_iteration_limit_is_reported_as_such() -> None:
+    solution = solve(load("nao-dsp"), settings=IpoptSettings(iterations=2))
+    assert not solution.success
+    assert "stopped at the iteration limit" in solution.status
+    assert solution.starts[0].iterations == 2
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"tolerance": 0.0}, r"tolerance must be within \(0, 1\), got 0\.0"),
+        ({"tolerance": np.nan}, "tolerance must be within"),
+        ({"iterations": 0}, "iterations and time_limit_s must be positive, got 0"),
+        ({"time_limit_s": np.nan}, "must be positive"),
+        ({"hessian": "none"}, "hessian must be 'exact', 'limited-memory' or None, got 'none'"),
+    ],
+)
+def test_settings_that_ipopt_would_refuse_late_are_refused_early(settings: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        IpoptSettings(**settings)  # type: ignore[arg-type]
+
+
+def test_wrong_input_is_refused_before_any_work() -> None:
+    problem = toy(corner)
+    with pytest.raises(InputError, match="starts must be at least 1, got 0"):
+        solve(problem, starts=0)
+    with pytest.raises(InputError, match=r"x of toy must have 2 values \(x, y\), got shape \(3,\)"):
+        solve(problem, x0=[1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="x of toy: y must be finite, got nan"):
+        solve(problem, x0=[1.0, np.nan])
+    with pytest.raises(UnknownNameError, match="unknown variable of toy 'z'; known: x, y"):
+        solve(problem, fix={"z": 1.0})
+    with pytest.raises(
+        InputError, match=r"variable 'x' cannot be fixed at 5\.0: its bounds are \[-2, 2\] m; widen them"
+    ):
+        solve(problem, fix={"x": 5.0})

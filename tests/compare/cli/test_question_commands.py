@@ -1,0 +1,174 @@
+"""`pareto` and `certainty` as scripts use them, Ctrl-C where questions are answered, and a linear solver that is not there."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from compare.cli import app
+from compare.questions.motors import study as motors
+from compare.questions.pareto import front as pareto_front
+from compare.questions.prices import study as prices
+from compare.questions.robust import study as robust
+from nlp_gait.backends.solvers.iteration_watch import IterationWatch
+
+# Three free variables, so that both the front and a search of one generation take no time.
+SMALL = ["nao-ssp", "--intervals", "4", "--starts", "1", "--seed", "0"]
+FIXED = {
+    "hip_height_m": 0.31,
+    "hip_vz_start_m_s": -0.00122,
+    "hip_vz_end_m_s": 0.0035,
+    "hip_vx_start_m_s": 0.01243,
+    "hip_vx_end_m_s": 0.001,
+    "swing_height_m": 0.015,
+}
+PARETO = ["pareto", *SMALL, "--points", "5", *(f"--fix={name}={value}" for name, value in FIXED.items())]
+CERTAINTY = ["certainty", "walk12", "--starts", "4", "--evaluations", "0"]
+
+
+def nlp_gait(*arguments: str | Path, status: int = 0) -> Result:
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert done.exit_code == status, f"{arguments}: {done.exit_code} {done.exception!r}\n{done.output}"
+    return done
+
+
+def one_sentence(*arguments: str | Path, status: int = 1) -> str:
+    error = nlp_gait(*arguments, status=status).stderr
+    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    return error
+
+
+def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
+    done = nlp_gait(
+        *PARETO, "--objectives", "power,speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path, "--json"
+    )
+    data = json.loads(done.stdout)
+    powers = [point["power_W"] for point in data["front"]]
+    assert len(powers) >= 4 and powers == sorted(powers)
+    assert data["criterion"] == {"name": "speed", "unit": "m/s"}
+    assert [(row["algorithm"], row["budget"], row["runs"]) for row in data["searches"]] == [("NSGA2", 100, 1)]
+    written = {Path(file).name for file in data["files"]}
+    assert written >= {"nao-ssp-front-speed.csv", "nao-ssp-pareto-speed.json"}
+    assert all(Path(file).stat().st_size > 0 for file in data["files"])
+    again = nlp_gait(
+        *PARETO, "--objectives", "power,speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path
+    )  # from its finished steps
+    assert "price" in again.stdout and " W per m/s " in again.stdout and "wrote " in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--objectives", "power,dbm_z"], ["unknown objective beside power 'dbm_z'", "dbm_y_mean"]),
+        (["--objectives", "power"], ["--objectives takes power and one or two of", "got 'power'"]),
+        (["--search", "NSGA2"], ["--search takes NAME=BUDGET,BUDGET", "'NSGA2'"]),
+        (["--search", "NSGA3=100"], ["one of NSGA2, CMOPSO", "'NSGA3'"]),
+        (["--search", "NSGA2=10"], ["at least the population of 100", "[10]"]),
+        (["--objectives", "power,dbm_y_mean,speed", "--search", "NSGA2=100"], ["leave out --search"]),
+    ],
+)
+def test_pareto_refuses_in_one_sentence_before_the_work(arguments: list[str], words: list[str], tmp_path: Path) -> None:
+    error = one_sentence(*PARETO, *arguments, "--out", tmp_path)
+    for word in words:
+        assert word in error
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_certainty_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
+    done = nlp_gait(*CERTAINTY, "--time-limit", "0", "--out", tmp_path, "--json")
+    data = json.loads(done.stdout)
+    assert data["optima"][0]["objective"] == pytest.approx(0.970839, rel=1e-5)
+    assert sum(data["statuses"].values()) == 4 and data["certificate"] is None
+    assert (tmp_path / "walk12-certainty.json").as_posix() in data["files"]
+    assert all(Path(file).stat().st_size > 0 for file in data["files"])
+
+
+def test_a_certificate_without_time_for_a_finite_bound_says_so(tmp_path: Path) -> None:
+    done = nlp_gait(*CERTAINTY, "--time-limit", "1e-9", "--out", tmp_path)
+    assert "Proven: nothing: the time limit came before a finite bound" in done.stdout
+    data = json.loads((tmp_path / "walk12-certainty.json").read_text())
+    assert data["certificate"]["bound"] is None and data["certificate"]["closed"] is False
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1", "nan", "inf"])
+def test_certainty_refuses_a_tolerance_before_the_work(wrong: str, tmp_path: Path) -> None:
+    error = one_sentence(*CERTAINTY, "--tolerance", wrong, "--out", tmp_path)
+    assert "tolerance must be positive and finite" in error and wrong in error
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_a_linear_solver_that_is_not_there_is_refused() -> None:
+    try:
+        error = one_sentence("solve", "walk12", "--starts", "1", "--linear-solver", "ma57")
+    except AssertionError:
+        assert "with ma57" in nlp_gait("solve", "walk12", "--starts", "1", "--linear-solver", "ma57").stdout
+        pytest.skip("ma57 is installed here")
+    assert "linear solver 'ma57' does not run in this installation" in error and "leave linear_solver out" in error
+
+
+def press(*_: object, **__: object) -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def pressed_in_call(number: int, function: Callable[..., object]) -> Callable[..., object]:
+    """The function, with Ctrl-C in place of one of its calls."""
+    count = 0
+
+    def counted(*arguments: object, **named: object) -> object:
+        nonlocal count
+        count += 1
+        return press() if count == number else function(*arguments, **named)
+
+    return counted
+
+
+def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+    evaluate = IterationWatch.eval
+
+    def counted(watch: IterationWatch, arguments: object) -> object:
+        if begun:
+            press()
+        return evaluate(watch, arguments)
+
+    ends = pareto_front.front_ends
+
+    def found(*arguments: object, **named: object) -> object:
+        result = ends(*arguments, **named)  # type: ignore[arg-type]
+        begun.append("front")
+        return result
+
+    monkeypatch.setattr(IterationWatch, "eval", counted)
+    monkeypatch.setattr(pareto_front, "front_ends", found)
+    steps = tmp_path / "steps"
+    steps.mkdir()
+    (steps / "earlier.json").write_text("{}")
+    error = one_sentence(*PARETO, "--search", "none", "--out", tmp_path, status=130)
+    assert error == f"nlp-gait: interrupted; 1 finished steps are kept in {tmp_path}; the same command continues\n"
+
+
+def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motors, "solve", pressed_in_call(2, motors.solve))
+    done = nlp_gait("motors", "nao-ssp", "--intervals", "3", "--starts", "1", "--out", tmp_path, status=130)
+    assert f"interrupted after 1 of 7 variants; what was found is in {tmp_path}\n" in done.stderr
+    assert len((tmp_path / "nao-ssp-motors.csv").read_text().splitlines()) == 2
+
+
+def test_ctrl_c_before_the_first_result_says_that_nothing_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (motors, robust):
+        monkeypatch.setattr(module, "solve", press)
+    monkeypatch.setattr(prices, "solved", press)
+    out = ["--out", tmp_path]
+    assert "after 0 of 7 variants; nothing was written" in one_sentence("motors", *out, status=130)
+    assert "after 0 of 3 boxes; nothing was written" in one_sentence("robust", "--no-simulate", *out, status=130)
+    assert "interrupted; nothing was written" in one_sentence("prices", "walk12", *out, status=130)
+    assert not list(tmp_path.iterdir())

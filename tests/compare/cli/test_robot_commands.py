@@ -1,0 +1,98 @@
+"""``simulate``, ``export`` and ``animate`` as scripts use them."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+
+X = {
+    "hip_height_m": 0.31,
+    "hip_vz_start_m_s": -0.0008,
+    "hip_vz_end_m_s": -0.0055,
+    "hip_vx_start_m_s": 0.052,
+    "hip_vx_end_m_s": 0.001,
+    "hip_vy_start_m_s": -0.0367,
+    "hip_vy_end_m_s": -0.0424,
+    "double_support_time_s": 2,
+}
+
+
+@pytest.fixture
+def gait(tmp_path):
+    path = tmp_path / "gait.json"
+    path.write_text(json.dumps({"problem": "nao-dsp", "x": X}))
+    return path
+
+
+def nlp_gait(*arguments, status=0):
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert done.exit_code == status, f"{arguments}: {done.exit_code} {done.exception!r}\n{done.output}"
+    return done
+
+
+def test_simulate_reports_and_writes_its_folder(gait, tmp_path):
+    pytest.importorskip("mujoco")
+    out = tmp_path / "out"
+    report = json.loads(nlp_gait("simulate", gait, "--out", out, "--json").stdout)
+    assert report["fallen"] is False and report["measured"]["mechanical_W"] > 0.0
+    assert json.loads((out / "report.json").read_text()) == report
+    written = sorted(p.name for p in out.iterdir())
+    assert written == ["model.xml", "playback.npz", "playback.png", "playback.svg", "report.json"]
+    with np.load(out / "playback.npz") as arrays:
+        assert arrays["q"].shape == (len(arrays["t"]), 22) == arrays["set_points"].shape
+
+
+def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    error = nlp_gait("simulate", gait, status=1).stderr
+    assert error.count("\n") == 1 and "pip install 'nlp-gait[sim]'" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["export", "GAIT", "--format", "webot"], ["unknown format 'webot'", "webots"]),
+        (["export", "absent.json", "--format", "csv"], ["'absent.json' cannot be read"]),
+        (["animate", "GAIT", "--out", "walk.avi"], ["ends in .gif or .mp4"]),
+        (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
+        (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
+        (["simulate", "GAIT", "--viewer", "--video", "walk.gif"], ["exclude each other"]),
+    ],
+)
+def test_bad_input_is_one_sentence(gait, arguments, words):
+    if arguments[0] == "simulate":
+        pytest.importorskip("mujoco")
+    error = nlp_gait(*(gait if a == "GAIT" else a for a in arguments), status=1).stderr
+    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    for word in words:
+        assert word in error
+
+
+def test_export_goes_beside_the_result_by_default(gait):
+    assert "gait.motion" in nlp_gait("export", gait, "--format", "webots").stdout
+    assert gait.with_name("gait.motion").read_text().startswith("#WEBOTS_MOTION,V1.0,LHipYawPitch,")
+
+
+def test_animate_writes_a_video_and_a_sheet(gait, tmp_path):
+    nlp_gait("animate", gait, "--fps", "1")
+    assert gait.with_suffix(".gif").stat().st_size > 5_000
+    nlp_gait("animate", gait, "--out", tmp_path / "sheet.png", "--poses", "2")
+    assert (tmp_path / "sheet.png").stat().st_size > 10_000
+
+
+def test_a_film_is_made_without_a_display(gait, tmp_path):
+    """In a process of its own, for the graphics driver is chosen when the engine is imported."""
+    pytest.importorskip("mujoco")
+    film = tmp_path / "film.gif"
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
+    command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film), "--fps", "4"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
+        pytest.skip("no off-screen graphics here")
+    assert done.returncode == 0, done.stderr
+    assert "stays up" in done.stdout and film.stat().st_size > 20_000

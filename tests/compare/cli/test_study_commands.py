@@ -1,0 +1,84 @@
+"""`compare`, `search` and `report` as scripts use them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.compare.cli.test_contract import as_json, nlp_gait
+
+STUDY = """
+runs = 1
+starts = 1
+evaluations = 300
+[[problem]]
+name = "nao-ssp"
+[[solver]]
+algorithm = "ipopt"
+[[solver]]
+algorithm = "pso"
+label = "little-pso"
+settings = {population = 20}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("study")
+    (out / "study.toml").write_text(STUDY)
+    done = as_json("compare", "--config", str(out / "study.toml"), "--out", str(out / "out"))
+    assert [s["algorithm"] for s in done["problems"]["nao-ssp"]] == ["ipopt", "little-pso"]
+    assert all(Path(file).stat().st_size for file in done["files"])
+    return out / "out"
+
+
+def test_resume_needs_no_other_option_and_keeps_everything(folder: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
+    assert len(before) == 2
+    nlp_gait("compare", "--resume", "--out", str(folder), "--jobs", "1")
+    assert {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")} == before
+    sessions = json.loads((folder / "study.json").read_text())["sessions"]
+    assert len(sessions) >= 2 and "--resume" in sessions[-1]["command"] and sessions[-1]["machine"]["processor"]
+
+
+def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> None:
+    import shutil
+
+    shutil.copytree(folder / "records", tmp_path / "records")
+    files = as_json("report", str(tmp_path), "--gradient-weight", "0", "--hessian-weight", "0")["files"]
+    assert (tmp_path / "report.html").as_posix() in files
+    assert "little-pso" in (tmp_path / "report.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["compare", "--resume", "--out", "{folder}", "--runs", "3"], ["--resume", "leave out --runs"]),
+        (["compare", "nao-ssp", "--config", "x.toml", "--out", "{new}"], ["--config", "leave out [PROBLEM]"]),
+        (["compare", "nao-ssp", "--runs", "2", "--out", "{folder}"], ["holds another study", "--out"]),
+        (["compare", "--resume", "--out", "{new}"], ["no study to resume"]),
+        (["compare", "--config", "{new}/none.toml", "--out", "{new}"], ["cannot be read"]),
+        (["compare", "nao-ssp", "--algorithms", "psso", "--out", "{new}"], ["unknown algorithm 'psso'", "pso"]),
+        (["compare", "nao-ssp", "--handling", "penalty", "--out", "{new}"], ["--penalty-weight"]),
+        (["compare", "nao-ssp", "--handling", "dep", "--out", "{new}"], ["unknown constraint handling 'dep'", "deb"]),
+        (["search", "nao-ssp", "--penalty-weight", "2"], ["go together"]),
+        (["search", "nao-ssp", "--time-limit", "-1"], ["time_limit_s must be"]),
+        (["report", "{new}"], ["holds no records"]),
+    ],
+)
+def test_wrong_use_is_one_sentence(arguments: list[str], words: list[str], folder: Path, tmp_path: Path) -> None:
+    filled = [a.replace("{folder}", str(folder)).replace("{new}", str(tmp_path)) for a in arguments]
+    error = nlp_gait(*filled, status=1).stderr
+    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    for word in words:
+        assert word in error
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_search_stops_for_the_reason_asked_for_and_polishes() -> None:
+    found = as_json("search", "nao-ssp", "--runs", "1", "--target", "1.0", "--polish", "--handling", "epsilon")
+    (run,), (polished,) = found["runs"], found["polished"]
+    assert run["status"] == "target reached" and run["objective"] <= 1.0 and run["evaluations"] < 10_000
+    assert polished["objective"] == pytest.approx(0.845868, rel=1e-5)

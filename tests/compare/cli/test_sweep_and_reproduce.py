@@ -1,0 +1,48 @@
+"""The commands ``sweep`` and ``reproduce`` as scripts use them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from importlib import import_module
+from inspect import signature
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.cli.reproduce import REPRODUCTIONS
+
+RUN = CliRunner()
+
+
+def test_sweep_writes_table_and_picture(tmp_path: Path) -> None:
+    over = ["--over", "hip_height_m=0.305:0.31:2"]
+    done = RUN.invoke(
+        app, ["sweep", "nao-dsp", *over, "--algorithm", "pso", "--evaluations", "300", "--out", str(tmp_path), "--json"]
+    )
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert [point["at"] for point in result["points"]] == [{"hip_height_m": 0.305}, {"hip_height_m": 0.31}]
+    table, *pictures = (Path(name) for name in result["files"])
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [float(row["power_W"]) for row in rows] == [point["objective"] for point in result["points"]]
+    assert all(picture.stat().st_size > 0 for picture in pictures)
+
+
+def test_sweep_over_nonsense_is_one_sentence(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["sweep", "nao-dsp", "--over", "hip_height_m=low:high:3", "--out", str(tmp_path)])
+    assert done.exit_code == 1
+    assert done.stdout == "" and done.stderr.startswith("nlp-gait: --over takes")
+
+
+def test_every_reproduction_can_be_called_alike() -> None:
+    for name in REPRODUCTIONS.values():
+        assert list(signature(import_module(name).reproduce).parameters) == ["out", "progress"]
+
+
+def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["reproduce", "nap", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert done.stderr == "nlp-gait: unknown reproduction 'nap'; did you mean 'nao'?\n"
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,85 @@
+"""Stick figures of all problems."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import nlp_gait
+from compare.drawing.animation import contact_sheet, frames
+from compare.drawing.skeletons import skeleton_of
+from nlp_gait.problem.registry import problem_names
+from nlp_gait.problem.result import Result
+
+SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
+WALK = (0.13, 0.1135, 0.02, 0.0204)
+
+
+def drawn(name, x=None, frames_per_s=2.5, **options):
+    problem = nlp_gait.load(name, **options)
+    point = problem.start_point(np.random.default_rng(0)) if x is None else problem.check_x(x)
+    return skeleton_of(Result(problem=problem, x=point), frames_per_s)
+
+
+@pytest.fixture(scope="module")
+def nao():
+    return drawn("nao-ssp", SSP)
+
+
+def test_nao_has_its_lengths_and_stands_on_its_soles(nao):
+    left = next(limb for limb in nao.limbs if limb.side == "left").points
+    lengths = np.linalg.norm(np.diff(left, axis=1), axis=2)
+    np.testing.assert_allclose(lengths[:, 1:], [[0.1, 0.1029, 0.04519]] * len(nao.t), atol=1e-9)
+    np.testing.assert_allclose(left[:, -1], [[0.06, 0.05, 0.0]] * len(nao.t), atol=1e-9)
+    assert [sole.supports.tolist() for sole in nao.soles] == [[True] * 11, [True] + [False] * 9 + [True]]
+
+
+def test_the_support_polygon_is_the_hull_of_loaded_soles(nao):
+    alone, both = nao.support(5), nao.support(0)
+    assert sorted(map(tuple, alone.round(9))) == [(0.01, 0.01), (0.01, 0.09), (0.16, 0.01), (0.16, 0.09)]
+    assert len(both) == 6 and both[:, 1].min() == pytest.approx(-0.09)
+
+
+def test_walk12_legs_reach_from_hip_to_ankle():
+    walk = drawn("walk12", WALK, 20.0)
+    lengths = np.linalg.norm(np.diff(np.stack([limb.points for limb in walk.limbs]), axis=2), axis=3)
+    np.testing.assert_allclose(lengths[..., 1:], np.broadcast_to(lengths[0, 0, 1:], lengths[..., 1:].shape), atol=1e-9)
+    assert walk.soles[0].supports[0] and not walk.soles[0].supports[-1]
+
+
+@pytest.mark.parametrize("name", problem_names())
+def test_every_problem_can_be_drawn(name):
+    skeleton = drawn(name)
+    low, high = skeleton.box()
+    assert np.isfinite(low).all() and (high - low).max() > 0.1
+    assert all(len(limb.points) == len(skeleton.t) for limb in skeleton.limbs)
+
+
+def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
+    problem = nlp_gait.load("stairs-plan")
+    x = problem.start_point(np.random.default_rng(0))
+    arrays = problem.signals(x, problem.p).arrays
+    swing = next(limb for limb in drawn("stairs-plan", frames_per_s=0.01).limbs if limb.side == "right").points
+    np.testing.assert_allclose(swing[:, 0][:, [0, 2]], arrays["hip"], atol=1e-9)
+    in_reach = np.abs(arrays["reach"]).max(axis=1) < 0.99  # beyond it the planner's leg does not meet its ankle
+    assert in_reach.sum() > 30
+    np.testing.assert_allclose(swing[in_reach, 2][:, [0, 2]], arrays["ankle"][in_reach], atol=1e-9)
+
+
+def test_stairs_are_drawn_under_the_feet():
+    stairs = drawn("stairs-ideal")
+    assert stairs.planar and stairs.support(0) is None
+    rises = np.unique(stairs.ground[:, 1])
+    assert len(rises) == 3 and rises[1] == 0.0 and rises[2] == pytest.approx(-rises[0])
+    stance = next(limb for limb in stairs.limbs if limb.side == "left").points
+    np.testing.assert_allclose(stance[:, 2:, 2], 0.0, atol=1e-12)
+
+
+def test_frames_differ_and_a_sheet_is_written(nao, tmp_path):
+    made = frames(nao)
+    first, second = next(made), next(made)
+    assert first.shape == second.shape and first.dtype == np.uint8
+    assert (first != second).any() and first.min() < 100
+    sheet = tmp_path / "sheet.png"
+    contact_sheet(nao, sheet, poses=2)
+    with Image.open(sheet) as image:
+        assert min(image.size) > 300

@@ -1,0 +1,114 @@
+"""Certainty: proofs for problems whose optimum is known, clusters, estimates with known answers, and resumption."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from casadi import MX
+
+import nlp_gait
+from compare.questions.certainty.branch_and_bound import certify
+from compare.questions.certainty.clusters import Optimum, cluster, unseen
+from compare.questions.certainty.multistart import Ends, multistart
+from compare.questions.certainty.report import write_certainty
+from compare.questions.certainty.study import certainty
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import Constraint
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import row, toy
+
+
+def two_valleys(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+    """10 + (x^2 - 1)^2 + x / 10 + y^2 above the line x + y = limit; valleys near x = -1 and x = 1."""
+    return 10 + (x**2 - 1) ** 2 + x / 10 + y**2, (row(x + y, lower=limit),)
+
+
+def test_the_bound_of_a_constrained_problem_is_proven_and_just() -> None:
+    problem = toy(two_valleys, limit=0.0)  # the better valley at x = -1 would need y = 1
+    best = nlp_gait.solve(problem, starts=10)
+    certificate = certify(problem, np.array(list(best.x.values())), tolerance=1e-4, time_limit_s=60.0)
+    assert certificate.closed
+    assert certificate.bound <= best.objective
+    assert certificate.gap == pytest.approx(1e-4)
+
+
+def test_an_incumbent_that_is_not_the_optimum_is_found_out() -> None:
+    problem = toy(two_valleys, limit=-9.0)
+    worse = np.array([0.987, 0.0])  # the local optimum near x = 1, 0.2 above the other one
+    certificate = certify(problem, worse, tolerance=1e-3, time_limit_s=1.0)
+    assert not certificate.closed
+    assert certificate.bound < 9.9 < 10.09 < certificate.objective
+
+
+def test_a_maximum_is_bounded_from_above() -> None:
+    def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        return 5 - x**2 - (y - 1) ** 2, (row(x, upper=limit),)
+
+    certificate = certify(toy(hill, "maximise"), np.array([0.0, 1.0]), tolerance=1e-3, time_limit_s=60.0)
+    assert certificate.closed
+    assert certificate.bound == pytest.approx(5.005)
+
+
+def test_an_infeasible_incumbent_is_refused() -> None:
+    with pytest.raises(InputError, match="infeasible"):
+        certify(toy(two_valleys, limit=2.0), np.array([0.0, 0.0]))
+
+
+def ends(x: list[float], objective: list[float], success: list[bool]) -> Ends:
+    return Ends(
+        x=np.array([[value, 0.0] for value in x]),
+        objective=np.array(objective),
+        success=np.array(success),
+        status=("converged",) * len(x),
+        time_s=np.zeros(len(x)),
+    )
+
+
+def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_none() -> None:
+    found = cluster(
+        toy(two_valleys), ends([1.0, -1.0, 1.001, 0.5], [2.0, 2.0, 2.00001, 1.0], [True, True, True, False])
+    )
+    assert [optimum.count for optimum in found] == [2, 1]
+    assert [optimum.objective for optimum in found] == [2.0, 2.0]
+    assert sum(optimum.share for optimum in found) == pytest.approx(1.0)
+
+
+def test_estimates_by_hand() -> None:
+    counts = (6, 3, 1)
+    estimate = unseen([Optimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
+    assert estimate.good_turing == pytest.approx(0.1)
+    assert estimate.expected_optima == pytest.approx(3 * 9 / 5)
+    assert estimate.expected_covered == pytest.approx(6 * 13 / 90)
+    assert (1 - estimate.largest_missed) ** 10 == pytest.approx(0.05)
+    assert unseen([Optimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
+
+
+def test_an_interrupted_multistart_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compare.questions.certainty.multistart.BATCH", 4)
+    problem = toy(two_valleys)
+    whole = multistart(problem, tmp_path / "whole", starts=8, progress=lambda count, note: None)
+
+    def interrupt(count: int, note: str) -> None:
+        if count:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        multistart(problem, tmp_path / "cut", starts=8, progress=interrupt)
+    notes: list[str] = []
+    resumed = multistart(problem, tmp_path / "cut", starts=8, progress=lambda count, note: notes.append(note))
+    assert "starts-0: kept from an earlier run" in notes
+    np.testing.assert_array_equal(whole.x, resumed.x)
+
+
+def test_a_study_says_what_is_proven_and_what_is_supported(tmp_path: Path) -> None:
+    problem = toy(two_valleys, limit=-9.0)
+    study = certainty(problem, tmp_path, starts=12, evaluations=2000, time_limit_s=20.0, progress=lambda n, note: None)
+    assert len(study.optima) == 2
+    assert study.optima[0].x[0] < 0.0 < study.optima[1].x[0]
+    assert study.certificate is not None and study.certificate.closed
+    assert "no feasible x falls below" in study.proven
+    assert study.search is not None and study.search.gap == pytest.approx(0.0, abs=1e-6)
+    assert all(path.stat().st_size > 0 for path in write_certainty(tmp_path, study))
+    study.to_json()

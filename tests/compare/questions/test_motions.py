@@ -1,0 +1,124 @@
+"""The comparison of motions: what is solved, that it rises nowhere, and that it continues."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.judge import evaluate
+from compare.questions.motions import study as module
+from compare.questions.motions.report import rows, sentences
+from compare.questions.motions.study import Motion, limit, motions
+from compare.questions.motions.tasks import tasks
+from compare.study.task import ProblemSpec
+from nlp_gait.errors import InputError
+
+RUN = CliRunner()
+ORDERS = ["cubic", "quintic"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("motions")
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> list[Motion]:
+    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), folder / "motions")
+
+
+def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: list[Motion]) -> None:
+    cubic, quintic, coarse = found
+    assert all(motion.success for motion in found)
+    assert quintic.power_W < 0.9 * cubic.power_W
+    assert quintic.power_W == pytest.approx(quintic.dense_power_W, rel=0.01)
+    assert coarse.power_W == pytest.approx(coarse.dense_power_W, rel=0.1)
+    assert (cubic.coefficients, quintic.coefficients) == (0, 14)
+
+
+def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any, **__: Any) -> None:
+        raise AssertionError("solved again")
+
+    monkeypatch.setattr(module, "solve", never)
+    again: list[str] = []
+    study = tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0)
+    assert motions(study, folder / "motions", progress=again.append) == found
+    assert again == ["planned-cubic-power", "planned-quintic-power", "coarse-quintic-power"]
+    with pytest.raises(InputError, match="another study"):
+        motions(study, folder / "motions", seed=1)
+
+
+def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
+    command = ["motions", "nao-dsp", "--orders", "cubic,quintic", "--free-orders", "", "--starts", "0"]
+    command += ["--out", str(folder)]
+    done = RUN.invoke(app, [*command, "--json"])
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert [motion["power_W"] for motion in result["motions"]] == [motion.power_W for motion in found]
+    table, *pictures = (Path(name) for name in result["files"])
+    lines = list(csv.DictReader(table.read_text().splitlines()))
+    assert [float(line["power_W"]) for line in lines] == [motion.power_W for motion in found]
+    assert len(pictures) == 4 and all(picture.stat().st_size > 10_000 for picture in pictures)
+    printed = RUN.invoke(app, command).stdout
+    assert "11 samples: quintic" in printed and "never rises" in printed
+
+
+def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: list[Motion]) -> None:
+    *_, task = tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], starts=0)
+    problem = ProblemSpec(name=task.problem, options=task.options).load()
+    planned = ProblemSpec(name="nao-dsp", options=task.options).load()
+    x0 = module._start(task, problem, found)
+    assert x0 is not None
+    expected = evaluate(planned, np.array(list(found[1].x.values())))
+    assert evaluate(problem, x0).indexes["power_W"] == pytest.approx(expected.indexes["power_W"], rel=1e-9)
+
+
+def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
+    cubic, quintic, coarse = found
+    worse = replace(quintic, power_W=cubic.power_W + 0.01)
+    assert "power rises by up to 0.01 W" in sentences([cubic, worse, coarse])[0]
+    assert rows([cubic, worse])[1][3].startswith("-")
+
+
+@pytest.mark.parametrize("phase", ["nao-ssp", "nao-dsp"])
+def test_a_study_adds_free_joints_and_smoothness(phase: str) -> None:
+    study = tasks(phase, orders=["cubic", "spline-4"], free_orders=["spline-2"])
+    assert [(task.kind, task.problem, task.trajectory) for task in study] == [
+        ("planned", phase, "cubic"),
+        ("planned", phase, "spline-4"),
+        ("coarse", phase, "spline-4"),
+        ("smooth", phase, "spline-4"),
+        ("smooth", phase, "spline-4"),
+        ("free", f"{phase}-free", "spline-2"),
+    ]
+    assert [task.options["samples_per_interval"] for task in study] == [4, 4, 1, 4, 4, 8]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"phase": "walk12"}, "compared for nao-ssp and nao-dsp, got 'walk12'"),
+        ({"phase": "nao-ssp", "orders": ["quintic", "cubic"]}, "must rise and be among cubic, quintic"),
+        ({"phase": "nao-ssp", "free_orders": ["septic"]}, "must rise and be among cubic, quintic"),
+        ({"phase": "nao-ssp", "orders": []}, "at least one order"),
+    ],
+)
+def test_other_studies_are_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        tasks(**arguments)
+
+
+def test_the_limit_of_a_geometric_sequence_is_exact() -> None:
+    assert limit([3.0, 2.0, 1.5]) == pytest.approx(1.0)
+    assert limit([9.0, 3.0, 2.0, 1.5]) == pytest.approx(1.0)
+    assert limit([3.0, 2.0, 1.0]) is None and limit([3.0, 2.0]) is None and limit([3.0, 2.0, 2.5]) is None
+    assert limit([3.0, 2.0, 1.1]) is None  # would be 8.1 away, nine times as far as the last step

@@ -1,0 +1,187 @@
+"""Fronts: knees of made-up ones by hand, the criteria against the judge, a small front of NAO, searches beside it."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from compare.judge import evaluate
+from compare.questions.pareto.compare import quality
+from compare.questions.pareto.criteria import criterion, parse_objectives
+from compare.questions.pareto.front import FrontPoint, nondominated, pareto_front
+from compare.questions.pareto.knees import bends
+from compare.questions.pareto.report import write_front
+from compare.questions.pareto.search import SearchFront
+from compare.questions.pareto.study import ParetoStudy, pareto_study, parse_searches
+from compare.questions.pareto.surface import pareto_surface, write_surface
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.problem.gait_problem import GaitProblem
+
+X = np.array([0.31, -0.00122, 0.0035, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0])
+# Slopes by multipliers and by differences of neighbouring optima agree to this part.
+SLOPE_TOLERANCE = 0.02
+
+
+def points(pairs: list[tuple[float, float]]) -> list[FrontPoint]:
+    return [FrontPoint(demanded=v, value=v, power_W=w, price=0.0, violation=0.0, x=(0.0,)) for v, w in pairs]
+
+
+def broken_line(*corners: tuple[float, float]) -> list[FrontPoint]:
+    """Points along straight pieces between corners."""
+    v, w = np.array(corners).T
+    fine = np.unique(np.round(np.union1d(np.linspace(v[0], v[-1], 81), v), 9))
+    return points(list(zip(fine.tolist(), np.interp(fine, v, w).tolist(), strict=True)))
+
+
+def test_one_corner_is_one_knee() -> None:
+    found = bends(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
+    assert [knee.value for knee in found.knees] == pytest.approx([0.7])
+    assert found.convex
+    assert found.knees[0].turn_deg == pytest.approx(
+        np.degrees(np.arctan2(2.9 / 3, 0.3) - np.arctan2(0.1 / 3, 0.7)), abs=0.1
+    )
+
+
+def test_two_corners_with_a_flatter_piece_between_are_two_knees_of_a_front_that_is_not_convex() -> None:
+    found = bends(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
+    assert [knee.value for knee in found.knees] == pytest.approx([0.4, 0.9])
+    assert not found.convex
+
+
+def test_an_arc_has_no_knee() -> None:
+    angles = np.linspace(0.0, np.pi / 2, 60)
+    found = bends(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles]))
+    assert found.knees == ()
+    assert found.convex
+
+
+def test_dominated_points_go() -> None:
+    kept = nondominated(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
+    assert [(p.value, p.power_W) for p in kept] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_criteria_are_the_judges_numbers(name: str) -> None:
+    problem = nlp_gait.load(name)
+    x = X if name == "nao-ssp" else np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.0217, 2.0])
+    judged = evaluate(problem, x)
+    objective = nlp_gait.compile_objective(problem)
+    for margin in ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min"):
+        beside = criterion(margin, problem)
+        assert beside.value(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+        assert beside.values(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+    speed = criterion("speed", problem)
+    way = 0.06 if name == "nao-ssp" else 0.04  # of the hip, Tables 3 and 5
+    assert speed.value(problem, x) == pytest.approx(way / x[-1])
+    assert speed.limited(problem, 2 * way / x[-1]).upper[-1] == pytest.approx(x[-1] / 2)
+
+
+def test_prices_are_the_fronts_slopes() -> None:
+    problem = nlp_gait.load("nao-ssp")
+    for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
+        beside = criterion(name, problem)
+        free = beside.freed(problem)
+        below, here, above = (
+            nlp_gait.solve(beside.limited(free, at + k * step), starts=1, x0=X).objective for k in (-1, 0, 1)
+        )
+        solution = nlp_gait.solve(beside.limited(free, at), starts=1, x0=X)
+        assert below < here < above
+        assert beside.price(solution) == pytest.approx((above - below) / (2 * step), rel=SLOPE_TOLERANCE)
+
+
+def test_objectives_are_parsed() -> None:
+    assert parse_objectives("power,dbm_y_mean") == ["dbm_y_mean"]
+    assert parse_objectives("speed, power, dbm_x_mean") == ["speed", "dbm_x_mean"]
+    for wrong in ("power", "speed,dbm_y_mean", "power,speed,speed", "power,a,b,c"):
+        with pytest.raises(InputError, match="--objectives takes power"):
+            parse_objectives(wrong)
+    assert parse_searches(["none"]) == {}
+    assert parse_searches(["NSGA2=100,200"]) == {"NSGA2": (100, 200)}
+    with pytest.raises(InputError, match="--search takes"):
+        parse_searches(["NSGA2"])
+
+
+def test_what_cannot_be_traded_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="objective beside power"):
+        criterion("dbm_z", nlp_gait.load("nao-ssp"))
+    with pytest.raises(InputError, match="trades no power"):
+        criterion("speed", nlp_gait.load("walk12"))
+    with pytest.raises(InputError, match="at least 5"):
+        problem = nlp_gait.load("nao-ssp")
+        pareto_front(problem, criterion("speed", problem), points=2)
+
+
+def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothing() -> None:
+    front = broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0))
+    values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
+    none = np.empty(0)
+    runs = [
+        SearchFront(algorithm="NSGA2", run=0, budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
+        SearchFront(algorithm="NSGA2", run=1, budget=10, values=none, powers=none, X=np.empty((0, 1))),
+    ]
+    (row,) = quality(front, runs)
+    assert row.hypervolume == pytest.approx((0.0, 0.5, 1.0))
+    assert row.empty == 1
+    assert row.igd == pytest.approx((0.0, 0.0, 0.0))
+    assert row.excess == pytest.approx((0.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("pareto")
+
+
+@pytest.fixture(scope="module")
+def small() -> GaitProblem:
+    """Three free variables, so that a search of some hundred evaluations comes near the front."""
+    problem = nlp_gait.load("nao-ssp", intervals=4)
+    fixed = dict(zip(problem.names, X, strict=True))
+    free = ("hip_vy_start_m_s", "hip_vy_end_m_s", "single_support_time_s")
+    return problem.fix(**{name: value for name, value in fixed.items() if name not in free})
+
+
+def study(problem: GaitProblem, folder: Path, notes: list[str]) -> ParetoStudy:
+    return pareto_study(
+        problem,
+        "dbm_y_mean",
+        folder,
+        points=5,
+        starts=1,
+        searches={"NSGA2": (100, 300)},
+        runs=1,
+        seed=0,
+        progress=notes.append,
+    )
+
+
+def test_a_small_front_lies_below_what_searches_find_and_is_kept(small: GaitProblem, folder: Path) -> None:
+    found = study(small, folder, [])
+    values, powers = zip(*((p.value, p.power_W) for p in found.front), strict=True)
+    assert list(values) == sorted(values) and list(powers) == sorted(powers)
+    assert all(p.violation <= 1e-6 for p in found.front)
+    assert found.challenge is not None
+    assert found.challenge.infeasible == 0
+    assert found.challenge.least_excess > -1e-3
+    assert found.qualities[1].hypervolume[1] > 0.8
+    notes: list[str] = []
+    again = study(small, folder, notes)
+    assert any("kept from an earlier run" in note for note in notes)
+    assert [p.power_W for p in again.front] == list(powers)
+    table, *pictures = write_front(folder, found.front, found.bends, found.searches, found.problem, found.criterion)
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["power_W"]) for row in rows] == list(powers)
+    assert all(path.stat().st_size > 0 for path in pictures)
+
+
+def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> None:
+    surface = pareto_surface(small, ["dbm_y_mean", "speed"], points=4, starts=1, seed=0, progress=lambda note: None)
+    powers = {p.demanded: p.power_W for p in surface.points}
+    for (margin, speed), power in powers.items():
+        assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
+    assert len(surface.points) + len(surface.infeasible) == 4
+    assert all(path.stat().st_size > 0 for path in write_surface(folder, surface))

@@ -1,0 +1,57 @@
+"""Prices of limits and of errors in the robot's data, as command and as function."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.questions.prices.study import AGREEMENT, prices
+from compare.study.task import ProblemSpec
+
+RUN = CliRunner()
+
+
+def test_the_command_prices_every_limit_and_writes_table_and_picture(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    answer = json.loads(done.stdout)
+    assert answer["robot"] == [] and answer["weak"] == [] and answer["reason"] is None
+    dearest = answer["limits"][0]
+    assert dearest["name"] == "f2max_m"
+    # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
+    assert dearest["slope"] == pytest.approx(-0.85 / 0.13, rel=1e-6)
+    table, *pictures = (Path(name) for name in answer["files"])
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [row["quantity"] for row in rows] == [price["name"] for price in answer["limits"]]
+    assert all(picture.stat().st_size > 0 for picture in pictures)
+
+
+def test_the_table_says_units_and_steps(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "step_length_m.upper" in done.stdout and "1 mm" in done.stdout and "1 degree" in done.stdout
+
+
+def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
+    found = prices(ProblemSpec(name="walk12"), starts=2)
+    errors = [error for price in found.limits for error in (price.error, price.x_error) if error is not None]
+    assert len(errors) > 6
+    assert max(errors) < AGREEMENT
+    # A turn cannot be less than none: only the other side can be solved again.
+    turn = next(price for price in found.limits if price.name == "turn_rad")
+    assert turn.error is None and turn.one_step is not None
+    assert turn.one_step[0] is None and turn.one_step[1] == pytest.approx(turn.per_step, rel=0.05)
+
+
+def test_a_fixed_variable_has_one_price() -> None:
+    spec = ProblemSpec(name="walk12", values={"step_length_m.lower": 0.1, "step_length_m.upper": 0.1})
+    found = prices(spec, starts=2)
+    price = next(price for price in found.limits if price.name == "step_length_m")
+    assert price.x is not None and price.x["step_length_m"] == pytest.approx(1.0)
+    assert price.error is not None and price.error < AGREEMENT
+    assert not any(other.name.startswith("step_length_m.") for other in found.limits)

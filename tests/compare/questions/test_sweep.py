@@ -1,0 +1,119 @@
+"""Sweeps: axes, true curves, tables and pictures."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import pytest
+
+from compare.drawing.labels import axis_label, quantity
+from compare.questions.sweep.report import sweep_figure, write_sweep
+from compare.questions.sweep.study import Axis, SweepPoint, count_solves, parse_axis, sweep
+from compare.study.runner import ProblemSpec
+from nlp_gait.errors import InputError, UnknownNameError
+
+SSP, DSP = ProblemSpec(name="nao-ssp"), ProblemSpec(name="nao-dsp")
+# Verified with two independent implementations to five digits, except 0.8 s: 2.282582 W by IPOPT and by differential evolution.
+SWING_W = {0.015: 0.84587, 0.018: 0.85426, 0.022: 0.86616, 0.024: 0.87244, 0.026: 0.87871, 0.028: 0.88497}
+DURATIONS_W = {0.8: 2.28258, 1.0: 2.02695, 1.5: 1.57457, 4.0: 0.84587}
+AGREEMENT_W = 1e-4
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("swing_height_m=0.015:0.028:3", (0.015, 0.0215, 0.028)),
+        ("swing_height_m=0.015:0.028:1", (0.015,)),
+        ("swing_height_m=0.02,0.015", (0.02, 0.015)),
+        ("swing_height_m=0.02", (0.02,)),
+    ],
+)
+def test_axis(text: str, values: tuple[float, ...]) -> None:
+    axis = parse_axis(text)
+    assert axis.name == "swing_height_m"
+    assert axis.values == pytest.approx(values)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a", "a=", "=1", "a=1:2", "a=1:2:0", "a=1:2:-3", "a=1:2:x", "a=nan", "a=1,inf", "a=1:2:3:4"]
+)
+def test_what_is_no_axis_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="NAME=LOW:HIGH:COUNT"):
+        parse_axis(text)
+
+
+def test_true_price_of_a_higher_swing_foot() -> None:
+    points = sweep(SSP, [Axis(name="swing_height_m", values=tuple(SWING_W))], starts=1)
+    assert {p.at["swing_height_m"]: p.objective for p in points} == pytest.approx(SWING_W, abs=AGREEMENT_W)
+    assert all(p.feasible and p.x["swing_height_m"] == p.at["swing_height_m"] for p in points)
+
+
+def test_true_price_of_time() -> None:
+    """Followed upwards alone, the path is on a local optimum of 2.079 W at 1 s."""
+    points = sweep(SSP, [Axis(name="single_support_time_s", values=tuple(DURATIONS_W))], starts=1)
+    assert {p.at["single_support_time_s"]: p.objective for p in points} == pytest.approx(DURATIONS_W, abs=AGREEMENT_W)
+
+
+def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
+    axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
+    calls: list[None] = []
+    points = sweep(DSP, axes, algorithm="pso", evaluations=300, progress=lambda: calls.append(None))
+    assert len(calls) == len(points) == count_solves(axes, "pso") == 4
+    assert count_solves(axes, "ipopt") == 8
+    assert [tuple(p.at.values()) for p in points] == [(0.3, 0.02), (0.3, 0.03), (0.31, 0.02), (0.31, 0.03)]
+    assert [p.x["hip_height_m"] for p in points] == [0.3, 0.3, 0.31, 0.31]
+    written = write_sweep(tmp_path, points, DSP.load(), "pso")
+    assert [path.suffix for path in written] == [".csv", ".png", ".svg"]
+    assert all(path.stat().st_size > 0 for path in written)
+
+
+def test_errors_come_before_the_work() -> None:
+    with pytest.raises(UnknownNameError, match="swing_height_m"):
+        sweep(SSP, [Axis(name="swing_heigth_m", values=(0.02,))])
+    with pytest.raises(InputError, match="bounds"):
+        sweep(SSP, [Axis(name="swing_height_m", values=(0.02, 0.2))])
+    with pytest.raises(InputError, match="once"):
+        sweep(SSP, [Axis(name="swing_height_m", values=(0.02,))] * 2)
+    with pytest.raises(UnknownNameError, match="algorithm"):
+        sweep(SSP, [Axis(name="swing_height_m", values=(0.02,))], algorithm="psa")
+
+
+def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
+    problem = SSP.load()
+    x = problem.by_name(problem.lower)
+    points = [
+        SweepPoint(
+            at={"dbm_y_mean_limit_m": limit},
+            objective=power,
+            feasible=feasible,
+            status=status,
+            x=x,
+            violation=0.0,
+            evaluations=7,
+            time_s=0.1,
+        )
+        for limit, power, feasible, status in (
+            (0.02, 0.8459, True, "converged"),
+            (0.03, 0.9, True, "converged"),
+            (0.09, 1.7, False, "in the way: dbm_y_mean (by 0.04 m)"),
+        )
+    ]
+    table, *_ = write_sweep(tmp_path, points, problem, "ipopt")
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [row["feasible"] for row in rows] == ["true", "true", "false"]
+    assert [float(row["power_W"]) for row in rows] == [0.8459, 0.9, 1.7]
+    assert rows[2]["status"] == "in the way: dbm_y_mean (by 0.04 m)"
+    (axes,) = sweep_figure(points, problem, "ipopt").axes
+    line, cross = axes.lines
+    assert [math.isnan(y) for y in line.get_ydata()] == [False, False, True]
+    assert list(cross.get_xdata()) == [0.09]
+    assert axes.get_xlabel() == "dbm y mean limit [m]" and axes.get_ylabel() == "least power [W]"
+
+
+def test_labels() -> None:
+    assert axis_label("hip_vx_start_m_s", "m/s") == "hip vx start [m/s]"
+    assert axis_label("reach_margin", "1") == "reach margin"
+    assert axis_label("hip_height_m.upper", "m") == "upper bound of hip height [m]"
+    assert quantity("hip_height_m", "m", 0.31) == "hip height = 0.31 m"

@@ -1,0 +1,85 @@
+"""The question of what walking costs: gaits along an axis, their table and pictures, and the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.questions.sweep.study import parse_axis
+from compare.questions.walk.report import write_figures
+from compare.questions.walk.study import Gait, optimal_gaits, result_of, solves, walk_csv, write_walk
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.problem.result import load_result
+
+# Fewer samples than those of ten intervals: what is tested here is what is done with the gaits.
+SPEC = ProblemSpec(name="nao-cycle", options={"objective": "power", "intervals": 3})
+AXIS = parse_axis("speed_m_s=0.04,0.05")
+
+
+@pytest.fixture(scope="module")
+def gaits() -> list[Gait]:
+    """Two gaits, and one that was not found."""
+    found = optimal_gaits(SPEC, AXIS, starts=1, seed=0)
+    lost = replace(found[1].found, at={"speed_m_s": 1.0}, feasible=False, status="in the way: step_length")
+    return [*found, replace(found[1], found=lost)]
+
+
+def test_gaits_hold_what_they_were_asked_for(gaits: list[Gait]) -> None:
+    assert solves(AXIS) == 4
+    assert [gait.found.feasible for gait in gaits] == [True, True, False]
+    for gait in gaits[:2]:
+        assert gait.indexes["speed_m_s"] == pytest.approx(gait.at)
+        assert gait.indexes["power_W"] == pytest.approx(gait.found.objective)
+        assert gait.indexes["cost_of_transport"] == pytest.approx(gait.found.objective / (5.30535 * 9.8 * gait.at))
+
+
+def test_the_table_and_the_results_can_be_read_back(gaits: list[Gait], tmp_path: Path) -> None:
+    written = write_walk(tmp_path, SPEC, gaits)
+    assert [path.suffix for path in written] == [".csv", ".json", ".json"]
+    rows = list(csv.DictReader(written[0].read_text().splitlines()))
+    assert [float(row["at speed_m_s"]) for row in rows] == [0.04, 0.05, 1.0]
+    assert rows[2]["feasible"] == "false" and rows[0]["engine_walked_m"] == ""
+    for gait, path in zip(gaits, written[1:], strict=False):
+        result = load_result(path)
+        assert result.problem.value("speed_m_s") == gait.at
+        assert result.problem.by_name(result.x) == gait.found.x
+
+
+def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait], tmp_path: Path) -> None:
+    problem = SPEC.load()
+    assert len(write_figures(tmp_path, gaits, problem, result_of(SPEC, gaits[0].found))) == 4
+    nothing = [replace(gait, found=replace(gait.found, feasible=False)) for gait in gaits]
+    assert len(write_figures(tmp_path, nothing, problem, None)) == 2
+    assert walk_csv(nothing).count("false") == 3
+
+
+def test_the_command_walks(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    arguments = ["walk", "--over", "speed_m_s=0.08", "--starts", "1", "--intervals", "3", "--steps", "2"]
+    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    (gait,) = json.loads(done.stdout)["gaits"]
+    assert gait["walk"]["steps_done"] == 2 and not gait["walk"]["measurements"]["fallen"]
+    assert gait["walk"]["walked_m"] == pytest.approx(gait["walk"]["planned_m"], rel=0.3)
+    assert (tmp_path / "nao-cycle-cost.png").exists() and (tmp_path / "nao-cycle.svg").exists()
+
+
+def test_an_interrupted_walk_keeps_what_was_found(
+    gaits: list[Gait], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from compare.questions.walk import study as question
+
+    def interrupted(*_: object, **__: object) -> list[Gait]:
+        raise Interrupted("interrupted after 1 of 2 points", gaits[:1])
+
+    monkeypatch.setattr(question, "optimal_gaits", interrupted)
+    done = CliRunner().invoke(app, ["walk", "--intervals", "3", "--out", str(tmp_path)])
+    assert done.exit_code == 130 and "interrupted after 1 of 2 points; what was found is in" in done.stderr
+    assert len((tmp_path / "nao-cycle-walk.csv").read_text().splitlines()) == 2

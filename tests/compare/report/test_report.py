@@ -1,0 +1,232 @@
+"""A report from records made by hand: every number in it is known."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from compare.analysis.comparison import compare_problems
+from compare.analysis.statistics.run_length import Weighting
+from compare.analysis.table import summarise
+from compare.report import rebuild_report, write_report
+from compare.study.manifest import Manifest, Session
+from compare.study.study import RECORDS
+from nlp_gait.errors import InputError
+from tests.compare.records import record, study
+
+SESSION = Session(
+    command="nlp-gait compare <b>walk</b>",
+    started="2026-01-01 00:00:00 UTC",
+    machine={"processor": "abacus"},
+    versions={"python": "3.11"},
+    kernel="g++ -O2",
+    jobs="2",
+)
+
+
+class Tables(HTMLParser):
+    """Texts of all tables of a page, and whatever it would load."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.loads: list[str] = []
+        self._cell: list[str] | None = None
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self._cell = []
+        for name, value in attrs:
+            if name in ("src", "href", "xlink:href") and value and not value.startswith(("#", "data:")):
+                self.loads.append(value)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("td", "th") and self._cell is not None:
+            self.rows[-1].append("".join(self._cell).replace("\u202f", ""))
+            self._cell = None
+
+    def handle_data(self, data: str) -> None:
+        if self._cell is not None:
+            self._cell.append(data)
+
+    def row(self, first: str, second: str | None = None) -> list[str]:
+        """The first row that begins so."""
+        return next(r for r in self.rows if r[0] == first and (second is None or r[1] == second))
+
+    def below(self, *header: str) -> list[list[str]]:
+        """Rows under a header that begins so, up to the next one of equal cells."""
+        start = next(i for i, r in enumerate(self.rows) if r[: len(header)] == list(header))
+        return self.rows[start + 1 :]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    write_report(out, study(), Manifest(settings=None, sessions=(SESSION,)))
+    return out
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def tables(page: str) -> Tables:
+    return Tables(page)
+
+
+def test_summaries_by_hand() -> None:
+    (comparison,) = compare_problems(study())
+    assert comparison.reference == 10.0
+    newton, swarm, colony = summarise(comparison)
+    assert [s.algorithm for s in (newton, swarm, colony)] == ["newton", "swarm", "colony"]
+    # n = 2: 5 + 5 + 4 * 3 + 4 * 3 + 3 * 6 = 52; two successes and one failure: 3 * 52 / 2.
+    assert newton.evaluations == 52.0 and newton.expected_evaluations == (78.0,) * 4
+    assert newton.expected_s == pytest.approx((0.75,) * 4)
+    assert (newton.runs, newton.claimed, newton.feasible, newton.best_claim) == (3, 3, 2, 9.5)
+    # To 1 %: after 300 and 400, two failures of 500: 1700 / 2. Nothing comes within 0.1 %.
+    assert swarm.expected_evaluations[0] == 850.0 and swarm.expected_s[0] == pytest.approx(8.5)
+    assert swarm.expected_evaluations[1:] == (float("inf"),) * 3
+    assert (swarm.best, swarm.median, swarm.worst) == (10.05, 10.55, 12.0)
+    assert swarm.gap == pytest.approx(0.055)
+    # To 1 % after 100, to 0.1 % after 200; three failures of 500.
+    assert colony.expected_evaluations[:2] == (1600.0, 1700.0)
+    assert (colony.feasible, colony.claimed, colony.best, colony.median, colony.worst) == (3, 3, 10.005, 10.5, 13.0)
+
+
+def test_table_of_solvers(tables: Tables) -> None:
+    assert tables.row("swarm") == [
+        "swarm",
+        "4",
+        "4/4",
+        "4/4",
+        "10.050000 W",
+        "10.050000 W",
+        "10.550000 W",
+        "12.000000 W",
+        "5.5000 %",
+        "500",
+        "5.000 s",
+    ]
+    assert tables.row("newton") == [
+        "newton",
+        "3",
+        "3/3",
+        "2/3",
+        "9.500000 W",
+        "10.000000 W",
+        "10.000000 W",
+        "10.000000 W",
+        "0.0000 %",
+        "52",
+        "0.500 s",
+    ]
+
+
+def test_expected_running_times(tables: Tables) -> None:
+    rows = tables.below("solver", "to 1 %")
+    assert rows[0] == ["newton", "78", "78", "78", "78", "0.75", "0.75", "0.75", "0.75"]
+    assert rows[1] == ["swarm", "850", "-", "-", "-", "8.5", "-", "-", "-"]
+    assert rows[2] == ["colony", "1600", "1700", "-", "-", "16", "17", "-", "-"]
+
+
+def test_pairs(tables: Tables) -> None:
+    rows = {row[0]: row[1:] for row in tables.below("better median < other")[:3]}
+    # Costs: newton 10, 10, inf; swarm 10.05, 10.1, 11, 12; colony 10.005, 10.5, inf, 13.
+    # The first is better in 8 of 12 pairs; in 8 of 12 with one tie; in 10 of 16.
+    assert rows["newton < swarm"][-1] == f"{8 / 12:.3f}"
+    assert rows["newton < colony"][-1] == f"{8.5 / 12:.3f}"
+    assert rows["swarm < colony"][-1] == f"{(3 + 3 + 2 + 2) / 16:.3f}"
+    # Gradient starts are elsewhere: only the two searches are paired. Differences 0.045, -0.4, -inf, -1: ranks 1 of 10 against
+    # 9; of the 16 sign patterns, those with a rank sum of at most 1 are 2, on both sides 4.
+    assert [rows[name][1] for name in rows] == ["-", "-", "0.2500"]
+    assert rows["swarm < colony"][2] == "4"
+
+
+def test_calls_and_weights(tables: Tables) -> None:
+    assert tables.below("solver", "f", "g")[0] == ["newton", "5", "5", "4", "4", "3", "0"]
+    assert tables.row("walk", "1") == ["walk", "1", "1", "3", "3", "6"]
+
+
+def test_prices_are_those_of_the_best_optimum(tables: Tables) -> None:
+    assert tables.row("knee <b>torque</b>")[1:] == ["upper", "2.5 Nm", "-0.125 W per Nm", "-0.0125 W for 0.1 Nm"]
+
+
+def test_every_failed_run_stands_there_with_its_reason(tables: Tables) -> None:
+    rows = tables.below("solver", "run", "seed")[:2]
+    assert rows[0] == ["newton", "2", "2", "restoration failed", "balance by 0.1 m"]
+    assert rows[1][:4] == ["colony", "2", "2", "<script>alert(1)</script> | failed"]
+
+
+def test_verdict_in_three_sentences(page: str) -> None:
+    verdict = re.search(r'<div class="verdict">(.*?)</div>', page, re.DOTALL)
+    assert verdict is not None
+    sentences = re.findall(r"<p>(.*?)</p>", verdict.group(1))
+    assert len(sentences) == 3
+    assert "walk power 10.000000 W, reached to 1e-6 by newton in 2 of 3 runs" in sentences[0]
+    assert "newton 0.0000 %, swarm 5.5000 % and colony 17.5000 %" in sentences[1]
+    assert "newton 78 evaluations or 0.75 s and colony 1\u202f700 evaluations or 17 s, never by swarm" in sentences[2]
+
+
+def test_session_is_shown(tables: Tables) -> None:
+    assert tables.row("command") == ["command", "nlp-gait compare <b>walk</b>"]
+    assert tables.row("processor") == ["processor", "abacus"]
+
+
+def test_text_of_users_is_escaped(page: str, folder: Path) -> None:
+    assert "<script>alert" not in page and "<b>walk" not in page and "<i>left" not in page
+    markdown = (folder / "report.md").read_text(encoding="utf-8")
+    assert "<script>" not in markdown and "&lt;script&gt;alert(1)&lt;/script&gt; \\| failed" in markdown
+
+
+def test_page_loads_nothing(page: str, tables: Tables) -> None:
+    assert tables.loads == []
+    assert "@import" not in page and "url(http" not in page and page.count("<svg") == 3
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+
+
+def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
+    for r in study():
+        path = tmp_path / RECORDS / r.problem / f"{r.algorithm}-{r.run:04d}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        r.write(path)
+    rebuild_report(tmp_path)
+    first, again = (Tables((f / "report.html").read_text(encoding="utf-8")).rows for f in (folder, tmp_path))
+    assert again == first[: first.index(["what", "value"])]
+    rebuild_report(tmp_path, Weighting(gradient=0.0, jacobian=0.0, hessian=0.0))
+    assert Tables((tmp_path / "report.html").read_text(encoding="utf-8")).row("newton")[9] == "10"
+
+
+def test_two_problems_have_a_performance_profile(tmp_path: Path) -> None:
+    other = [replace(r, problem="run") for r in study()]
+    files = write_report(tmp_path, [*study(), *other], Manifest(settings=None, sessions=()))
+    assert tmp_path / "performance-profile.svg" in files and all(path.stat().st_size for path in files)
+
+
+def test_nothing_feasible_is_said_plainly(tmp_path: Path) -> None:
+    failed = [record("pso", run, [(10, None)], feasible=False, success=False) for run in range(2)]
+    write_report(tmp_path, failed, Manifest(settings=None, sessions=()))
+    assert "No solver found a feasible point of walk." in (tmp_path / "report.md").read_text(encoding="utf-8")
+
+
+def test_records_that_disagree_on_the_objective_are_refused(tmp_path: Path) -> None:
+    other = record("pso", 1, [(10, 1.0)], objective={"name": "margin", "unit": "m", "sense": "maximise"})
+    with pytest.raises(InputError, match="disagree on the objective"):
+        compare_problems([record("pso", 0, [(10, 1.0)]), other])
+
+
+def test_maximised_objectives_are_ranked_the_other_way() -> None:
+    margin = {"name": "margin", "unit": "m", "sense": "maximise"}
+    runs = [record("pso", run, [(10, value)], objective=margin) for run, value in enumerate((0.1, 0.2, 0.4))]
+    (summary,) = summarise(compare_problems(runs)[0])
+    assert (summary.best, summary.median, summary.worst) == (0.4, 0.2, 0.1)
+    assert summary.gap == pytest.approx(0.5)

@@ -1,0 +1,82 @@
+"""Gradient methods as runs: SLSQP on finite differences, other NLP solvers, limits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from compare.study.runner import run_task
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.backends.solvers import nlpsol
+from nlp_gait.errors import InputError
+
+SSP = ProblemSpec(name="nao-ssp")
+OPTIMUM = 0.845868
+
+
+def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
+    record = run_task(Task(problem=SSP, algorithm="slsqp"))
+    assert record.success and record.verdict.feasible
+    assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-4)
+    assert record.evaluations["f"] == record.history.evaluations[-1] > 10 * record.iterations
+    assert (np.diff(record.history.evaluations) > 0).all() and (np.diff(record.time_s.history) > 0.0).all()
+
+
+def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
+    record = run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=45)))
+    assert record.status == "evaluation budget used" and not record.success
+    assert record.evaluations["f"] <= 45 and set(record.x) == set(SSP.load().names)
+    assert run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
+
+
+def test_slsqp_leaves_fixed_variables_alone() -> None:
+    fixed = ProblemSpec(name="nao-ssp", values=dict(SSP.load().fix(swing_height_m=0.02).values))
+    record = run_task(Task(problem=fixed, algorithm="slsqp", run=1))
+    assert record.x["swing_height_m"] == 0.02 and record.verdict.feasible
+
+
+@pytest.mark.parametrize("name", nlpsol.OPTIONS)
+def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
+    reason = nlpsol.probe(name)
+    if reason is not None:
+        pytest.skip(f"{name} does not run here: {reason}")
+    record = run_task(Task(problem=SSP, algorithm=name))
+    assert record.success
+    assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-5)
+    assert record.verdict.violation < 1e-5  # fatrop relaxes bounds by more than the judge's 1e-6, and is told so
+    assert record.evaluations["f"] > 0 and record.evaluations["gradient"] > 0
+
+
+def test_other_nlp_solvers_print_nothing() -> None:
+    program = (
+        "from compare.study.runner import run_task; from compare.study.task import ProblemSpec, Task\n"
+        "run_task(Task(problem=ProblemSpec(name='nao-ssp'), algorithm='sqpmethod'))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0 and done.stdout == ""
+
+
+def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nlpsol, "PROBE", "import os; os.kill(os.getpid(), 9)")
+    nlpsol.probe.cache_clear()
+    try:
+        assert nlpsol.probe("fatrop") == "it ends with status -9"
+        with pytest.raises(InputError, match="'fatrop' does not run in this installation"):
+            nlpsol.solve_with("fatrop", nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
+    finally:
+        nlpsol.probe.cache_clear()
+    with pytest.raises(InputError, match="must be one of"):
+        nlpsol.probe("snop")
+
+
+def test_a_gradient_run_charges_all_its_calls() -> None:
+    record = run_task(Task(problem=SSP, algorithm="ipopt"))
+    assert record.history.evaluations == (record.evaluations["f"],) and record.active_constraints
+    assert record.definition["objective"] == {"name": "power", "unit": "W", "sense": "minimise"}

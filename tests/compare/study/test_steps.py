@@ -1,0 +1,67 @@
+"""Steps of a reproduction that are kept and used again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import nlp_gait
+from compare.papers.tables import write_table
+from compare.study.steps import Steps, fingerprint
+
+
+def test_a_step_runs_once_for_equal_inputs(tmp_path: Path) -> None:
+    calls: list[int] = []
+
+    def compute() -> dict[str, float]:
+        calls.append(1)
+        return {"f": 0.1}
+
+    messages: list[str] = []
+    for _ in range(2):
+        assert Steps(tmp_path, messages.append)("one", {"seed": 1}, compute) == {"f": 0.1}
+    assert len(calls) == 1
+    assert messages == ["one", "one: kept from an earlier run"]
+    Steps(tmp_path, messages.append)("one", {"seed": 2}, compute)
+    assert len(calls) == 2
+
+
+def test_a_step_runs_again_when_its_code_has_changed(tmp_path: Path) -> None:
+    Steps(tmp_path, print)("one", {}, lambda: 1)
+    assert Steps(tmp_path, print, code=[nlp_gait])("one", {}, lambda: 2) == 2
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"sha256": "0"}'])
+def test_a_damaged_step_runs_again(tmp_path: Path, text: str) -> None:
+    steps = Steps(tmp_path, print)
+    steps("one", {}, lambda: 1)
+    file = tmp_path / "steps" / "one.json"
+    file.write_text(text)
+    assert steps("one", {}, lambda: 2) == 2
+    assert json.loads(file.read_text())["result"] == 2
+
+
+def test_an_interrupted_step_leaves_no_file(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Steps(tmp_path, print)("one", {}, interrupted)
+    assert not list((tmp_path / "steps").iterdir())
+
+
+def test_fingerprint_tells_values_and_mathematics_apart() -> None:
+    one = fingerprint(nlp_gait.load("walk12"))
+    assert one == fingerprint(nlp_gait.load("walk12"))
+    assert one != fingerprint(nlp_gait.load("walk12").with_values(step_time_s=2.0))
+    other = fingerprint(nlp_gait.load("walk12", zmp="appendix"))
+    assert one["mathematics_sha256"] != other["mathematics_sha256"]
+
+
+def test_tables_are_rounded_for_people_only(tmp_path: Path) -> None:
+    text = write_table(tmp_path / "a.b", {"solver": "", "f [1]": ".2f"}, [["ga", 1 / 3]])
+    assert "| ga | 0.33 |" in text
+    assert (tmp_path / "a.b.md").read_text() == text
+    assert (tmp_path / "a.b.csv").read_text() == f"solver,f [1]\nga,{1 / 3!r}\n"

@@ -1,0 +1,296 @@
+"""Studies: the same files whatever the workers, resumed after kill -9, everything wrong said before the work."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import compare.study.workers
+from compare.study.record import read_record
+from compare.study.runner import attempt
+from compare.study.settings import SolverSpec, StudySettings, read_settings, settings_from
+from compare.study.study import Study, read_records, record_file, run_study
+from compare.study.task import Handling, ProblemSpec, Stop, Task
+from metaheuristics import ParticleSwarm, SearchError
+from metaheuristics.interface import Array, Start
+from nlp_gait.errors import GaitError, InputError
+
+SSP = ProblemSpec(name="nao-ssp")
+SMALL = StudySettings(
+    problems=(SSP,),
+    solvers=(
+        SolverSpec(algorithm="pso", polish=True),
+        SolverSpec(algorithm="ga"),
+        SolverSpec(algorithm="pso", label="pso-20", settings={"population": 20}),
+    ),
+    runs=2,
+    stop=Stop(evaluations=500),
+)
+
+
+def contents(folder: Path) -> dict[str, Any]:
+    """Every record but its times."""
+    found = {}
+    for path in sorted(folder.glob("records/*/*.json")):
+        data = json.loads(path.read_text())
+        assert data.pop("time_s")["solve"] > 0.0
+        found[str(path.relative_to(folder))] = data
+    return found
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("undisturbed")
+    run_study(Study(tasks=SMALL.tasks(), folder=folder))
+    return folder
+
+
+def test_one_file_a_run(undisturbed: Path) -> None:
+    names = [
+        f"records/nao-ssp/{solver}-000{run}.json" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)
+    ]
+    assert sorted(contents(undisturbed)) == sorted(names)
+
+
+def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> None:
+    run_study(Study(tasks=SMALL.tasks(), folder=tmp_path, jobs=2))
+    assert contents(tmp_path) == contents(undisturbed)
+
+
+def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
+    search, polished = (
+        read_record(undisturbed / "records" / "nao-ssp" / f"{name}-0001.json") for name in ("pso", "pso+ipopt")
+    )
+    assert polished.verdict.feasible and polished.verdict.objective == pytest.approx(0.845868, rel=1e-5)
+    assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["hessian"] > 0
+    assert polished.history.evaluations[:-1] == search.history.evaluations
+    assert polished.time_s.solve > search.time_s.solve
+    assert polished.active_constraints and not search.active_constraints
+
+
+def test_finished_runs_are_kept_and_not_run_again(undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare.study.workers, "attempt", lambda *_: pytest.fail("run twice"))
+    kept: list[int] = []
+    records = run_study(Study(tasks=SMALL.tasks(), folder=undisturbed), kept=kept.append)
+    assert kept == [8] and [r.run for r in records] == [task.run for task in SMALL.tasks()]
+
+
+def test_another_study_in_the_folder_is_refused(undisturbed: Path) -> None:
+    other = replace(SMALL, stop=Stop(evaluations=600))
+    with pytest.raises(InputError, match="another study: .* differs in stop; choose another folder"):
+        run_study(Study(tasks=other.tasks(), folder=undisturbed))
+
+
+def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
+    task = SMALL.tasks()[0]
+    path = record_file(tmp_path, task)
+    path.parent.mkdir(parents=True)
+    good = record_file(undisturbed, task).read_text()
+    for text, message in (
+        (good[: len(good) // 2], "is not valid JSON"),
+        ("[]", "'schema' must be 2, got 'list'"),
+        (good.replace('"schema": 2', '"schema": 1'), "'schema' must be 2, got 1"),
+        (good.replace('"evaluations": 500', '"evaluations": "many"'), None),
+        (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=message):
+            run_study(Study(tasks=(task,), folder=tmp_path))
+
+
+def test_killed_at_random_moments_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
+    program = (
+        "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
+        "if __name__ == '__main__': run_study(Study(tasks=SMALL.tasks(), folder=Path(sys.argv[1]), jobs=2))"
+    )
+    moments = random.Random(4)
+    for _ in range(2):
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, str(tmp_path)], cwd=Path(__file__).parents[3], start_new_session=True
+        )
+        try:
+            process.wait(moments.uniform(2.0, 6.0))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    assert all(read_record(path) for path in tmp_path.glob("records/*/*.json"))  # whole or absent
+    run_study(Study(tasks=SMALL.tasks(), folder=tmp_path))
+    assert contents(tmp_path) == contents(undisturbed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Broken:
+    """An algorithm that fails: in a worker it raises, or takes the process with it."""
+
+    population: int = 2
+    deadly: bool = False
+    name: ClassVar[str] = "broken"
+
+    def start(self, start: Start) -> Broken:
+        if self.deadly:
+            os.kill(os.getpid(), signal.SIGKILL)
+        raise RuntimeError("no <luck>")
+
+    def ask(self) -> Array:
+        return np.zeros((1, 1))
+
+    def tell(self, *_: object) -> None:
+        """Learn nothing."""
+
+    def stop(self) -> tuple[str, ...]:
+        return ()
+
+
+def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
+    tasks = (Task(problem=SSP, algorithm=Broken()), Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)))
+    broken, good = run_study(Study(tasks=tasks, folder=tmp_path))
+    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.success and not broken.verdict.feasible
+    assert good.evaluations == {"f": 100}
+    again = next(r for r in read_records(tmp_path) if r.algorithm == "broken")
+    assert again.status == broken.status and np.isnan(again.verdict.objective) and again.x == {}
+
+
+def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
+    failed = attempt(Task(problem=SSP, algorithm=Broken()))
+    polished = attempt(Task(problem=SSP, algorithm="ipopt", label="broken+ipopt", polishes="broken"), failed)
+    assert "has no point to polish: failed: RuntimeError" in polished.status
+
+
+def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
+    tasks = tuple(Task(problem=SSP, algorithm=Broken(deadly=True), run=run) for run in range(2))
+    with pytest.raises(GaitError, match="worker process died 3 times in a row"):
+        run_study(Study(tasks=tasks, folder=tmp_path, jobs=2))
+
+
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        (Task(problem=SSP, algorithm="psoo"), "unknown algorithm 'psoo'; did you mean"),
+        (Task(problem=SSP, algorithm="pso", settings={"inertial": 1}), "no setting 'inertial'"),
+        (Task(problem=SSP, algorithm="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
+        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "slsqp has no settings"),
+        (Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
+        (Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
+        (Task(problem=SSP, algorithm="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
+        (Task(problem=SSP, algorithm="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
+        (Task(problem=SSP, algorithm="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
+        (Task(problem=SSP, algorithm="pso", label="../../etc"), "label has 1 to 64 letters"),
+        (Task(problem=ProblemSpec(name="nao-spp"), algorithm="pso"), "unknown problem"),
+    ],
+)
+def test_what_cannot_run_is_said_before_the_work(task: Task, message: str, tmp_path: Path) -> None:
+    with pytest.raises((GaitError, SearchError), match=message):
+        run_study(Study(tasks=(task,), folder=tmp_path))
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_two_solvers_of_one_name_are_refused() -> None:
+    task = Task(problem=SSP, algorithm="pso")
+    with pytest.raises(InputError, match="label them apart"):
+        Study(tasks=(task, replace(task, settings={"population": 20})))
+
+
+TOML = """
+runs = 3
+starts = 2
+evaluations = 700
+seed = 5
+target = 0.9
+handling = {name = "penalty", weight = 2.0}
+
+[[problem]]
+name = "nao-ssp"
+label = "ssp-v6"
+options = {robot = "nao-v6"}
+set = {torque_change_limit_Nm = 0.3}
+fix = {swing_height_m = 0.02}
+
+[[solver]]
+algorithm = "ipopt"
+
+[[solver]]
+algorithm = "pso"
+label = "small-pso"
+settings = {population = 20}
+polish = true
+"""
+
+
+def test_study_file(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(TOML)
+    settings = read_settings(path)
+    tasks = settings.tasks()
+    assert [(t.title, t.run_seed) for t in tasks] == [
+        ("ipopt", 5),
+        ("ipopt", 6),
+        *(("small-pso", seed) for seed in (5, 6, 7)),
+        *(("small-pso+ipopt", seed) for seed in (5, 6, 7)),
+    ]
+    problem = tasks[0].problem.load()
+    assert problem.options["robot"] == "nao-v6" and problem.value("swing_height_m.upper") == 0.02
+    assert tasks[2].search() == ParticleSwarm(population=20) and tasks[2].stop == Stop(evaluations=700, target=0.9)
+    assert settings_from(json.loads(json.dumps(settings.to_json())), "again").tasks() == tasks
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("runs = 3", "runs = 0"), "runs must be a whole number of at least 1, got 0"),
+        (("runs = 3", "runs = true"), "runs must be a whole number"),
+        (("runs = 3", "run = 3"), "unknown key of .*'run'; did you mean 'runs'"),
+        (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
+        (("target = 0.9", "target = nan"), "finite numbers"),
+        (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
+        (('algorithm = "ipopt"', 'label = "x"'), "needs 'algorithm'"),
+        (("runs = 3", "runs = "), "is not valid TOML"),
+        (('name = "nao-ssp"', "name = 3"), "name must be a text, got 3"),
+        (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
+        (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be a table"),
+    ],
+)
+def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str, tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(TOML.replace(*change, 1))
+    with pytest.raises(GaitError, match=message):
+        for task in read_settings(path).tasks():
+            task.problem.load()
+
+
+def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
+    from nlp_gait.files import remove_leftovers
+
+    old, new, record = (tmp_path / name for name in (".a.json.1.tmp", ".b.json.2.tmp", "c.json"))
+    for path in (old, new, record):
+        path.write_text("")
+    long_ago = time.time() - 3600
+    os.utime(old, (long_ago, long_ago))
+    remove_leftovers(tmp_path)
+    assert sorted(tmp_path.iterdir()) == [new, record]
+
+
+def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def swallowing(*job: Any) -> Any:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            return attempt(*job)
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(compare.study.workers, "attempt", swallowing)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(Study(tasks=(Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
+    assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before

@@ -1,0 +1,69 @@
+"""The planner: feasible on a dense grid, never beaten by a search, and clear about what forbids a stair."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from compare.judge import evaluate
+from metaheuristics import ParticleSwarm, minimize
+from nlp_gait.errors import InputError
+from nlp_gait.problem.gait_problem import GaitProblem
+
+# Best of 20 starts, case 2 of Table IV.
+BEST_ENERGY_J = 110.880
+# Best known governing parameters rounded: a start from which the optimum is found in a second or two.
+NEAR_BEST = (0.69, 0.09, 0.24, 0.09, 0.7, 1.45, 0.58, 0.8, 1.3, 0.32, 0.12)
+
+
+@pytest.fixture(scope="module")
+def problem() -> GaitProblem:
+    return nlp_gait.load("stairs-plan")
+
+
+@pytest.fixture(scope="module")
+def solution(problem: GaitProblem) -> nlp_gait.Solution:
+    return nlp_gait.solve(problem, x0=NEAR_BEST)
+
+
+def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
+    assert solution.success, solution.status
+    assert solution.objective == pytest.approx(BEST_ENERGY_J, rel=1e-4)
+    judged = evaluate(problem, list(solution.x.values()))
+    assert judged.feasible
+    assert not judged.dense_violations
+    assert judged.dense is not None
+    assert judged.dense["energy_J"] == pytest.approx(solution.objective, rel=0.01)
+
+
+def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
+    found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=2_000, seed=0)
+    assert found.feasible
+    assert found.objective >= solution.objective - 1e-6
+
+
+def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
+    steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
+    refused = nlp_gait.solve(steep, x0=NEAR_BEST, settings=nlp_gait.IpoptSettings(iterations=40))
+    assert not refused.success
+    assert "in the way: " in refused.status
+    assert refused.worst_violations[0].name.startswith(("reach", "link_", "knee_angle"))
+
+
+def test_signals_have_one_row_for_each_sample(problem: GaitProblem) -> None:
+    arrays = problem.signals(np.array(NEAR_BEST), problem.p).arrays
+    assert {len(array) for array in arrays.values()} == {44}
+    assert arrays["t"][0] == 0.0
+    assert arrays["t"][-1] == pytest.approx(3.5)
+    assert arrays["q"].shape == arrays["tau"].shape == (44, 7)
+    jumps = np.flatnonzero(np.diff(arrays["t"]) == 0.0)
+    assert len(jumps) == 3  # both sides of each knot
+    assert np.abs(arrays["q"][jumps] - arrays["q"][jumps + 1]).max() < 1e-9
+    assert np.abs(arrays["qd"][jumps] - arrays["qd"][jumps + 1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("options", [{"intervals": 10}, {"intervals": 0}, {"minimise": "time"}])
+def test_options_that_are_not_allowed(options: dict[str, int | str]) -> None:
+    with pytest.raises(InputError, match="must be"):
+        nlp_gait.load("stairs-plan", **options)

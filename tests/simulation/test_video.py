@@ -1,0 +1,46 @@
+"""Videos."""
+
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nlp_gait.errors import InputError, MissingExtraError, OutputError
+from nlp_gait.simulation.video import check_video_path, write_video
+
+
+def frames(count=4):
+    for k in range(count):
+        frame = np.full((24, 33, 3), 255, dtype=np.uint8)
+        frame[:, 8 * k : 8 * k + 8] = (200, 60, 20)
+        yield frame
+
+
+def test_a_gif_keeps_frames_size_pace_and_colours(tmp_path):
+    path = tmp_path / "walk.gif"
+    write_video(path, frames(), frames_per_s=12.5)
+    with Image.open(path) as image:
+        assert image.n_frames == 4 and image.size == (33, 24) and image.info["duration"] == 80
+        image.seek(2)
+        assert np.abs(np.array(image.convert("RGB"))[5, 20].astype(int) - (200, 60, 20)).max() <= 16
+    assert [p.name for p in tmp_path.iterdir()] == ["walk.gif"]
+
+
+def test_an_mp4_is_written_where_there_is_an_encoder(tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    write_video(tmp_path / "walk.mp4", frames(), frames_per_s=25.0)
+    assert b"ftyp" in (tmp_path / "walk.mp4").read_bytes()[:16]
+
+
+def test_mp4_without_its_encoder_and_other_endings_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[video\]', or write a .gif"):
+        check_video_path(tmp_path / "walk.mp4")
+    with pytest.raises(InputError, match="ends in .gif or .mp4, got 'walk.avi'"):
+        check_video_path(tmp_path / "walk.avi")
+
+
+def test_an_unwritable_video_is_an_output_error(tmp_path):
+    with pytest.raises(OutputError, match="cannot write"):
+        write_video(tmp_path / "no" / "walk.gif", frames(), 10.0)
