@@ -13,7 +13,7 @@ from benchmarks.rows import Row
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solvers.derivatives import compiled_nlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.problem.gait_problem import Point, constraint_rows
+from nlp_gait.problem.assembly import Point
 from nlp_gait.problem.registry import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Angle
 
@@ -78,7 +78,7 @@ def _naive(problem: GaitProblem) -> tuple[ca.Function, dict[str, object]]:
     offset = np.array([variable.lower for variable in problem.variables])
     point = Point(x=offset + problem.scale * z, p=symbols.p, positions=symbols.positions)
     assembly = problem.assemble(point, Naive())
-    rows = [constraint_rows(constraint) for constraint in assembly.constraints]
+    rows = [constraint.columns for constraint in assembly.constraints]
     g, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
     bounds = ca.Function("bounds", [symbols.p], [lower, upper])(problem.p)
     nlp = {"x": z, "p": symbols.p, "f": assembly.objective, "g": g}

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 
 DENSE_INTERVALS = 1000  # at least this many equal parts on the dense grid
 
@@ -86,7 +87,7 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
     """
     point = problem.check_x(x)
     cost, violation, rows, indexes = _values(problem, point)
-    parts = int(problem.options.get("intervals", DENSE_INTERVALS)) * int(problem.options.get("samples_per_interval", 1))
+    parts = DENSE_INTERVALS if problem.grid is None else problem.grid.parts
     factor = math.ceil(DENSE_INTERVALS / parts)
     dense = problem.dense(factor)
     dense_rows, dense_indexes = _values(dense, point)[2:] if dense is not None else ((), None)

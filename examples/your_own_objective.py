@@ -7,29 +7,21 @@ from dataclasses import replace
 
 import metaheuristics
 import nlp_gait
-from nlp_gait.problem.gait_problem import Assembly, Objective, Parameter
-
-base = nlp_gait.load("nao-ssp")
+from nlp_gait.problem import Objective, Parameter
 
 
-def assemble(point, ops):
+def cost(gait, point, ops):
     """What the gait costs, and what waiting for it costs."""
-    gait = base.assemble(point, ops)
-    cost = gait.objective + point["price_of_time_W_s"] * point["single_support_time_s"]
-    return Assembly(objective=cost, constraints=gait.constraints, indexes=gait.indexes)
+    return replace(gait, objective=gait.objective + point["price_of_time_W_s"] * point["single_support_time_s"])
 
 
-problem = replace(
-    base,
+problem = nlp_gait.load("nao-ssp").derived(
     name="nao-ssp-in-a-hurry",
     objective=Objective(name="power and time", unit="W"),
-    own_parameters=(
-        *base.own_parameters,
-        Parameter(name="price_of_time_W_s", unit="W/s", default=0.3, description="price of a second", minimum=0.0),
-    ),
-    assemble=assemble,
-    refine=None,
-    _built={},
+    parameters=[
+        Parameter(name="price_of_time_W_s", unit="W/s", default=0.3, description="price of a second", minimum=0.0)
+    ],
+    change=cost,
 )
 for price in (0.0, 0.3, 1.0):
     solution = nlp_gait.solve(problem.with_values(price_of_time_W_s=price), starts=2, seed=0)

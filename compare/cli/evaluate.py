@@ -51,12 +51,12 @@ def evaluate(
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values).load()
     point = loaded.check_x(parse_numbers(x))
     if signals is not None:
-        if loaded.signals is None:
+        if loaded.motion is None:
             fail(f"problem {problem!r} has no signals")
         from nlp_gait.export.signals import write_npz
 
         target = output_file(signals)
-        write_npz(target, loaded.signals(point, loaded.p))
+        write_npz(target, loaded.signals(point))
     evaluation = judge(loaded, point)
     if as_json:
         print_json(evaluation.to_json())

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.drawing.figures import new_figure, style
-from compare.drawing.skeleton import LEFT, RIGHT, TRUNK, Skeleton
 from nlp_gait.files import new_file
+from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Skeleton
 from nlp_gait.simulation.video import Frame
 
 if TYPE_CHECKING:

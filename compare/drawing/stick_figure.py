@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.drawing.animation import COLOURS
 from compare.drawing.figures import new_figure, style
-from compare.drawing.skeleton import LEFT, RIGHT, Skeleton
+from nlp_gait.problem.skeleton import LEFT, RIGHT, Skeleton
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.problem.gait_problem import Array, GaitProblem, constraint_rows
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import RowViolation
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -67,7 +68,7 @@ def _build(problem: GaitProblem) -> ExactModel:
     names: list[str] = []
     units: list[str] = []
     for constraint in assembly.constraints:
-        value, lower, upper = constraint_rows(constraint)
+        value, lower, upper = constraint.columns
         values.append(value)
         lowers.append(lower)
         uppers.append(upper)

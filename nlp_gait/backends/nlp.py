@@ -17,7 +17,9 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem.gait_problem import Array, GaitProblem, Point, constraint_rows
+from nlp_gait.problem.assembly import Point
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
 # A derivative below this is zero for the check of the lifting's sense.
@@ -90,7 +92,7 @@ def _build(problem: GaitProblem) -> NlpModel:
         Point(x=ca.DM(offset) + ca.DM(problem.scale) * z, p=p, positions=symbols.positions), ops
     )
 
-    rows = [constraint_rows(constraint) for constraint in assembly.constraints]
+    rows = [constraint.columns for constraint in assembly.constraints]
     values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
     bounds = ca.Function("row_bounds", [p], [lower, upper])
     cost = problem.objective.sign * assembly.objective

@@ -9,7 +9,8 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.problem.gait_problem import Array, Point, Variable
+from nlp_gait.problem.assembly import Point, Variable
+from nlp_gait.problem.signals import Array
 
 
 @dataclass(frozen=True, kw_only=True)

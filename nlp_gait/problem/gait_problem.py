@@ -1,4 +1,4 @@
-"""What a gait problem is: variables, parameters and one assembly of objective and constraints.
+"""What a gait problem is: variables, parameters, one assembly of objective and constraints, and what else it can do.
 
 A problem holds mathematics. It knows no solver: ``backends/`` turn it into an NLP or into compiled code, both from the same
 ``assemble``. Everything that a user may want to change without rebuilding is a parameter: limits, weights, and the bounds of
@@ -8,154 +8,80 @@ every variable, which appear among the parameters as ``<variable>.lower`` and ``
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, TypeVar
 
-import casadi as ca
 import numpy as np
-from casadi import MX
+from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.playback import Playback
+from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem.skeleton import Skeleton
+from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 T = TypeVar("T")
+# Changes what a problem assembles.
+Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Variable:
-    """Decision variable with its default bounds, in ``unit``; no bound may be set beyond ``minimum`` and ``maximum``."""
+class Grid:
+    """Instants at which a problem evaluates its motion.
 
-    name: str
-    unit: str
-    lower: float
-    upper: float
-    description: str
-    minimum: float = -math.inf
-    maximum: float = math.inf
+    Attributes:
+        intervals: equal parts over which limits on changes hold.
+        samples_per_interval: above 1 for more samples than these limits need.
+        refined_by: option of the problem's maker that gives a denser grid when multiplied; None if the variables depend on
+            the grid, so that there is none.
+    """
 
+    intervals: int
+    samples_per_interval: int = 1
+    refined_by: Literal["intervals", "samples_per_interval"] | None = None
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """Number that may change without rebuilding; ``minimum`` and ``maximum`` say what is allowed."""
-
-    name: str
-    unit: str
-    default: float
-    description: str
-    minimum: float = -math.inf
-    maximum: float = math.inf
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Objective:
-    """Name, unit and sense of what is optimised."""
-
-    name: str
-    unit: str
-    sense: Literal["minimise", "maximise"] = "minimise"
+    def __post_init__(self) -> None:
+        """Refuse what gives no grid."""
+        for name in ("intervals", "samples_per_interval"):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+                raise InputError(f"{name} must be a whole number >= 1, got {count!r}")
 
     @property
-    def sign(self) -> float:
-        """+1 if minimised, -1 if maximised: sign * objective is what every solver minimises."""
-        return 1.0 if self.sense == "minimise" else -1.0
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Constraint:
-    """Rows lower <= value <= upper; a missing bound is None.
-
-    Attributes:
-        name: of the group, for example ``"torque_change"``.
-        labels: one per row, naming joint or side and sample; empty for a single row without a label.
-        unit: of value and bounds.
-        scale: violation of this size counts as 1 in the total violation [unit].
-        value: (m, 1).
-        lower: (m, 1) or scalar, a function of parameters only.
-        upper: likewise.
-    """
-
-    name: str
-    labels: tuple[str, ...] = ()
-    unit: str
-    scale: float
-    value: MX
-    lower: MX | None = None
-    upper: MX | None = None
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """For example ``torque_change[LKneePitch, 3]``."""
-        return tuple(f"{self.name}[{label}]" for label in self.labels) if self.labels else (self.name,)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Assembly:
-    """A problem's mathematics under one interpretation of the non-smooth operations.
-
-    Attributes:
-        objective: scalar, in the problem's own sense.
-        constraints: groups of rows.
-        indexes: named performance figures (scalars); meaningful under ``Exact`` only.
-    """
-
-    objective: MX
-    constraints: tuple[Constraint, ...]
-    indexes: Mapping[str, MX]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Point:
-    """Symbols of an assembly, read by name: ``point["hip_height_m"]``.
-
-    Attributes:
-        x: (n, 1) decision variables.
-        p: (k, 1) parameters.
-    """
-
-    x: MX
-    p: MX
-    positions: Mapping[str, tuple[Literal["x", "p"], int]]
-
-    def __getitem__(self, name: str) -> MX:
-        """Symbol of a variable or a parameter."""
-        kind, index = self.positions[name]
-        return self.x[index] if kind == "x" else self.p[index]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Signals:
-    """Time histories of one gait.
-
-    Attributes:
-        joints: names of the columns of q, qd, qdd and tau.
-        arrays: by name; the first axis is time. Units: s, rad, rad/s, rad/s^2, Nm, m.
-    """
-
-    joints: tuple[str, ...]
-    arrays: Mapping[str, Array]
+    def parts(self) -> int:
+        """Equal parts between the samples."""
+        return self.intervals * self.samples_per_interval
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GaitProblem:
     """A gait problem with the current values of its parameters.
 
-    Copies made by ``with_values`` share everything that was built from the mathematics.
+    Copies made by ``with_values`` share everything that was built from the mathematics; ``derived`` is how to change the
+    mathematics.
 
     Attributes:
         name: for example ``"nao-ssp"``.
         title: one line.
-        options: what the mathematics was built with (robot, intervals, ...).
         variables: in the order of x.
         own_parameters: limits and weights, without the variables' bounds.
         objective: name, unit, sense.
         assemble: builds objective and constraints from symbols and an interpretation.
-        refine: makes the same problem with more samples (a factor), or None if it has no samples.
-        signals: time histories of a given x (n,) and parameter vector (k,), or None.
-        start: a start point (n,) for gradient methods from the parameter vector and a generator; None means uniform
-            within the bounds.
+        options: what the mathematics was built with (robot, intervals, ...); written by ``problem.registry.maker``.
+        refine: makes the same problem with a number of times as many samples, or None if it has none; likewise.
+        grid: samples, or None if the problem has none.
+        motion: time histories at a point of numbers, or None.
+        start: start point (n,) for gradient methods from the parameters by name and a generator; None means uniform within
+            the bounds.
+        robot: whose joints move, where it is a tree of rigid links, else None.
+        durations: variables that hold the duration of each phase, in their order.
+        skeleton: what is drawn of a motion, from it and the parameters by name, or None.
+        playback: what a physics engine needs to play the motion, or None.
         hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
         long_derivatives: True where one solve by a gradient method pays for compiling its derivatives.
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
@@ -165,20 +91,33 @@ class GaitProblem:
 
     name: str
     title: str
-    options: Mapping[str, str | int | float | bool]
     variables: tuple[Variable, ...]
     own_parameters: tuple[Parameter, ...]
     objective: Objective
     assemble: Callable[[Point, Nonsmooth], Assembly]
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
     refine: Callable[[int], GaitProblem] | None = None
-    signals: Callable[[Array, Array], Signals] | None = None
-    start: Callable[[Array, np.random.Generator], Array] | None = None
+    grid: Grid | None = None
+    motion: Callable[[NumericPoint], Signals] | None = None
+    start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None
+    robot: Robot | None = None
+    durations: tuple[str, ...] = ()
+    skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
+    playback: Playback | None = None
     hessian: Literal["exact", "limited-memory"] = "exact"
     long_derivatives: bool = False
     starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
-    _built: dict[str, Any] = field(default_factory=dict, repr=False)
+    # No argument, so that every copy but those of ``with_values`` begins with nothing built.
+    _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse names that stand twice."""
+        counts = Counter([*self.names, *(parameter.name for parameter in self.parameters)])
+        twice = [name for name, count in counts.items() if count > 1]
+        if twice:
+            raise InputError(f"problem {self.name!r}: these variables or parameters stand twice: {', '.join(twice)}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -243,6 +182,7 @@ class GaitProblem:
                 )
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
         changed = replace(self, values=merged)
+        object.__setattr__(changed, "_built", self._built)  # the mathematics is the same
         changed._check_pairs()
         return changed
 
@@ -266,10 +206,83 @@ class GaitProblem:
             return None
         return self.built(f"dense {factor}", lambda: refine(factor)).with_values(**self.values)
 
+    def derived(
+        self,
+        *,
+        name: str = "",
+        title: str = "",
+        objective: Objective | None = None,
+        variables: Sequence[Variable] = (),
+        parameters: Sequence[Parameter] = (),
+        change: Change | None = None,
+    ) -> GaitProblem:
+        """A problem with other mathematics; time histories, start points and denser grids follow along.
+
+        Args:
+            name: of the new problem, if it gets one.
+            title: likewise.
+            objective: name, unit and sense, where ``change`` replaces the objective.
+            variables: in addition, after those that are there.
+            parameters: in addition.
+            change: makes the new assembly from this problem's, the point of all variables and parameters, and the
+                interpretation of non-smooth operations.
+
+        Raises:
+            InputError: a name that is there already.
+        """
+
+        def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+            assembly = self.assemble(point.only(self.names), ops)
+            return assembly if change is None else change(assembly, point, ops)
+
+        def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+            base = self.start(parameters, rng) if self.start is not None else _uniform(self.names, parameters, rng)
+            return np.concatenate([base, _uniform([variable.name for variable in variables], parameters, rng)])
+
+        def refine(factor: int) -> GaitProblem:
+            finer = self.dense(factor)
+            assert finer is not None  # only where there is one; for the type checker
+            return finer.derived(
+                name=name, title=title, objective=objective, variables=variables, parameters=parameters, change=change
+            )
+
+        motion = self.motion
+        return replace(
+            self,
+            name=name or self.name,
+            title=title or self.title,
+            objective=objective or self.objective,
+            variables=(*self.variables, *variables),
+            own_parameters=(*self.own_parameters, *parameters),
+            assemble=assemble,
+            motion=None if motion is None else lambda at: motion(at.only(self.names)),
+            start=start if self.start is not None or variables else None,
+            refine=None if self.refine is None else refine,
+        )
+
+    def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
+        """Time histories at x (n,) and the current parameter values.
+
+        Raises:
+            InputError: x has the wrong length or is not finite, or the problem has no time histories.
+        """
+        if self.motion is None:
+            raise InputError(f"problem {self.name!r} has no time histories")
+        return self.motion(self.at(x))
+
+    def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
+        """The point x (n,) with the current parameter values, in numbers."""
+        return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
+
+    @property
+    def parameter_values(self) -> dict[str, float]:
+        """Current values by name."""
+        return dict(zip((q.name for q in self.parameters), self.p.tolist(), strict=True))
+
     def start_point(self, rng: np.random.Generator) -> Array:
         """(n,) start point for a gradient method, within the bounds."""
         if self.start is not None:
-            return np.clip(self.start(self.p, rng), self.lower, self.upper)
+            return np.clip(self.start(self.parameter_values, rng), self.lower, self.upper)
         return rng.uniform(self.lower, self.upper)
 
     def variable_index(self, name: str) -> int:
@@ -278,8 +291,17 @@ class GaitProblem:
             raise unknown(f"variable of {self.name}", name, self.names)
         return self.names.index(name)
 
-    def check_x(self, x: Sequence[float] | Array) -> Array:
-        """(n,) floats, or InputError if the length is wrong or a value is not finite."""
+    def check_x(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
+        """(n,) floats from values in order or by name; InputError if one lacks, is too many, or is not finite."""
+        if isinstance(x, Mapping):
+            missing = [name for name in self.names if name not in x]
+            if missing or len(x) > len(self.names):
+                extra = [name for name in x if name not in self.names]
+                raise InputError(
+                    f"x of {self.name} must name every variable once; missing: {', '.join(missing) or 'none'}, "
+                    f"unknown: {', '.join(map(str, extra)) or 'none'}"
+                )
+            x = [x[name] for name in self.names]
         try:
             array = np.asarray(x, dtype=float)
         except (TypeError, ValueError, OverflowError) as error:
@@ -299,9 +321,8 @@ class GaitProblem:
 
     def symbols(self) -> Point:
         """Fresh symbols for x and p."""
-        positions: dict[str, tuple[Literal["x", "p"], int]] = {q.name: ("p", i) for i, q in enumerate(self.parameters)}
-        positions |= {v.name: ("x", i) for i, v in enumerate(self.variables)}
-        return Point(x=MX.sym("x", len(self.variables)), p=MX.sym("p", len(self.parameters)), positions=positions)
+        parameters = [q.name for q in self.parameters]
+        return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
 
     def built(self, key: str, build: Callable[[], T]) -> T:
         """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
@@ -335,16 +356,9 @@ def is_number(value: object) -> bool:
         return False
 
 
-def constraint_rows(constraint: Constraint) -> tuple[MX, MX, MX]:
-    """Value, lower and upper of a constraint as columns of equal length; a missing bound is infinite."""
-    m = constraint.value.shape[0]
-
-    def column(bound: MX | None, missing: float) -> MX:
-        if bound is None:
-            return MX(ca.DM.ones(m) * missing)
-        return bound if bound.shape[0] == m else ca.repmat(bound, m, 1)
-
-    return constraint.value, column(constraint.lower, -math.inf), column(constraint.upper, math.inf)
+def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Random values of variables within their bounds."""
+    return rng.uniform(*(np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
 
 
 def _frozen(values: Sequence[float]) -> Array:

@@ -1,16 +1,18 @@
-"""Gait problems by name."""
+"""Gait problems by name, and what turns a function with options into a problem that knows how it was made."""
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from nlp_gait.errors import InputError, kind_name, unknown
 from nlp_gait.problem.gait_problem import GaitProblem, is_number
 
-# Module and function of each problem, imported when it is asked for: no process pays for those that it does not use.
+# Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
     "nao-ssp": ("nao.single_support", "nao_ssp"),
     "nao-dsp": ("nao.double_support", "nao_dsp"),
@@ -26,13 +28,49 @@ PROBLEMS = {
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
 
+Maker = Callable[..., GaitProblem]
+
+
+def maker(*later: tuple[str, ...]) -> Callable[[Maker], Maker]:
+    """Makes a function of keyword options into a problem's maker: options are checked, and written into the problem.
+
+    The function's signature is the only list of the options. One whose annotation is a ``Literal`` takes its values only. The
+    problem is refined by the option that its grid names.
+
+    Args:
+        later: groups of options that came after the first studies. A group whose options all have their defaults is left out
+            of what is recorded, so that records from before it stay valid.
+    """
+
+    def decorate(make: Maker) -> Maker:
+        @functools.wraps(make)
+        def made(**options: Any) -> GaitProblem:
+            check(made, options)
+            defaults = {name: option.default for name, option in inspect.signature(make).parameters.items()}
+            call = defaults | options
+            problem = make(**call)
+            grid = problem.grid
+            left_out = [name for group in later for name in group if all(call[n] == defaults[n] for n in group)]
+            recorded = {name: value for name, value in call.items() if name not in left_out}
+            if grid is not None and "samples_per_interval" in recorded:
+                recorded["samples_per_interval"] = grid.samples_per_interval  # as chosen where that was left to it
+            refined_by = None if grid is None else grid.refined_by
+            if refined_by is None:
+                return replace(problem, options=recorded)
+            own = getattr(grid, refined_by)
+            return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
+
+        return made
+
+    return decorate
+
 
 def problem_names() -> tuple[str, ...]:
     """Names of the problems that come with the package."""
     return tuple(PROBLEMS)
 
 
-def problem_maker(name: str) -> Callable[..., GaitProblem]:
+def problem_maker(name: str) -> Maker:
     """Function that makes a problem; its keyword arguments are the problem's options.
 
     Raises:
@@ -40,28 +78,41 @@ def problem_maker(name: str) -> Callable[..., GaitProblem]:
     """
     if name not in PROBLEMS:
         raise unknown("problem", name, PROBLEMS)
-    module, maker = PROBLEMS[name]
-    make: Callable[..., GaitProblem] = getattr(importlib.import_module(f"nlp_gait.problems.{module}"), maker)
+    module, function = PROBLEMS[name]
+    make: Maker = getattr(importlib.import_module(f"nlp_gait.problems.{module}"), function)
     return make
 
 
 def check_options(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse options of a problem that do not exist, or are not of their default's type.
+    """Refuse options of a problem that do not exist, or whose values are not allowed; raises as ``load``."""
+    check(problem_maker(name), options)
+
+
+def check(make: Maker, options: Mapping[str, Any]) -> None:
+    """Refuse options that a maker does not have, that are not of their default's type, or not among those allowed.
 
     Raises:
-        UnknownNameError: no such problem or option.
-        InputError: a value of another type, or a count beyond what can be built.
+        UnknownNameError: no such option.
+        InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
-    known = inspect.signature(problem_maker(name)).parameters
+    known, allowed = inspect.signature(make).parameters, _choices(make)
     for option, value in options.items():
         if option not in known:
-            raise unknown(f"option of {name}", option, known)
+            raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
         expected = type(known[option].default)
         right = type(value) is expected or (expected is float and type(value) is int)
         if not right or (expected is float and not is_number(value)):
             raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
+        if option in allowed and value not in allowed[option]:
+            raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
+
+
+@functools.cache
+def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
+    """Values of the options that have a choice."""
+    return {name: get_args(hint) for name, hint in get_type_hints(make).items() if get_origin(hint) is Literal}
 
 
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
@@ -71,9 +122,4 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
         UnknownNameError: no such problem or option.
         InputError: a value that the option does not allow.
     """
-    make = problem_maker(name)
-    check_options(name, options)
-    return make(**options)
-
-
-__all__ = ["PROBLEMS", "GaitProblem", "check_options", "load", "problem_maker", "problem_names"]
+    return problem_maker(name)(**options)

@@ -9,8 +9,9 @@ from typing import Any
 
 from nlp_gait.errors import GaitError, InputError, unknown
 from nlp_gait.files import read_json
-from nlp_gait.problem.gait_problem import Array, is_number
-from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.gait_problem import GaitProblem, is_number
+from nlp_gait.problem.registry import load
+from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 
 SCHEMA = 1  # of a result; one without it is taken as the first

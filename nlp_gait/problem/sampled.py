@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Signals
 from nlp_gait.problem.result import Result
+from nlp_gait.problem.signals import Signals
 
 FINE_INTERVALS = 1000  # of a grid that splines run through: their error is below 1e-9 rad
 
@@ -20,14 +20,12 @@ def sampled(result: Result, period_s: float) -> Signals:
     if not period_s > 0.0:  # NaN fails too
         raise InputError(f"the time between samples must be > 0 s, got {period_s!r}")
     problem, x = result.problem, result.x
-    if problem.signals is None:
-        raise InputError(f"problem {problem.name!r} has no time histories")
-    signals = problem.signals(x, problem.p)
+    signals = problem.signals(x)
     times = signals.arrays["t"]
     longest = float((times[1:] - times[:-1]).max())
     factor = math.ceil(longest / period_s - 1e-9)  # a step that is a period but for rounding is not halved
     dense = problem.dense(factor) if factor > 1 else None
-    return signals if dense is None or dense.signals is None else dense.signals(x, dense.p)
+    return signals if dense is None else dense.signals(x)
 
 
 def finely_sampled(result: Result) -> Signals:

@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import reduce
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Assembly, GaitProblem, Point
+from nlp_gait.problem.assembly import Assembly, Point
+from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 
@@ -31,8 +32,8 @@ def worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
         if other.objective.sense != "minimise":
             raise InputError(f"a worst case is of an objective that is minimised; {first.objective.name} is maximised")
 
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        parts = [scenario.assemble(point, ops) for scenario in scenarios]
+    def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+        parts = [assembly, *(scenario.assemble(point, ops) for scenario in scenarios[1:])]
         constraints = tuple(
             replace(constraint, name=f"{constraint.name}@{k}" if k else constraint.name)
             for k, part in enumerate(parts)
@@ -43,10 +44,5 @@ def worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
         indexes = {f"{name}@{k}" if k else name: v for k, part in enumerate(parts) for name, v in part.indexes.items()}
         return Assembly(objective=worst, constraints=constraints, indexes=indexes)
 
-    return replace(
-        first,
-        title=f"{first.title}, worst of {len(scenarios)} scenarios",
-        assemble=assemble,
-        refine=None,
-        _built={},
-    )
+    worst = first.derived(title=f"{first.title}, worst of {len(scenarios)} scenarios", change=change)
+    return replace(worst, refine=None)  # a denser grid of the first scenario alone would be another problem

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi as ca
 import numpy as np
-from casadi import SX
 
-from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.errors import InputError
+from nlp_gait.problem.playback import Playback
 from nlp_gait.problem.result import Result
-from nlp_gait.problems.nao.body import GRAVITY, nao
-from nlp_gait.problems.nao.double_support import FEET, torso_shares
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import fixed_model
@@ -27,31 +25,23 @@ def engine_torques(result: Result, signals: Signals) -> Array:
         result: gait of ``nao-ssp`` or ``nao-dsp``, with rotational inertia: an engine takes no point masses.
         signals: its time histories.
     """
-    options = result.problem.options
-    robot = nao(str(options["robot"]), rotational_inertia=True)
+    playback = result.problem.playback
+    if playback is None or playback.supports is None:
+        raise InputError(f"problem {result.problem.name!r} does not say which foot carries what")
     torques = np.zeros_like(signals.arrays["tau"])
-    if "torso_share" not in options:
-        _fill(torques, tree_from(robot, robot.feet["left"].link), signals)
-        return torques
-    hip = SX.sym("hip")
-    feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
-    by_side = torso_shares(hip, options["torso_share"], feet_y)  # type: ignore[arg-type]
-    for side, foot in FEET.items():
-        tree = tree_from(robot, robot.feet[foot].link, [j for j in signals.joints if j.startswith(side)])
-        share = ca.Function("share", [hip], [by_side[side]])(signals.arrays["hip"][:, 1]).full().ravel()
-        _fill(torques, tree, signals, robot.root, share)
+    for support in playback.supports(signals):
+        tree = tree_from(playback.robot, playback.robot.feet[support.foot].link, support.joints)
+        _fill(torques, tree, signals, playback, support.torso_share)
     return torques
 
 
-def _fill(
-    torques: Array, tree: Sequence[Body], signals: Signals, shared: str | None = None, share: Array | None = None
-) -> None:
-    """Write the torques of a tree's joints into their columns; ``share`` (T,) scales mass and inertia of one link."""
+def _fill(torques: Array, tree: Sequence[Body], signals: Signals, playback: Playback, share: Array | None) -> None:
+    """Write the torques of a tree's joints into their columns; ``share`` (T,) scales the torso's mass and inertia."""
     engine = mujoco()
-    model = engine.MjModel.from_xml_string(fixed_model(tree, GRAVITY))
+    model = engine.MjModel.from_xml_string(fixed_model(tree, playback.gravity))
     data = engine.MjData(model)
     columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
-    body = None if shared is None else model.body(shared)
+    body = None if share is None else model.body(playback.robot.root)
     whole = None if body is None else (float(body.mass[0]), body.inertia.copy())
     for k in range(len(torques)):
         if body is not None and whole is not None and share is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,16 +10,14 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.result import Result
 from nlp_gait.problem.sampled import finely_sampled
-from nlp_gait.problems.nao.body import GRAVITY, HEAD_JOINTS, JOINTS, nao
-from nlp_gait.robots import Robot, load_robot
+from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 from nlp_gait.simulation.steps import walk
 
 SIDES = ("left", "right")
-CYCLE = "nao-cycle"
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 
@@ -40,8 +38,12 @@ class Plan:
     full_robot: Robot
     signals: Signals
     heat_loss: float
-    gravity: float = GRAVITY
-    joints: tuple[str, ...] = field(default=JOINTS)
+    gravity: float
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Those that are driven."""
+        return self.signals.joints
 
     @property
     def duration_s(self) -> float:
@@ -73,7 +75,8 @@ class Plan:
 
     def shapes(self, sole: str) -> dict[str, list[Shape]]:
         """Shapes of the simulated robot's links."""
-        return link_shapes(self.full_robot, sole, welded=HEAD_JOINTS)
+        welded = [joint for joint in self.full_robot.joints if joint not in self.robot.joints]
+        return link_shapes(self.full_robot, sole, welded=welded)
 
     @cached_property
     def mechanical_power_W(self) -> float:
@@ -102,20 +105,22 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
         InputError: another problem, a gait so damaged that its angles are not finite, or several steps of a phase.
     """
     problem = result.problem
-    robot = problem.options.get("robot")
-    if not isinstance(robot, str) or not problem.name.startswith("nao-"):
-        raise InputError(f"only gaits of the NAO problems can be simulated, got one of {problem.name!r}")
+    playback, robot = problem.playback, problem.robot
+    if playback is None or robot is None:
+        raise InputError(f"problem {problem.name!r} cannot be simulated: only gaits of the NAO problems can")
     signals = finely_sampled(result)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
-    welded = nao(robot, rotational_inertia=True)
     if steps is not None:
-        if problem.name != CYCLE:
-            raise InputError(f"only gaits of {CYCLE!r} can be played for several steps, got one of {problem.name!r}")
-        signals = walk(signals, welded, steps)
+        if not playback.repeats:
+            raise InputError(
+                f"problem {problem.name!r} is no cycle that can be repeated; several steps can be played of 'nao-cycle'"
+            )
+        signals = walk(signals, playback.robot, steps)
     return Plan(
-        robot=welded,
-        full_robot=load_robot(robot),
+        robot=playback.robot,
+        full_robot=robot,
         signals=signals,
-        heat_loss=problem.value("heat_loss_W_per_Nm2"),
+        heat_loss=problem.value(playback.heat_loss),
+        gravity=playback.gravity,
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.signals import Array, Columns, Signals, in_space
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
@@ -19,6 +19,14 @@ from nlp_gait.simulation.plan import SIDES, Plan
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
 FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start
+COLUMNS = {
+    "torso": in_space("m"),
+    "tilt": Columns(unit="rad"),
+    "heading": Columns(unit="rad"),
+    "feet": Columns(unit="m", labels=SIDES),
+    "loads": Columns(unit="N", labels=SIDES),
+    "pressure": in_space("m", "xy"),
+}
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
 # Called with the engine's model and data before every step.
@@ -59,8 +67,9 @@ class Trace:
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """The time histories, for an archive."""
-        names = ("t", "q", "qd", "torque", "set_points", "torso", "tilt", "heading", "feet", "loads", "pressure")
-        return Signals(joints=joints, arrays={name: getattr(self, name) for name in names})
+        arrays = {name: getattr(self, name) for name in ("t", "q", "qd", "torque", "set_points", *COLUMNS)}
+        driven = {"torque": Columns(unit="Nm", labels=joints), "set_points": Columns(unit="rad", labels=joints)}
+        return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
 
 def play(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 
@@ -29,10 +31,8 @@ def walk(cycle: Signals, robot: Robot, steps: int) -> Signals:
     image = mirror_image(cycle, robot)
     advance, period = step_of(cycle), float(cycle.arrays["t"][-1])
     parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
-    return Signals(
-        joints=cycle.joints,
-        arrays={name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]},
-    )
+    arrays = {name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]}
+    return replace(cycle, arrays=arrays)
 
 
 def step_of(cycle: Signals) -> float:
@@ -53,7 +53,7 @@ def mirror_image(signals: Signals, robot: Robot) -> Signals:
             arrays[name] = array
         else:
             arrays[SIDES_SWAPPED.get(name, name)] = array * np.array([1.0, -1.0, 1.0])[: array.shape[1]]
-    return Signals(joints=signals.joints, arrays=arrays)
+    return replace(signals, arrays=arrays)
 
 
 def _moved(signals: Signals, distance: float, delay: float) -> dict[str, Array]:

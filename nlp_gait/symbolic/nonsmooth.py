@@ -177,15 +177,3 @@ class Lifted:
         exact = step.mapaccum(steps)(initial, *inputs)
         self.lifts.append(Lift(variable=states, value=ca.vec(exact), rows=ca.vec(path - reached), tight=True))
         return path
-
-
-class PowerAside:
-    """An interpretation for problems in which power is an index only: nothing keeps a lifted |.| down there."""
-
-    def __init__(self, ops: Nonsmooth) -> None:
-        self.acos, self.min, self.largest = ops.acos, ops.min, ops.largest
-        self.step, self.tie, self.rollout = ops.step, ops.tie, ops.rollout
-
-    def abs(self, v: MX) -> MX:
-        """|v|."""
-        return ca.fabs(v)

@@ -11,9 +11,9 @@ import nlp_gait
 from nlp_gait.errors import InputError, OutputError, UnknownNameError
 from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.export.tables import columns
-from nlp_gait.problem.gait_problem import Signals
 from nlp_gait.problem.registry import problem_names
 from nlp_gait.problem.result import Result, load_result
+from nlp_gait.problem.signals import Signals
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
 
@@ -32,7 +32,7 @@ def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_pa
     assert all(name.endswith("]") for name in header) and len(set(header)) == len(header)
     table = np.array(rows, dtype=float)
     assert table.shape == (21, len(header))  # ten intervals of 200 ms, halved
-    signals = result.problem.signals(result.x, result.problem.p)
+    signals = result.problem.signals(result.x)
     knee = signals.joints.index("LKneePitch")
     np.testing.assert_allclose(
         table[::2, header.index("tau LKneePitch [Nm]")], signals.arrays["tau"][:, knee], rtol=1e-12

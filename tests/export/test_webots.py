@@ -58,7 +58,7 @@ def test_a_gait_is_written_every_40_ms_and_read_back(points, tmp_path):
 
 def test_set_points_are_the_planned_angles(points):
     problem = nlp_gait.load("nao-ssp")
-    signals = problem.signals(problem.check_x(OPTIMUM), problem.p)  # 11 samples, 400 ms apart
+    signals = problem.signals(problem.check_x(OPTIMUM))  # 11 samples, 400 ms apart
     np.testing.assert_allclose(points.angles[::10], signals.arrays["q"], atol=1e-9)
 
 

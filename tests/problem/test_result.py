@@ -83,7 +83,7 @@ def test_sampling_keeps_the_problems_samples(tmp_path, period, samples):
     result = load_result(written(tmp_path, {"problem": "nao-dsp", "x": X}))
     signals = sampled(result, period)
     assert len(signals.arrays["t"]) == samples
-    own = result.problem.signals(result.x, result.problem.p)
+    own = result.problem.signals(result.x)
     np.testing.assert_allclose(signals.arrays["q"][:: (samples - 1) // 10], own.arrays["q"], atol=1e-12)
 
 

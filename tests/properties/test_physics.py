@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.nao.body import GRAVITY, upright_links
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from
@@ -39,7 +39,7 @@ def candidates(problem: GaitProblem) -> list[Array]:
 
 def signals_of(problem: GaitProblem, x: Array) -> dict[str, Array]:
     assert problem.signals is not None
-    signals: Signals = problem.signals(x, problem.p)
+    signals: Signals = problem.signals(x)
     return dict(signals.arrays)
 
 
@@ -123,7 +123,7 @@ def test_a_gait_mirrored_left_to_right_needs_mirrored_torques() -> None:
     image = mirrored(robot)
     assert problem.signals is not None
     for x in candidates(problem):
-        signals = problem.signals(x, problem.p)
+        signals = problem.signals(x)
         columns = {name: i for i, name in enumerate(signals.joints)}
         moving = {
             f"{key} {partner(name)}": sign * signals.arrays[key][:, columns[name]] if name in columns else np.zeros(11)

@@ -17,7 +17,7 @@ AGREEMENT_NM = 1e-9
 )
 def test_engine_and_model_need_the_same_torques(gait, name, options):
     result = gait(name, **options)
-    signals = result.problem.signals(result.x, result.problem.p)
+    signals = result.problem.signals(result.x)
     assert np.abs(signals.arrays["tau"]).max() > 1.0
     np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
 
@@ -25,7 +25,7 @@ def test_engine_and_model_need_the_same_torques(gait, name, options):
 def test_lever_rule_and_fast_motion(gait):
     result = gait("dsp optimum", torso_share="lever")
     result.x[-1] = 0.3  # accelerations fifty times as large
-    signals = result.problem.signals(result.x, result.problem.p)
+    signals = result.problem.signals(result.x)
     np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
 
 

@@ -59,11 +59,10 @@ def walk(
     """
     from compare.questions.sweep.study import parse_axis
     from compare.questions.walk.report import write_figures
-    from compare.questions.walk.study import optimal_gaits, played, result_of, solves, write_walk
+    from compare.questions.walk.study import CYCLE, optimal_gaits, played, result_of, solves, write_walk
     from nlp_gait.backends.interrupts import Interrupted
     from nlp_gait.files import writable_folder
     from nlp_gait.simulation.engine import mujoco
-    from nlp_gait.simulation.plan import CYCLE
 
     if steps:
         mujoco()  # said now if it is missing, not after the work

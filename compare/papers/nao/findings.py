@@ -12,7 +12,8 @@ import numpy as np
 from compare.analysis.statistics.rank_sum_normal import RankSum, rank_sum_normal
 from compare.papers.nao.paper import PrintedPhase
 from compare.papers.nao.runs import Run, judged, power_with_legs_twice
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 
 ALGORITHMS = ("pso", "ga")
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}

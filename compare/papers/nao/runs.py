@@ -20,7 +20,8 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, read_bytes
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.problems.nao.body import PLANNED_JOINTS
 
 Run = dict[str, Any]
@@ -108,9 +109,9 @@ def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
     Raises:
         ValueError: the problem has no time histories.
     """
-    if problem.signals is None:
+    if problem.motion is None:
         raise ValueError(f"{problem.name} has no time histories")
-    signals = problem.signals(problem.check_x(x), problem.p)
+    signals = problem.signals(problem.check_x(x))
     legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
     mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
     share = np.diff(signals.arrays["t"]) / signals.arrays["t"][-1]

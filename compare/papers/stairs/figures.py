@@ -12,7 +12,7 @@ from compare.drawing.figures import legend_below, new_figure, save, style
 from compare.papers.stairs.motion import Leg, first_step, two_steps
 from compare.papers.stairs.paper import TABLE_4
 from compare.papers.stairs.runs import best_track, complete, plan_problem, tracked
-from nlp_gait.problem.gait_problem import Array
+from nlp_gait.problem.signals import Array
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.robot import load_biped
 from nlp_gait.problems.stairs.stair import SETBACK
@@ -51,9 +51,9 @@ def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]], network:
 
 def _planned(case: int, plan: Mapping[str, float]) -> Mapping[str, Array]:
     problem = plan_problem(case).dense(DENSITY)
-    if problem is None or problem.signals is None:
+    if problem is None:
         raise TypeError("the planner has samples and signals")
-    return problem.signals(np.array([plan[name] for name in problem.names]), problem.p).arrays
+    return problem.signals(plan).arrays
 
 
 def _two_step_times(plan: Mapping[str, float]) -> Array:

@@ -15,7 +15,8 @@ from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
 from metaheuristics.interface import Algorithm
 from nlp_gait import IpoptSettings, compile_objective, load, solve
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.problems.stairs.closed_loop import InverseKinematics
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.learned_path import LEGS
@@ -169,7 +170,7 @@ def best_track(found: Mapping[str, Any]) -> list[float]:
 def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
     """Time histories of the closed loop with given gains and torso pitch."""
     problem = track_problem(case, plan)
-    return problem.signals(np.array(x), problem.p).arrays  # type: ignore[misc]
+    return problem.signals(np.array(x)).arrays
 
 
 def printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
@@ -194,7 +195,7 @@ def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[s
     for kind, problem in problems.items():
         verdict = evaluate(problem, x)
         found |= {f"{kind} cost": verdict.objective["value"], f"{kind} feasible": float(verdict.feasible)}
-        angles.append(problem.signals(np.array(x), problem.p).arrays["q_desired"])  # type: ignore[misc]
+        angles.append(problem.signals(np.array(x)).arrays["q_desired"])
     error = np.abs(angles[0] - angles[1])[:, [LINKS.index(link) for leg in LEGS for link in leg]]
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
 
@@ -202,7 +203,7 @@ def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[s
 def replayed(case: int, x: list[float]) -> dict[str, float]:
     """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
     problem = on_stair(loaded("stairs-ideal"), case)
-    arrays = problem.signals(np.array(x), problem.p).arrays  # type: ignore[misc]
+    arrays = problem.signals(np.array(x)).arrays
     _, followed = replay(arrays, FEEDBACK)
     time, fallen = replay(arrays, OPEN_LOOP)
     off = np.maximum.accumulate(np.abs(fallen).max(axis=1))

@@ -19,7 +19,8 @@ import numpy as np
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 

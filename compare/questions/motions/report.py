@@ -14,7 +14,7 @@ from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.study.task import ProblemSpec
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem.gait_problem import Array
+from nlp_gait.problem.signals import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,8 +163,8 @@ def paths(found: Sequence[Motion]) -> list[Path3]:
     result = []
     for m in drawn:
         problem = ProblemSpec(name=m.task.problem, options=m.task.options).load().dense(DRAWN)
-        assert problem is not None and problem.signals is not None  # a phase has both; for the type checker
-        arrays: Mapping[str, Array] = problem.signals(np.array(list(m.x.values())), problem.p).arrays
+        assert problem is not None  # a phase has one; for the type checker
+        arrays: Mapping[str, Array] = problem.signals(m.x).arrays
         result.append(Path3(label=title(m), hip=arrays["hip"], foot=arrays["right_foot"]))
     return result
 

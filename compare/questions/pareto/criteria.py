@@ -12,7 +12,9 @@ from casadi import MX
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem.gait_problem import Array, Assembly, GaitProblem, Objective, Parameter, Point
+from nlp_gait.problem.assembly import Assembly, Objective, Parameter, Point
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -94,7 +96,7 @@ class Margin:
         """See ``Criterion``; the mean margins only, which are smooth but for the jump that is smoothed anyway."""
         if not self.name.endswith("_mean"):
             raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
-        return next(c.value for c in assembly.constraints if c.name == self.name)
+        return assembly.group(self.name).value
 
     def price(self, solution: Solution) -> float:
         """See ``Criterion``."""
@@ -160,38 +162,33 @@ def criterion(name: str, problem: GaitProblem) -> Criterion:
         UnknownNameError: no such criterion.
         InputError: the problem has no power, margins and duration to trade.
     """
-    durations = [v.name for v in problem.variables if v.name.endswith("_support_time_s")]
-    if problem.objective.name != POWER or len(durations) != 1 or problem.signals is None:
+    durations = problem.durations
+    if problem.objective.name != POWER or len(durations) != 1 or problem.motion is None:
         raise InputError(f"{problem.name} trades no power against balance or speed; allowed are nao-ssp and nao-dsp")
     if name in MARGINS:
         return Margin(name=name)
     if name != SPEED:
         raise unknown("objective beside power", name, (*MARGINS, SPEED))
     middle = (problem.lower + problem.upper) / 2
-    hip = problem.signals(middle, problem.p).arrays["hip"]
+    hip = problem.signals(middle).arrays["hip"]
     return Speed(duration=durations[0], way_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
 def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
     """The problem that minimises power less a reward for the criterion, whose size is the parameter ``reward_W_per_unit``."""
 
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        assembly = problem.assemble(point, ops)
+    def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
         cost = assembly.objective - point[REWARD] * criterion.expression(point, assembly)
         return replace(assembly, objective=cost)
 
     reward = Parameter(
         name=REWARD, unit=f"W/({criterion.unit})", default=0.0, description=f"reward for {criterion.name}", minimum=0.0
     )
-    return replace(
-        problem,
+    return problem.derived(
         name=f"{problem.name}-{criterion.name}",
-        own_parameters=(*problem.own_parameters, reward),
         objective=Objective(name="rewarded_power", unit="W"),
-        assemble=assemble,
-        refine=None,
-        signals=None,
-        _built={},
+        parameters=(reward,),
+        change=change,
     )
 
 

@@ -16,10 +16,11 @@ from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.files import csv_text, write_json, write_text
 from nlp_gait.problem.result import Result
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import CYCLE, plan_of
+from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
 from nlp_gait.simulation.walking import Walk, measure_walk
 
+CYCLE = "nao-cycle"
 # Indexes that the table lists, with their units in their names.
 FIGURES = (
     "power_W",

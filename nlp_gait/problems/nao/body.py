@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from casadi import DM, SX, vertsplit
+from casadi import DM, SX
 
 from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.problem.assembly import InstantPoint
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
@@ -15,7 +16,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, stack
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
-LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
 
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
 # Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
@@ -60,11 +60,13 @@ def upright_links(robot: Robot) -> frozenset[str]:
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
 
 
-def hip_motion(x: SX, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX) -> Motion:
+def hip_motion(
+    at: InstantPoint, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
+) -> Motion:
     """Motion of the torso's origin as cubics in x, y and z (3,) [m].
 
     Args:
-        x: values of the variables that ``nao_legs.hip_variables`` makes.
+        at: values of the variables that ``legs.hip_variables`` makes.
         along: x at both ends [m].
         across: y at both ends [m].
         duration: of the phase [s].
@@ -73,11 +75,13 @@ def hip_motion(x: SX, along: tuple[float, float], across: tuple[float, float], d
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.
     """
-    height, vz0, vz1, vx0, vx1, vy0, vy1 = vertsplit(x)
+    height = at["hip_height_m"]
+    ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
     return stack(
-        cubic(SX(along[0]), SX(along[1]), vx0, vx1, duration, phase),
-        cubic(SX(across[0]), SX(across[1]), vy0, vy1, duration, phase),
-        cubic(height, height, vz0, vz1, duration, phase),
+        *(
+            cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
+            for axis, (start, end) in ends.items()
+        )
     )
 
 

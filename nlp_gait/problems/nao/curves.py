@@ -6,7 +6,7 @@ own; with all of them at zero the motion is the papers'.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -14,9 +14,12 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Variable
+from nlp_gait.problem.assembly import InstantPoint, Variable
+from nlp_gait.problem.gait_problem import Grid
+from nlp_gait.problem.signals import Array
+from nlp_gait.problems.biped.parts import AngleLimits
 from nlp_gait.problems.nao.body import arm_joints, hip_motion
+from nlp_gait.robots import Robot
 from nlp_gait.symbolic.splines import coefficient_count, spline
 from nlp_gait.symbolic.trajectories import Motion, plus, stack
 
@@ -39,17 +42,10 @@ class Splines:
     Attributes:
         trajectory: their order.
         units: of each curve by name, ``"m"`` or ``"rad"``.
-        first: number of variables before the coefficients.
     """
 
     trajectory: Trajectory
     units: Mapping[str, str]
-    first: int
-
-    def __post_init__(self) -> None:
-        """Refuse an unknown order."""
-        if self.trajectory not in SPANS:
-            raise InputError(f"trajectory must be one of {', '.join(SPANS)}, got {self.trajectory!r}")
 
     @property
     def count(self) -> int:
@@ -71,18 +67,25 @@ class Splines:
             for k in range(self.count)
         )
 
-    def motions(self, x: SX, duration: SX, phase: SX) -> dict[str, Motion]:
-        """What each curve adds to its cubic, from x (n,)."""
-        m, k = self.count, len(self.units)
-        added = spline(ca.reshape(x[self.first : self.first + m * k], m, k), duration, phase)
+    def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
+        """What each curve adds to its cubic."""
+        coefficients = ca.vertcat(*(at[variable.name] for variable in self.variables))
+        added = spline(ca.reshape(coefficients, self.count, len(self.units)), duration, phase)
         return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
 
-    def start(self, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Start point: the papers' variables anywhere within their bounds, coefficients near zero."""
-        share = np.ones(len(lower))
-        share[self.first :] = START_SHARE
-        middle, half = (lower + upper) / 2, (upper - lower) / 2
-        return middle + share * rng.uniform(-half, half)
+    def start_of(self, names: Sequence[str]) -> Callable[[Mapping[str, float], np.random.Generator], Array] | None:
+        """Start points of variables: the papers' anywhere within their bounds, coefficients near zero; None without any."""
+        if self.count == 0:
+            return None
+        own = {variable.name for variable in self.variables}
+        share = np.array([START_SHARE if name in own else 1.0 for name in names])
+
+        def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+            lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
+            middle, half = (lower + upper) / 2, (upper - lower) / 2
+            return np.asarray(middle + share * rng.uniform(-half, half))
+
+        return start
 
 
 def hip_and_arm_units(swing: Mapping[str, tuple[float, float]]) -> dict[str, str]:
@@ -91,34 +94,40 @@ def hip_and_arm_units(swing: Mapping[str, tuple[float, float]]) -> dict[str, str
 
 
 def hip_on_spline(
-    x: SX,
+    at: InstantPoint,
     more: Mapping[str, Motion],
     along: tuple[float, float],
     across: tuple[float, float],
     duration: SX,
     phase: SX,
 ) -> Motion:
-    """Motion of the torso's origin (3,) [m]: the papers' (see ``nao.hip_motion``), and what each curve adds."""
-    return plus(hip_motion(x[:7], along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
+    """Motion of the torso's origin (3,) [m]: the papers' (see ``body.hip_motion``), and what each curve adds."""
+    return plus(hip_motion(at, along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
 def arm_motions(
     more: Mapping[str, Motion], swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
 ) -> dict[str, Motion]:
-    """Motions of the arms' joints [rad]: the papers' (see ``nao.arm_joints``), and what each curve adds."""
+    """Motions of the arms' joints [rad]: the papers' (see ``body.arm_joints``), and what each curve adds."""
     arms = arm_joints(swing, duration, phase)
     return arms | {joint: plus(arms[joint], more[joint]) for joint in swing}
 
 
-def samples_in_interval(trajectory: str, samples_per_interval: int) -> int:
-    """Number of samples in an interval: what is asked for, or for 0 what suits the trajectory."""
-    if samples_per_interval != 0 or isinstance(samples_per_interval, bool):
-        return samples_per_interval
-    return SAMPLES if trajectory == "cubic" else SPLINE_SAMPLES
+def arm_limits(
+    robot: Robot, splines: Splines, swing: Mapping[str, tuple[float, float]], duration: Callable[[InstantPoint], SX]
+) -> AngleLimits:
+    """Limits of the arms' joints that swing, which a spline can break between the ends of a phase."""
+
+    def angles(at: InstantPoint, phase: SX) -> SX:
+        time = duration(at)
+        arms = arm_motions(splines.motions(at, time, phase), swing, time, phase)
+        return ca.vertcat(*(arms[joint].position for joint in swing))
+
+    return AngleLimits("arm_angle", robot, tuple(swing), angles)
 
 
-def motion_options(trajectory: str, criterion: str, samples_per_interval: int) -> dict[str, str | int]:
-    """Options of a problem that say how its motion differs from the papers'; none if it does not."""
-    given = (trajectory, criterion, samples_per_interval)
-    names = ("trajectory", "objective", "samples_per_interval")
-    return {} if given == ("cubic", "power", SAMPLES) else dict(zip(names, given, strict=True))
+def grid_for(trajectory: str, intervals: int, samples_per_interval: int) -> Grid:
+    """Samples of a phase: as many in an interval as are asked for, or for 0 as many as suit the trajectory."""
+    if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
+        samples_per_interval = SAMPLES if trajectory == "cubic" else SPLINE_SAMPLES
+    return Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")

@@ -7,23 +7,37 @@ and the step length are variables, and the cycle repeats after mirroring left to
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 
-from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, GaitProblem, Objective, Signals
-from nlp_gait.problems.nao.body import nao
+from nlp_gait.problem.assembly import Objective
+from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Array
+from nlp_gait.problems.biped.goals import MeanPower
+from nlp_gait.problems.biped.phase import Phase
+from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.cycle_motion import (
     TIMES,
     cycle_variables,
     double_support_planner,
     single_support_planner,
 )
-from nlp_gait.problems.nao.cycle_rows import WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.nao.cycle_rows import (
+    WalkingCycle,
+    double_margins,
+    joined,
+    mean_margins,
+    single_margins,
+    start_at_speed,
+)
 from nlp_gait.problems.nao.double_support import TorsoShare, double_support_loads
-from nlp_gait.problems.nao.phase import Phase
+from nlp_gait.problems.nao.problem import paper_parts, playback
 from nlp_gait.problems.nao.single_support import single_support_loads
+from nlp_gait.problems.nao.skeleton import skeleton
+from nlp_gait.robots import Robot, load_robot
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -32,6 +46,7 @@ OBJECTIVES = {
 }
 
 
+@maker(("samples_per_interval",))
 def nao_cycle(
     *,
     robot: str = "nao-v5",
@@ -41,83 +56,69 @@ def nao_cycle(
     torso_share: TorsoShare = "lever",
     samples_per_interval: int = 1,
 ) -> GaitProblem:
-    """Walking cycle of NAO: one step, whose mirror image is the next one.
+    """Walking cycle of NAO: one step, whose mirror image is the next one; for the other options see ``problems.nao``.
 
     Args:
-        robot: name or file of the robot.
+        robot: name or file.
         objective: ``"energy-per-metre"`` leaves the speed free; ``"power"`` is that at the speed ``speed_m_s``, a parameter: the
             step length is then no variable but speed times the time of the cycle.
-        intervals: equal parts of each phase over which torques may change by the limit.
-        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
-        torso_share: how the torso's mass is shared between the legs in double support (see ``nao_dsp.torso_shares``). By the
-            lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the farther one.
-        samples_per_interval: above 1 for a grid that is denser than the intervals.
+        intervals: of each phase.
+        rotational_inertia: False takes every link as a point mass.
+        torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
+            farther one.
+        samples_per_interval: above 1 for a denser grid.
     """
-    options: dict[str, str | int | bool] = {
-        "robot": robot,
-        "objective": objective,
-        "intervals": intervals,
-        "rotational_inertia": rotational_inertia,
-        "torso_share": torso_share,
-    }
-    cycle = walking_cycle(**options, samples_per_interval=samples_per_interval)  # type: ignore[arg-type]
+    grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
+    cycle = walking_cycle(nao(robot, rotational_inertia), torso_share, grid, at_given_speed=objective == "power")
+    names = tuple(variable.name for variable in cycle.decisions)
 
-    def refine(factor: int) -> GaitProblem:
-        return nao_cycle(**options, samples_per_interval=samples_per_interval * factor)  # type: ignore[arg-type]
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return start_at_speed(names, parameters, rng)
 
-    def signals(x: Array, p: Array) -> Signals:
-        return joined(cycle.signals(problem.symbols(), x, p))
-
-    def start(p: Array, rng: np.random.Generator) -> Array:
-        names = (parameter.name for parameter in problem.parameters)
-        return start_at_speed(problem.names, dict(zip(names, p.tolist(), strict=True)), rng)
-
-    problem = GaitProblem(
+    return GaitProblem(
         name="nao-cycle",
         title=f"NAO, walking cycle: least {OBJECTIVES[objective].name.replace('_', ' ')}",
-        options=options,
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
         objective=OBJECTIVES[objective],
         assemble=cycle.assemble,
-        refine=refine,
-        signals=signals,
+        grid=grid,
+        motion=lambda at: joined(cycle.signals(at)),
         start=start if cycle.at_given_speed else None,
+        robot=load_robot(robot),
+        durations=tuple(TIMES.values()),
+        skeleton=skeleton(load_robot(robot)),
+        playback=playback(robot, repeats=True),
     )
-    return problem
 
 
-def walking_cycle(
-    *,
-    robot: str,
-    objective: Goal,
-    intervals: int,
-    rotational_inertia: bool,
-    torso_share: TorsoShare,
-    samples_per_interval: int = 1,
-) -> WalkingCycle:
-    """Both phases of the cycle; arguments as those of ``nao_cycle``."""
-    if objective not in OBJECTIVES:
-        raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, got {objective!r}")
-    if torso_share not in get_args(TorsoShare):
-        raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
-    model = nao(robot, rotational_inertia)
-    variables = cycle_variables(model)
+def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
+    """Both phases of the cycle.
+
+    Args:
+        model: robot as ``nao`` makes it.
+        torso_share: in double support, see ``double_support.torso_shares``.
+        grid: of each phase.
+        at_given_speed: the step length follows from the speed.
+    """
+    variables, means = cycle_variables(model), mean_margins(model)
     halves = {
-        "ssp": (single_support_planner(model), single_support_loads(model)),
-        "dsp": (double_support_planner(model), double_support_loads(model, torso_share)),
+        "ssp": (single_support_planner(model), single_support_loads(model), single_margins(model)),
+        "dsp": (double_support_planner(model), double_support_loads(model, torso_share), double_margins(model)),
     }
     phases = {
         name: Phase(
             robot=model,
-            variables=len(variables),
+            joints=JOINTS,
+            planned=PLANNED_JOINTS,
+            variables=variables,
             duration=TIMES[name],
             plan=plan,
             loads=loads,
-            intervals=intervals,
-            samples_per_interval=samples_per_interval,
-            derivatives="analytic",
+            grid=grid,
+            parts=paper_parts(model, margins, means[name]),
+            goal=MeanPower(),
         )
-        for name, (plan, loads) in halves.items()
+        for name, (plan, loads, margins) in halves.items()
     }
-    return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=objective == "power")
+    return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=at_given_speed)

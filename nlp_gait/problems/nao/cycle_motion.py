@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from casadi import SX, fmax, vertcat, vertsplit
+from casadi import SX, fmax, vertcat
 
-from nlp_gait.problem.gait_problem import Variable
-from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, LEAST_DURATION, leg_joints
+from nlp_gait.problem.assembly import InstantPoint, Variable
+from nlp_gait.problems.biped.parts import REACH_MARGIN
+from nlp_gait.problems.biped.phase import Plan, Planner
+from nlp_gait.problems.biped.samples import LEAST_DURATION
+from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, leg_joints
 from nlp_gait.problems.nao.legs import hip_variables, leg_geometry
-from nlp_gait.problems.nao.phase import Plan, Planner
-from nlp_gait.problems.nao.single_support import swing_foot
+from nlp_gait.problems.nao.single_support import LIFT, swing_foot
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, stack
@@ -72,7 +74,7 @@ class Cycle(NamedTuple):
 
 
 def cycle_variables(robot: Robot) -> tuple[Variable, ...]:
-    """Variables of a cycle, in the order that ``cycle_from`` reads; the step length is the last one.
+    """Variables of a cycle; the step length is the last one.
 
     Heights, velocities, swing height and times have the bounds of the published phases.
     """
@@ -109,30 +111,34 @@ def cycle_variables(robot: Robot) -> tuple[Variable, ...]:
     low, high = (round(share * length, 3) for share in STEP_SHARES)
     return (
         *found,
-        Variable(
-            name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="highest point of the swing foot"
-        ),
+        Variable(name=LIFT, unit="m", lower=0.015, upper=0.03, description="highest point of the swing foot"),
         Variable(name=TIMES["ssp"], unit="s", lower=0.4, upper=4.0, description="from lift-off to touch-down"),
         Variable(name=TIMES["dsp"], unit="s", lower=0.2, upper=2.0, description="from touch-down to the next lift-off"),
         Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot"),
     )
 
 
-def cycle_from(x: SX) -> Cycle:
-    """Cycle of the decision variables (20,)."""
-    first, second = (State(s[:3], s[3:6], s[6], s[7]) for s in (x[:8], x[8:16]))
-    lift, single, double, step = vertsplit(x[16:])
-    return Cycle(
-        first, second, lift, fmax(single, LEAST_DURATION), fmax(double, LEAST_DURATION), fmax(step, LEAST_STEP)
+def cycle_from(at: InstantPoint) -> Cycle:
+    """Cycle of the variables."""
+    lift_off, touch_down = (
+        State(
+            vertcat(*(at[f"hip_{axis}_{switch}_m"] for axis in "xyz")),
+            vertcat(*(at[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz")),
+            at[f"arm_swing_{switch}_rad"],
+            at[f"arm_rate_{switch}_rad_s"],
+        )
+        for switch in SWITCHES
     )
+    single, double = (fmax(at[time], LEAST_DURATION) for time in TIMES.values())
+    return Cycle(lift_off, touch_down, at[LIFT], single, double, fmax(at[STEP], LEAST_STEP))
 
 
 def single_support_planner(robot: Robot) -> Planner:
     """From lift-off to touch-down over the left foot."""
     (left_y, right_y), (left_z, right_z) = _feet_y(robot), _ankle_heights(robot)
 
-    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        cycle = cycle_from(x)
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+        cycle, margin = cycle_from(at), at[REACH_MARGIN]
         ankles = {
             "L": stack(*map(constant, (0.0, left_y, left_z))),
             "R": swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase),
@@ -146,8 +152,8 @@ def double_support_planner(robot: Robot) -> Planner:
     """From touch-down to the mirror image of lift-off over both feet."""
     (left_y, right_y), (left_z, right_z) = _feet_y(robot), _ankle_heights(robot)
 
-    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        cycle = cycle_from(x)
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+        cycle, margin = cycle_from(at), at[REACH_MARGIN]
         ahead = Motion(cycle.step, SX(0), SX(0))
         ankles = {
             "L": stack(*map(constant, (0.0, left_y, left_z))),

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem.gait_problem import Array, Assembly, Constraint, Parameter, Point, Signals, Variable
-from nlp_gait.problems.nao.body import GRAVITY, JOINTS, LEAST_DURATION
+from nlp_gait.problem.assembly import Assembly, Constraint, Parameter, Point, Variable
+from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problems.biped.parts import MARGIN_SCALE, TORQUE_SCALE, Margins
+from nlp_gait.problems.biped.phase import Phase
+from nlp_gait.problems.biped.samples import LEAST_DURATION
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS
 from nlp_gait.problems.nao.cycle_motion import LEAST_STEP, STEP, TIMES
-from nlp_gait.problems.nao.double_support import Box, double_support_margins, double_support_mean_margins, support_box
+from nlp_gait.problems.nao.double_support import Box, double_support_mean_margins, margins_in, support_box
 from nlp_gait.problems.nao.legs import leg_geometry
-from nlp_gait.problems.nao.limits import TORQUE_SCALE, assemble_phase, phase_parameters
-from nlp_gait.problems.nao.phase import Phase
 from nlp_gait.problems.nao.single_support import single_support_margins, single_support_mean_margins
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partner
@@ -26,7 +27,6 @@ SPEED = "speed_m_s"
 LEAST_SPEED = 1e-4  # [m/s]
 PUBLISHED_STEP = 0.06  # [m]; the box around both soles, of which the least mean margins in double support are shares
 NO_JUMP_LIMIT = 1000.0  # [Nm]
-STEP_SCALE = 0.01  # [m]; counts as 1 in the total violation, as a balance margin does
 # Limits that differ between the phases, and so do their names.
 BALANCE = tuple(f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy")
 
@@ -55,13 +55,7 @@ class WalkingCycle:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Limits and weights of both phases; those of balance carry the phase's name."""
-        left, right = (leg_geometry(self.robot, side).hip_m[1] for side in "LR")
-        box = support_box(self.robot, {"L": (0.0, left), "R": (PUBLISHED_STEP, right)})
-        means = {
-            "ssp": single_support_mean_margins(self.robot.feet["left"]),
-            "dsp": double_support_mean_margins(box),
-        }
-        own = {name: phase_parameters(self.robot, mean) for name, mean in means.items()}
+        own = {name: phase.parameters for name, phase in self.phases.items()}
         balance = [
             replace(parameter, name=f"{name}_{parameter.name}", description=f"{parameter.description}, {name.upper()}")
             for name, parameters in own.items()
@@ -91,15 +85,11 @@ class WalkingCycle:
             ),
         )
 
-    def motion(self, point: Point) -> Point:
-        """The point with the step length as the last entry of x, where it is none yet."""
+    def motion(self, at: Point) -> Point:
+        """The point with the step length as a variable, where it is none yet."""
         if not self.at_given_speed:
-            return point
-        step = point[SPEED] * (point[TIMES["ssp"]] + point[TIMES["dsp"]])
-        return replace(point, x=ca.vertcat(point.x, step), positions=self._positions(point))
-
-    def _positions(self, point: Point) -> Mapping[str, tuple[Literal["x", "p"], int]]:
-        return {**point.positions, STEP: ("x", len(self.variables) - 1)}
+            return at
+        return at.extended(STEP, at[SPEED] * (at[TIMES["ssp"]] + at[TIMES["dsp"]]))
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Objective, rows and indexes.
@@ -108,28 +98,18 @@ class WalkingCycle:
         own, which is off by default: the published one is for a change over an interval of time, while at a switch the
         supporting feet change at once and in this model the loads with them.
         """
-        motion = self.motion(point)
-        margins = {"ssp": self._single_margins, "dsp": self._double_margins}
-        samples = {name: phase.samples(motion, ops) for name, phase in self.phases.items()}
-        parts = {
-            name: assemble_phase(
-                _named_for(motion, name),
-                ops,
-                samples[name],
-                margins[name](samples[name].zmp, motion, ops),
-                phase.samples_per_interval,
-            )
-            for name, phase in self.phases.items()
-        }
-        times = {name: ca.fmax(motion[time], LEAST_DURATION) for name, time in TIMES.items()}
-        period, step = times["ssp"] + times["dsp"], ca.fmax(motion[STEP], LEAST_STEP)
+        at = self.motion(point)
+        samples = {name: phase.samples(at, ops) for name, phase in self.phases.items()}
+        parts = {name: phase.assemble(_named_for(at, name), samples[name], ops) for name, phase in self.phases.items()}
+        times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
+        period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
         energy = parts["ssp"].objective * times["ssp"] + parts["dsp"].objective * times["dsp"]
         rows = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
         indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
             objective=energy / period if self.at_given_speed else energy / step,
-            constraints=(*rows, *_jump_rows(jumps, motion), *self._step_rows(motion)),
+            constraints=(*rows, *_jump_rows(jumps, at), *self._step_rows(at)),
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
@@ -146,25 +126,8 @@ class WalkingCycle:
             return ()
         lower, upper = (motion[f"{STEP}.{end}"] for end in ("lower", "upper"))
         return (
-            Constraint(name="step_length", unit="m", scale=STEP_SCALE, value=motion[STEP], lower=lower, upper=upper),
+            Constraint(name="step_length", unit="m", scale=MARGIN_SCALE, value=motion[STEP], lower=lower, upper=upper),
         )
-
-    def _single_margins(self, zmp: MX, motion: Point, ops: Nonsmooth) -> tuple[MX, MX]:
-        left_y = leg_geometry(self.robot, "L").hip_m[1]
-        return single_support_margins(zmp, (0.0, left_y), self.robot.feet["left"], ops)
-
-    def _double_margins(self, zmp: MX, motion: Point, ops: Nonsmooth) -> tuple[MX, MX]:
-        """In the box around the left foot and the right one a step ahead."""
-        left, right = self.robot.feet["left"], self.robot.feet["right"]
-        left_y, right_y = (leg_geometry(self.robot, side).hip_m[1] for side in "LR")
-        step = motion[STEP]
-        box = Box(
-            back=ca.fmin(-left.back_m, step - right.back_m),
-            front=ca.fmax(left.front_m, step + right.front_m),
-            right=min(left_y - left.right_m, right_y - right.right_m),
-            left=max(left_y + left.left_m, right_y + right.left_m),
-        )
-        return double_support_margins(zmp, box, ops)
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Changes of torques (22, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""
@@ -173,19 +136,44 @@ class WalkingCycle:
         touch_down, lift_off = double[:, 0] - single[:, -1], signs * single[images, 0] - double[:, -1]
         return {"lift_off": lift_off, "touch_down": touch_down}
 
-    def signals(self, point: Point, x: Array, p: Array) -> dict[str, Signals]:
-        """Time histories of both phases at a given x (n,) and parameter vector (k,); the second one's time goes on.
-
-        Args:
-            point: symbols of the problem.
-            x: decision variables.
-            p: parameter values.
-        """
-        full = replace(point, x=MX.sym("x", len(self.variables)), positions=self._positions(point))
-        values = ca.Function("motion", [point.x, point.p], [self.motion(point).x])(x, p).full().ravel()
-        single, double = (phase.signals(full, values, p) for phase in self.phases.values())
+    def signals(self, at: Point) -> dict[str, Signals]:
+        """Time histories of both phases at a point of numbers; the second one's time goes on."""
+        single, double = (phase.signals(self.motion(at)) for phase in self.phases.values())
         later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
-        return {"ssp": single, "dsp": Signals(joints=double.joints, arrays=later)}
+        return {"ssp": single, "dsp": replace(double, arrays=later)}
+
+
+def single_margins(robot: Robot) -> Margins:
+    """On the left foot, which stands at zero below its own hip joint."""
+    return single_support_margins((0.0, leg_geometry(robot, "L").hip_m[1]), robot.feet["left"])
+
+
+def double_margins(robot: Robot) -> Margins:
+    """In the box around the left foot and the right one a step ahead."""
+    left, right = robot.feet["left"], robot.feet["right"]
+    left_y, right_y = (leg_geometry(robot, side).hip_m[1] for side in "LR")
+
+    def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        step = at[STEP]
+        box = Box(
+            back=ca.fmin(-left.back_m, step - right.back_m),
+            front=ca.fmax(left.front_m, step + right.front_m),
+            right=min(left_y - left.right_m, right_y - right.right_m),
+            left=max(left_y + left.left_m, right_y + right.left_m),
+        )
+        return margins_in(box, zmp, ops)
+
+    return margins
+
+
+def mean_margins(robot: Robot) -> dict[str, tuple[float, float]]:
+    """Default of the least mean margins of each phase in x and y [m]."""
+    left, right = (leg_geometry(robot, side).hip_m[1] for side in "LR")
+    box = support_box(robot, {"L": (0.0, left), "R": (PUBLISHED_STEP, right)})
+    return {
+        "ssp": single_support_mean_margins(robot.feet["left"]),
+        "dsp": double_support_mean_margins(box),
+    }
 
 
 def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -206,8 +194,8 @@ def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.ra
 def joined(phases: Mapping[str, Signals]) -> Signals:
     """Phases one after the other. Of the two samples at a switch the earlier one stays: positions and velocities are equal."""
     first, *others = phases.values()
-    return Signals(
-        joints=first.joints,
+    return replace(
+        first,
         arrays={
             name: np.concatenate([array, *(other.arrays[name][1:] for other in others)])
             for name, array in first.arrays.items()

@@ -6,41 +6,33 @@ torso, which depends on where the hip is between the feet.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Generic, Literal, NamedTuple, TypeVar, get_args
+from collections.abc import Callable, Collection, Mapping
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
-from casadi import MX, SX, vertcat
+import casadi as ca
+from casadi import DM, MX, SX, fmax, vertcat
 
-from nlp_gait.errors import InputError
+from nlp_gait.problem.assembly import InstantPoint, Variable
 from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problems.nao.body import (
-    GRAVITY,
-    JOINTS,
-    leg_joints,
-    nao,
-    upright_links,
-)
-from nlp_gait.problems.nao.curve_limits import Criterion, with_motion
+from nlp_gait.problem.playback import Support
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Signals
+from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
+from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.biped.samples import LEAST_DURATION
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, leg_joints, nao, upright_links
 from nlp_gait.problems.nao.curves import (
     Splines,
     Trajectory,
+    arm_limits,
     arm_motions,
+    grid_for,
     hip_and_arm_units,
-    motion_options,
-    samples_in_interval,
-)
-from nlp_gait.problems.nao.double_support_stance import (
-    DURATION,
-    Point2,
-    double_support_duration,
-    double_support_hip,
-    soles_of,
-    standing_ankles,
+    hip_on_spline,
 )
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables, leg_geometry
-from nlp_gait.problems.nao.limits import phase_problem
-from nlp_gait.problems.nao.motors import motor_options, with_motors
-from nlp_gait.problems.nao.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import combined_zmp, ground_load, zmp_of_wrench
@@ -56,12 +48,14 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
     "RShoulderPitch": (2.0, 1.5),
     "RElbowRoll": (0.42, 0.50),
 }
-FEET = {"L": "left", "R": "right"}
+DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
 
 TorsoShare = Literal["printed", "lever"]
+Point2: TypeAlias = tuple[float, float]
 Side = TypeVar("Side", float, MX)
 
 
+@maker(("trajectory", "objective", "samples_per_interval"), ("motors",))
 def nao_dsp(
     *,
     robot: str = "nao-v5",
@@ -75,66 +69,86 @@ def nao_dsp(
     objective: Criterion = "power",
     motors: str = "",
 ) -> GaitProblem:
-    """Double support of NAO.
-
-    Args:
-        robot: name or file of the robot.
-        intervals: equal parts of the phase over which torques may change by the limit.
-        derivatives: analytic, or finite differences of the sampled angles as in the paper.
-        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
-        torso_share: how the torso's mass is shared between the legs (see ``torso_shares``).
-        step_length_m: from foot to foot.
-        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
-            cubics, 4 with splines, which would else bend between the samples.
-        trajectory: of hip and arms: the paper's cubics, or more coefficients on top of them.
-        objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
-        motors: what of the real motors is taken into account, separated by commas, see ``nao_motors``; nothing by default.
-    """
-    if torso_share not in get_args(TorsoShare):
-        raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
+    """Double support of NAO; for the options see ``problems.nao``."""
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
     soles = soles_of(model, step_length_m)
     box = support_box(model, soles)
-    own = (*hip_variables(model), DURATION)
-    splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING), first=len(own))
-    variables = (*own, *splines.variables)
-    samples = samples_in_interval(trajectory, samples_per_interval)
+    splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING))
+    real = Motors.parsed(motors, model)
+    richer = (arm_limits(model, splines, ARM_SWING, double_support_duration),)
     phase = Phase(
         robot=model,
-        variables=len(variables),
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        variables=(*hip_variables(model), DURATION, *splines.variables),
         duration=DURATION.name,
         plan=_planner(model, soles, splines),
         loads=double_support_loads(model, torso_share),
-        intervals=intervals,
-        samples_per_interval=samples,
+        grid=grid_for(trajectory, intervals, samples_per_interval),
         derivatives=derivatives,
+        parts=(
+            *paper_parts(model, double_support_margins(box), double_support_mean_margins(box)),
+            *(richer if splines.count else ()),
+            *real.parts,
+        ),
+        goal=goal_of(objective, real),
     )
-    problem = phase_problem(
-        name="nao-dsp",
-        title="NAO, double support: least mean power",
-        variables=variables,
-        phase=phase,
-        margins=lambda zmp, ops: double_support_margins(zmp, box, ops),
-        mean_dbm_m=double_support_mean_margins(box),
-        make=nao_dsp,
-        options={
-            "robot": robot,
-            "intervals": intervals,
-            "derivatives": derivatives,
-            "rotational_inertia": rotational_inertia,
-            "torso_share": torso_share,
-            "step_length_m": step_length_m,
-            **motion_options(trajectory, objective, samples),
-            **motor_options(motors),
-        },
+    return phase_problem(
+        "nao-dsp",
+        "NAO, double support: least mean power",
+        phase,
+        robot,
+        on_both_feet(model, torso_share),
+        start=splines.start_of(phase.names),
     )
 
-    def arms(x: SX, s: SX) -> Mapping[str, Motion]:
-        duration = double_support_duration(x)
-        return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
 
-    return with_motors(with_motion(problem, phase, splines, objective, arms), phase, motors)
+def on_both_feet(robot: Robot, rule: TorsoShare) -> Callable[[Signals], tuple[Support, ...]]:
+    """Each foot carries its own leg and arm, and its share of the torso (eqs. 28, 29)."""
+
+    def supports(signals: Signals) -> tuple[Support, ...]:
+        feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
+        hip = SX.sym("hip")
+        shares = ca.Function("shares", [hip], list(torso_shares(hip, rule, feet_y).values()))
+        carried = [share.full().ravel() for share in shares(signals.arrays["hip"][:, 1])]
+        return tuple(
+            Support(foot=foot, joints=_joints_on(side), torso_share=share)
+            for (side, foot), share in zip(BOTH_FEET.items(), carried, strict=True)
+        )
+
+    return supports
+
+
+def _joints_on(side: str) -> tuple[str, ...]:
+    return tuple(joint for joint in JOINTS if joint.startswith(side))
+
+
+def soles_of(robot: Robot, step: float) -> dict[str, Point2]:
+    """Ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2)."""
+    return {"L": (step, leg_geometry(robot, "L").hip_m[1]), "R": (2 * step, leg_geometry(robot, "R").hip_m[1])}
+
+
+def standing_ankles(robot: Robot, soles: Mapping[str, Point2]) -> dict[str, SX]:
+    """Ankles (3,) by side, above where the feet stand [m]."""
+    return {side: SX(DM([*xy, leg_geometry(robot, side).ankle_height_m])) for side, xy in soles.items()}
+
+
+def double_support_duration(at: InstantPoint) -> SX:
+    """Time of the phase [s], never zero."""
+    return fmax(at[DURATION.name], LEAST_DURATION)
+
+
+def double_support_hip(at: InstantPoint, more: Mapping[str, Motion], soles: Mapping[str, Point2], phase: SX) -> Motion:
+    """Motion of the torso's origin (3,) between standing feet [m] (Table 5, rows 1 to 3), and what each curve adds.
+
+    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, rounded to a micrometre so
+    that the paper's numbers come out exactly, and from halfway to the left foot to halfway to the right one.
+    """
+    (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
+    sixth = (front_x - rear_x) / 6
+    hip_x, hip_y = (round(rear_x + sixth, 6), round(front_x - sixth, 6)), (left_y / 2, right_y / 2)
+    return hip_on_spline(at, more, hip_x, hip_y, double_support_duration(at), phase)
 
 
 class Box(NamedTuple, Generic[Side]):
@@ -148,7 +162,7 @@ class Box(NamedTuple, Generic[Side]):
 
 def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
     """Rectangle around both soles, whose ankles stand at ``soles`` by side."""
-    feet = {side: robot.feet[foot] for side, foot in FEET.items()}
+    feet = {side: robot.feet[foot] for side, foot in BOTH_FEET.items()}
     return Box(
         back=min(soles[side][0] - foot.back_m for side, foot in feet.items()),
         front=max(soles[side][0] + foot.front_m for side, foot in feet.items()),
@@ -167,10 +181,10 @@ def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Pla
     """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
     ankles = standing_ankles(robot, soles)
 
-    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        duration = double_support_duration(x)
-        more = splines.motions(x, duration, phase)
-        hip = double_support_hip(x, more, soles, phase)
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+        duration, margin = double_support_duration(at), at[REACH_MARGIN]
+        more = splines.motions(at, duration, phase)
+        hip = double_support_hip(at, more, soles, phase)
         still = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in ankles.items()}
         left, left_reach = leg_joints(robot, "L", hip, still["L"], margin, ops)
         right, right_reach = leg_joints(robot, "R", hip, still["R"], margin, ops)
@@ -206,10 +220,7 @@ def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) ->
 
 def double_support_loads(robot: Robot, rule: TorsoShare, upright: Collection[str] | None = None) -> Loader:
     """Torques of each half from its own foot, and the combined ZMP of both feet; ``upright`` as for single support."""
-    halves = {
-        side: tree_from(robot, robot.feet[foot].link, [joint for joint in JOINTS if joint.startswith(side)])
-        for side, foot in FEET.items()
-    }
+    halves = {side: tree_from(robot, robot.feet[foot].link, _joints_on(side)) for side, foot in BOTH_FEET.items()}
     weight, upright = robot.mass_kg * GRAVITY, upright_links(robot) if upright is None else upright
     feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
 
@@ -220,7 +231,7 @@ def double_support_loads(robot: Robot, rule: TorsoShare, upright: Collection[str
         zmps, ground_loads = [], []
         for side, tree in halves.items():
             half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
-            offset = zmp_of_wrench(wrench, robot.feet[FEET[side]].ankle_height_m, weight)
+            offset = zmp_of_wrench(wrench, robot.feet[BOTH_FEET[side]].ankle_height_m, weight)
             torques |= half
             zmps.append(feet[side] + offset)
             ground_loads.append(ground_load(wrench, weight))
@@ -229,11 +240,16 @@ def double_support_loads(robot: Robot, rule: TorsoShare, upright: Collection[str
     return loads
 
 
-def double_support_margins(zmp: MX, box: Box[float] | Box[MX], ops: Nonsmooth) -> tuple[MX, MX]:
-    """Balance margins in x and y, (1, N + 1) each [m]: distances to the sides of the box around both soles.
+def double_support_margins(box: Box[float]) -> Margins:
+    """Balance margins in x and y: distances to the sides of the box around both soles.
 
     Source:
         Gupta, Pratihar, Deb (2023), Fig. 8 (b).
     """
+    return lambda zmp, at, ops: margins_in(box, zmp, ops)
+
+
+def margins_in(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
+    """Distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
     x, y = zmp[0, :].T, zmp[1, :].T
     return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T

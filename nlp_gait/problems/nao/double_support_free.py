@@ -3,37 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import get_args
 
 import casadi as ca
-import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Assembly, Constraint, GaitProblem, Point
-from nlp_gait.problems.nao.body import nao
+from nlp_gait.problem.assembly import Constraint, InstantPoint, Point
+from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.registry import maker
+from nlp_gait.problems.biped.goals import MeanPower
+from nlp_gait.problems.biped.parts import ANGLE_SCALE, REACH_MARGIN, AngleLimits, Contribution, Part
+from nlp_gait.problems.biped.phase import Phase, Plan
+from nlp_gait.problems.biped.samples import Samples, Trace
+from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.closed_chain import YAW_PITCHES, check_yaw_pitches, closure, leaning_legs
-from nlp_gait.problems.nao.curve_limits import at_phases, limit_rows, with_motion
-from nlp_gait.problems.nao.curves import SPLINE_SAMPLES, Splines, Trajectory, arm_motions, hip_and_arm_units
+from nlp_gait.problems.nao.curves import (
+    SPLINE_SAMPLES,
+    Splines,
+    Trajectory,
+    arm_limits,
+    arm_motions,
+    hip_and_arm_units,
+)
 from nlp_gait.problems.nao.double_support import (
     ARM_SWING,
+    DURATION,
     TorsoShare,
+    double_support_duration,
+    double_support_hip,
     double_support_loads,
     double_support_margins,
     double_support_mean_margins,
-    support_box,
-)
-from nlp_gait.problems.nao.double_support_stance import (
-    DURATION,
-    double_support_duration,
-    double_support_hip,
+    on_both_feet,
     soles_of,
     standing_ankles,
+    support_box,
 )
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables
-from nlp_gait.problems.nao.limits import phase_problem
-from nlp_gait.problems.nao.phase import Phase, Plan
+from nlp_gait.problems.nao.problem import paper_parts, phase_problem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, stack
 
@@ -42,6 +48,7 @@ LEAN = ("torso_roll", "torso_pitch")
 FLAT = 1e-6
 
 
+@maker()
 def nao_dsp_free(
     *,
     robot: str = "nao-v5",
@@ -52,94 +59,87 @@ def nao_dsp_free(
     step_length_m: float = 0.06,
     samples_per_interval: int = SPLINE_SAMPLES,
 ) -> GaitProblem:
-    """Double support of NAO with a torso that leans.
+    """Double support of NAO with a torso that leans; for the options see ``problems.nao``.
 
     The curves are those of ``nao-dsp`` and the torso's roll and pitch, zero and at rest at both ends; with zero coefficients on
     these the motion is that of ``nao-dsp``.
 
-    Args:
-        robot: name or file of the robot.
-        intervals: equal parts of the phase over which torques may change by the limit.
-        trajectory: of torso and arms.
-        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
-        torso_share: how the torso's mass is shared between the legs (see ``nao_dsp.torso_shares``).
-        step_length_m: from foot to foot.
-        samples_per_interval: so many that the joints cannot bend between the samples.
-
     Source:
         Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
     """
-    if torso_share not in get_args(TorsoShare):
-        raise InputError(f"torso_share must be one of {', '.join(get_args(TorsoShare))}, got {torso_share!r}")
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
     check_yaw_pitches(model)
     soles = soles_of(model, step_length_m)
     box, ankles = support_box(model, soles), standing_ankles(model, soles)
-    own = (*hip_variables(model), DURATION)
-    units = hip_and_arm_units(ARM_SWING) | dict.fromkeys(LEAN, "rad")
-    splines = Splines(trajectory=trajectory, units=units, first=len(own))
-    variables = (*own, *splines.variables)
+    splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING) | dict.fromkeys(LEAN, "rad"))
 
-    def torso(x: SX, s: SX) -> tuple[Motion, Motion, Mapping[str, Motion]]:
+    def torso(at: InstantPoint, s: SX) -> tuple[Motion, Motion, Mapping[str, Motion]]:
         """Its origin, its lean, and the arms."""
-        duration = double_support_duration(x)
-        more = splines.motions(x, duration, s)
-        hip = double_support_hip(x, more, soles, s)
+        duration = double_support_duration(at)
+        more = splines.motions(at, duration, s)
+        hip = double_support_hip(at, more, soles, s)
         return hip, stack(*(more[name] for name in LEAN)), arm_motions(more, ARM_SWING, duration, s)
 
-    def plan(x: SX, margin: SX, s: SX, ops: Nonsmooth) -> Plan:
-        hip, lean, arms = torso(x, s)
-        legs = leaning_legs(model, hip, lean, ankles, margin, ops)
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Plan:
+        hip, lean, arms = torso(at, s)
+        legs = leaning_legs(model, hip, lean, ankles, at[REACH_MARGIN], ops)
         return Plan(joints={**legs.joints, **arms}, hip=hip.position, ankles=ankles, reach=legs.reach)
 
+    def pose(at: InstantPoint, s: SX) -> SX:
+        hip, lean, _ = torso(at, s)
+        return ca.vertcat(hip.position, lean.position)
+
+    richer = (arm_limits(model, splines, ARM_SWING, double_support_duration),) if splines.count else ()
     phase = Phase(
         robot=model,
-        variables=len(variables),
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        variables=(*hip_variables(model), DURATION, *splines.variables),
         duration=DURATION.name,
         plan=plan,
         loads=double_support_loads(model, torso_share, upright=()),
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        derivatives="analytic",
+        grid=Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval"),
+        parts=(
+            *paper_parts(model, double_support_margins(box), double_support_mean_margins(box)),
+            *richer,
+            AngleLimits(
+                "other_angle", model, (YAW_PITCHES["L"],), lambda at, s: closure(model, pose(at, s), ankles)[0]
+            ),
+            FlatSoles(lambda at, s: closure(model, pose(at, s), ankles)[1]),
+        ),
+        goal=MeanPower(),
     )
-    problem = phase_problem(
-        name="nao-dsp-free",
-        title="NAO, double support with a leaning torso: least mean power",
-        variables=variables,
-        phase=phase,
-        margins=lambda zmp, ops: double_support_margins(zmp, box, ops),
-        mean_dbm_m=double_support_mean_margins(box),
-        make=nao_dsp_free,
-        options={
-            "robot": robot,
-            "intervals": intervals,
-            "trajectory": trajectory,
-            "rotational_inertia": rotational_inertia,
-            "torso_share": torso_share,
-            "step_length_m": step_length_m,
-            "samples_per_interval": samples_per_interval,
-        },
+    return phase_problem(
+        "nao-dsp-free",
+        "NAO, double support with a leaning torso: least mean power",
+        phase,
+        robot,
+        on_both_feet(model, torso_share),
+        start=splines.start_of(phase.names),
+        searchable=False,
     )
-    moved = with_motion(problem, phase, splines, "power", lambda x, s: torso(x, s)[2])
 
-    def closed(x: SX, s: SX) -> SX:
-        hip, lean, _ = torso(x, s)
-        return ca.vertcat(*closure(model, ca.vertcat(hip.position, lean.position), ankles))
 
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        assembly = moved.assemble(point, ops)
-        rows = at_phases(closed, point, np.linspace(0.0, 1.0, phase.steps + 1)[1:-1])
-        flat = Constraint(
+class FlatSoles(Part):
+    """Soles that the closed chain leaves flat between the ends, where Newton's method has converged.
+
+    Args:
+        turns: how far each sole is from flat (2,) [rad].
+    """
+
+    def __init__(self, turns: Trace) -> None:
+        self.traces = {"sole_turn": turns}
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Two-sided rows."""
+        row = Constraint(
             name="sole_turn",
-            labels=tuple(f"{side}, {k}" for k in range(1, phase.steps) for side in ("left", "right")),
+            labels=tuple(f"{side}, {k}" for k in range(1, samples.steps) for side in ("left", "right")),
             unit="rad",
-            scale=1.0,
-            value=ca.vec(rows[1:, :]),
+            scale=ANGLE_SCALE,
+            value=ca.vec(samples.traces["sole_turn"][:, 1:-1]),
             lower=MX(-FLAT),
             upper=MX(FLAT),
         )
-        yaw_pitch = limit_rows(model, "other_angle", (YAW_PITCHES["L"],), rows[0, :])
-        return replace(assembly, constraints=(*assembly.constraints, yaw_pitch, flat))
-
-    return replace(moved, assemble=assemble, searchable=False)
+        return Contribution(rows=(row,))

@@ -8,7 +8,7 @@ the paper swings: the torso leans and turns, the swing foot tilts and leaves its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,11 +17,21 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.gait_problem import Array, Point, Signals
+from nlp_gait.problem.assembly import Constraint, InstantPoint, Point
+from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problems.biped.parts import (
+    HEIGHT_SCALE,
+    REACH_MARGIN,
+    Contribution,
+    Part,
+    halfway_rows,
+    limit_rows,
+)
+from nlp_gait.problems.biped.phase import Loader, Phase, Plan, Planner
+from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.curves import Splines, Trajectory
-from nlp_gait.problems.nao.phase import Loader, Phase, Plan, Planner, Samples
-from nlp_gait.problems.nao.single_support import ARM_SWING
+from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body as TreeBody
 from nlp_gait.robots.tree import tree_from
@@ -52,24 +62,6 @@ class Body(NamedTuple):
     corners: SX
 
 
-class FreeSamples(NamedTuple):
-    """A phase at N + 1 samples; columns are samples.
-
-    Attributes:
-        samples: what every phase has.
-        others: (5, N + 1) angles of the hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad].
-        along: (1, N + 1) x of the right ankle [m].
-        heights: (4, N + 1) of the right sole's corners above the ground [m].
-        sides: (2, N + 1) y of its left corners [m].
-    """
-
-    samples: Samples
-    others: MX
-    along: MX
-    heights: MX
-    sides: MX
-
-
 OTHERS = (YAW_PITCHES[0], *ARM_SWING)
 
 
@@ -80,10 +72,10 @@ class FreeMotion:
     Attributes:
         robot: with links welded that never move.
         splines: on every curve.
-        paper: the paper's motion from its own variables, which come first in x; its ends are taken.
+        paper: the paper's motion, whose ends are taken.
         loads: torques and ZMP.
         support: (3,) the left ankle, which stands [m].
-        duration: of the phase [s] from x (n,).
+        duration: of the phase [s].
     """
 
     robot: Robot
@@ -91,13 +83,13 @@ class FreeMotion:
     paper: Planner
     loads: Loader
     support: tuple[float, float, float]
-    duration: Callable[[SX], SX]
+    duration: Callable[[InstantPoint], SX]
 
-    def joints(self, x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
+    def joints(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Motion of every joint [rad]."""
-        duration = self.duration(x)
-        start, end = (self.paper(x[: self.splines.first], margin, SX(at), ops).joints for at in (0, 1))
-        more = self.splines.motions(x, duration, phase)
+        duration = self.duration(at)
+        start, end = (self.paper(at, SX(instant), ops).joints for instant in (0, 1))
+        more = self.splines.motions(at, duration, phase)
         moved: dict[str, Motion] = {}
         for name in MOVING:
             a, b = start[name], end[name]
@@ -105,9 +97,9 @@ class FreeMotion:
             moved[name] = plus(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
         return {**start, **moved}
 
-    def plan(self, x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
         """Motion of the whole robot."""
-        joints = self.joints(x, margin, phase, ops)
+        joints = self.joints(at, phase, ops)
         body = self.body({name: motion.position for name, motion in joints.items()})
         return Plan(
             joints=joints,
@@ -115,11 +107,6 @@ class FreeMotion:
             ankles={"L": SX(DM(self.support)), "R": body.ankle},
             reach=ca.vertcat(*(ca.cos(joints[knee].position) for knee in KNEES)),
         )
-
-    def _by_joint(self, rows: MX) -> dict[str, MX]:
-        """Rows of a matrix (15, N + 1) by joint name."""
-        found = dict(zip(CURVES, ca.vertsplit(rows), strict=True))
-        return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
 
     def body(self, q: Mapping[str, SX]) -> Body:
         """Where torso and right foot are, from angles by joint name."""
@@ -140,33 +127,8 @@ class FreeMotion:
             ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
         )
 
-    def samples(self, phase: Phase, point: Point, ops: Nonsmooth) -> FreeSamples:
-        """The phase at N + 1 equidistant samples.
-
-        The joints' motion is tied, for torques are far from linear in it and it is linear in most of the many variables; and so
-        is what follows from it at each sample alone, before limits join samples.
-        """
-        n = phase.steps + 1
-        x, margin, s = SX.sym("x", phase.variables), SX.sym("margin"), SX.sym("s")
-        joints = self.joints(x, margin, s, ops)
-        moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
-        motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
-        motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T)
-        values = motion.map(n)(ca.repmat(point.x, 1, n), ca.repmat(point["reach_margin"], 1, n), table)
-        motions = tied(values, ops)
-        torque, zmp, along, heights, sides = (tied(part, ops) for part in self._instant.map(n)(motions))
-        q, qd = (self._by_joint(part) for part in ca.vertsplit(motions, len(CURVES))[:2])
-        samples = Samples(
-            planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
-            reach=ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
-            torque=torque,
-            power=ca.vertcat(*(qd[name] * torque[JOINTS.index(name), :] for name in MOVING)),
-            zmp=zmp,
-        )
-        return FreeSamples(samples, ca.vertcat(*(q[name] for name in OTHERS)), along, heights, sides)
-
     @cached_property
-    def _instant(self) -> ca.Function:
+    def instant(self) -> ca.Function:
         """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and where ankle and sole are."""
         rows = len(CURVES)
         v = SX.sym("v", 3 * rows)
@@ -189,9 +151,96 @@ class FreeMotion:
         return {body.link.name: pose for body, pose in zip(self._tree, poses, strict=True)}
 
 
-def free_splines(trajectory: Trajectory, first: int) -> Splines:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreePhase(Phase):
+    """A phase on the left foot whose joints are free.
+
+    Attributes:
+        free: the motion.
+    """
+
+    free: FreeMotion
+
+    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
+        """The phase at N + 1 equidistant samples; traces are ``others``, ``along``, ``heights`` and ``sides``.
+
+        The joints' motion is tied, for torques are far from linear in it and it is linear in most of the many variables; and so
+        is what follows from it at each sample alone, before limits join samples. Traces: ``others`` (5, N + 1), angles of the
+        hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad]; ``along`` (1, N + 1), x of the right ankle [m]; ``heights``
+        (4, N + 1) of the right sole's corners above the ground [m]; ``sides`` (2, N + 1), y of its left corners [m].
+        """
+        n = self.grid.parts + 1
+        x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
+        joints = self.free.joints(InstantPoint.of(x, margin, self.names, [REACH_MARGIN]), s, ops)
+        moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
+        motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
+        motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T)
+        values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
+        motions = tied(values, ops)
+        torque, zmp, along, heights, sides = (tied(part, ops) for part in self.free.instant.map(n)(motions))
+        q, qd, qdd = (by_joint(part) for part in ca.vertsplit(motions, len(CURVES)))
+        return Samples(
+            joints=JOINTS,
+            moving=MOVING,
+            per_interval=self.grid.samples_per_interval,
+            duration=at[self.duration],
+            planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
+            reach=ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
+            torque=torque,
+            power=ca.vertcat(*(qd[name] * torque[JOINTS.index(name), :] for name in MOVING)),
+            zmp=zmp,
+            motion=tuple(ca.vertcat(*part.values()) for part in (q, qd, qdd)),
+            traces={
+                "others": ca.vertcat(*(q[name] for name in OTHERS)),
+                "along": along,
+                "heights": heights,
+                "sides": sides,
+            },
+        )
+
+
+def by_joint(rows: MX) -> dict[str, MX]:
+    """Rows of a matrix (15, N + 1) by joint name."""
+    found = dict(zip(CURVES, ca.vertsplit(rows), strict=True))
+    return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
+
+
+class FreeLimits(Part):
+    """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
+
+    Args:
+        robot: whose limits they are.
+        path_middle: x of the swing foot halfway [m].
+        inner_edge: y of the supporting sole's inner edge [m].
+    """
+
+    def __init__(self, robot: Robot, path_middle: float, inner_edge: float) -> None:
+        self._robot, self._path_middle, self._inner_edge = robot, path_middle, inner_edge
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Rows between the ends; the number of samples is odd, for one of them is the middle."""
+        traces, middle = samples.traces, samples.steps // 2
+        heights, corners = traces["heights"], ("back right", "back left", "front right", "front left")
+        halfway = halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], corners)
+        return Contribution(
+            rows=(
+                limit_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
+                _corner_rows("foot_height", heights[:, 1:-1], corners),
+                *halfway,
+                _corner_rows("feet_apart", self._inner_edge - traces["sides"][:, 1:-1], corners[1::2]),
+            )
+        )
+
+
+def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
+    """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
+    labels = tuple(f"{corner}, {k}" for k in range(1, values.shape[1] + 1) for corner in corners)
+    return Constraint(name=name, labels=labels, unit="m", scale=HEIGHT_SCALE, value=ca.vec(values), lower=MX(0.0))
+
+
+def free_splines(trajectory: Trajectory) -> Splines:
     """Splines on every joint."""
-    return Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"), first=first)
+    return Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
 
 
 def tied(values: MX, ops: Nonsmooth) -> MX:

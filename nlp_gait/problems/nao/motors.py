@@ -13,21 +13,23 @@ Both hip yaw-pitch joints have one motor. No source gives a limit of acceleratio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem.gait_problem import Array, Assembly, Constraint, GaitProblem, Parameter, Point, Signals
+from nlp_gait.problem.assembly import Constraint, Parameter, Point
+from nlp_gait.problems.biped.goals import HEAT_LOSS, Draw
+from nlp_gait.problems.biped.parts import ANGLE_SCALE, TORQUE_SCALE, Contribution, Part
+from nlp_gait.problems.biped.samples import Samples, labels, time_mean
 from nlp_gait.problems.nao.body import JOINTS
-from nlp_gait.problems.nao.limits import ANGLE_SCALE, TORQUE_SCALE, labels, time_mean
-from nlp_gait.problems.nao.phase import Phase, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
-from nlp_gait.symbolic.nonsmooth import Nonsmooth, PowerAside
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 SPEED_SCALE = 1.0  # 1 rad/s too fast counts like 1 rad or 1 Nm
 FEATURES = ("limits", "ankle", "free-braking", "regeneration", "heat")
@@ -55,11 +57,21 @@ SUPPLY = Parameter(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Motors:
-    """What of the real motors a problem takes into account."""
+    """What of the real motors a problem takes into account.
+
+    Attributes:
+        features: see above.
+        robot: whose motors they are.
+
+    Raises:
+        UnknownNameError: no such feature.
+        InputError: features that exclude each other; a joint of the robot without data of its motor.
+    """
 
     features: tuple[str, ...]
+    robot: Robot
 
     def __post_init__(self) -> None:
         """Refuse unknown features, and two rules for braking."""
@@ -68,100 +80,53 @@ class Motors:
                 raise unknown("feature in motors", name, FEATURES)
         if {"free-braking", "regeneration"} <= set(self.features):
             raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
+        if self.features:
+            self._ratings  # noqa: B018  a robot without data is refused now
+
+    @classmethod
+    def parsed(cls, text: str, robot: Robot) -> Motors:
+        """Features from an option's text, separated by commas; none if it is empty."""
+        return cls(features=tuple(part.strip() for part in text.split(",") if part.strip()), robot=robot)
 
     @property
-    def draws_differently(self) -> bool:
-        """Whether the power is another one than the paper's."""
-        return bool({"free-braking", "regeneration", "heat"} & set(self.features))
+    def parts(self) -> tuple[Part, ...]:
+        """Limits of the motors."""
+        limits = (MotorLimits(self.robot, self._ratings),) if "limits" in self.features else ()
+        return (*limits, *((AnkleCoupling(),) if "ankle" in self.features else ()))
 
+    @property
+    def draw(self) -> Draw | None:
+        """How the motors draw power; None for the paper's way."""
+        return self._power if {"free-braking", "regeneration", "heat"} & set(self.features) else None
 
-def parsed(text: str) -> Motors:
-    """Features from an option's text, separated by commas; none if it is empty.
+    def _power(self, at: Point, samples: Samples, ops: Nonsmooth) -> MX:
+        """Mean electrical power over the phase [W]."""
+        driven = ca.vec(samples.power)
+        if "regeneration" in self.features:
+            mechanical = driven
+        elif "free-braking" in self.features:
+            mechanical = (driven + ops.abs(driven)) / 2
+        else:
+            mechanical = ops.abs(driven)
+        if "heat" in self.features:
+            constants = DM([rating.heat_W_per_Nm2 for rating in self._ratings])
+            heat = constants.T @ _by_motor(samples.torque) ** 2
+        else:
+            heat = at[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
+        return time_mean(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
 
-    Raises:
-        UnknownNameError: no such feature.
-        InputError: features that exclude each other.
-    """
-    return Motors(features=tuple(part.strip() for part in text.split(",") if part.strip()))
-
-
-def motor_options(motors: str) -> dict[str, str]:
-    """Option of a problem with real motors; none if it has the paper's."""
-    return {"motors": motors} if motors else {}
-
-
-def with_motors(problem: GaitProblem, phase: Phase, text: str) -> GaitProblem:
-    """A phase's problem with real motors.
-
-    Args:
-        problem: of the phase.
-        phase: its motion and loads.
-        text: features, see above; the problem itself if there are none.
-
-    Raises:
-        UnknownNameError: no such feature.
-        InputError: features that exclude each other or the objective; a joint of the robot without data of its motor.
-    """
-    motors = parsed(text)
-    if not motors.features:
-        return problem
-    if motors.draws_differently and problem.objective.name != "power":
-        raise InputError(
-            f"motors={text!r} changes the power, but the objective is {problem.objective.name}; leave out what changes it"
-        )
-    ratings = [_motor(phase.robot, joint) for joint in JOINTS]
-    own = len(problem.own_parameters)
-    limited = "limits" in motors.features
-
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        assembly = problem.assemble(point, PowerAside(ops) if motors.draws_differently else ops)
-        samples = phase.samples(point, ops)
-        rows: list[Constraint] = []
-        if limited or "ankle" in motors.features:
-            q, qd, _ = phase.motions(point, ops)
-            rows += _motor_rows(phase, ratings, samples.torque, qd, point[SUPPLY.name]) if limited else []
-            rows += _ankle_rows(phase.moving, q) if "ankle" in motors.features else []
-        assembly = replace(assembly, constraints=(*assembly.constraints, *rows))
-        if not motors.draws_differently:
-            return assembly
-        power = _power(point, ops, samples, ratings, motors)
-        indexes = {**assembly.indexes, "paper_power_W": assembly.indexes["power_W"], "power_W": power}
-        return replace(assembly, objective=power, indexes=indexes)
-
-    def signals(x: Array, p: Array) -> Signals:
-        return problem.signals(x, np.delete(p, own) if limited else p)  # type: ignore[misc]
-
-    return replace(
-        problem,
-        own_parameters=(*problem.own_parameters, SUPPLY) if limited else problem.own_parameters,
-        assemble=assemble,
-        signals=signals,
-        _built={},
-    )
-
-
-def _motor(robot: Robot, joint: str) -> Motor:
-    motor = robot.joint(joint).motor
-    if motor is None:
-        raise InputError(f"robot {robot.name!r}: joint {joint!r} has no motor data, which the option motors needs")
-    return motor
-
-
-def _power(point: Point, ops: Nonsmooth, samples: Samples, ratings: Sequence[Motor], motors: Motors) -> MX:
-    """Mean electrical power over the phase [W]."""
-    driven = ca.vec(samples.power)
-    if "regeneration" in motors.features:
-        mechanical = driven
-    elif "free-braking" in motors.features:
-        mechanical = (driven + ops.abs(driven)) / 2
-    else:
-        mechanical = ops.abs(driven)
-    if "heat" in motors.features:
-        constants = DM([rating.heat_W_per_Nm2 for rating in ratings])
-        heat = constants.T @ _by_motor(samples.torque) ** 2
-    else:
-        heat = point["heat_loss_W_per_Nm2"] * ca.sum1(samples.torque**2)
-    return time_mean(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
+    @cached_property
+    def _ratings(self) -> tuple[Motor, ...]:
+        """Data of the motors, one for each of ``JOINTS``."""
+        ratings = []
+        for joint in JOINTS:
+            motor = self.robot.joint(joint).motor
+            if motor is None:
+                raise InputError(
+                    f"robot {self.robot.name!r}: joint {joint!r} has no motor data, which the option motors needs"
+                )
+            ratings.append(motor)
+        return tuple(ratings)
 
 
 def _by_motor(torque: MX) -> MX:
@@ -172,37 +137,51 @@ def _by_motor(torque: MX) -> MX:
     return ca.sparsify(DM(sharing)) @ torque
 
 
-def _motor_rows(phase: Phase, ratings: Sequence[Motor], torque: MX, qd: MX, supply: MX) -> list[Constraint]:
+class MotorLimits(Part):
     """Speed, torque against speed |tau| <= stall (1 - |qd| / no-load), and root mean square torque of every motor.
 
     As two lines of each sign, tau +- qd stall / no-load within +- stall, in braking too, where a motor could give more.
+
+    Args:
+        robot: whose joints' speeds are limited.
+        ratings: of the motors, one for each of ``JOINTS``.
     """
-    n = torque.shape[1]
-    samples = [str(k) for k in range(n)]
-    motors = [k for k, joint in enumerate(JOINTS) if joint != SHARED[1]]
-    names = tuple(JOINTS[k] for k in motors)
-    loads = _by_motor(torque)[motors, :]
-    stall = DM([ratings[k].stall_torque_Nm for k in motors])
-    slope = DM([ratings[k].stall_torque_Nm / ratings[k].no_load_rad_s for k in motors])
-    place = DM(len(motors), len(phase.moving))
-    for column, joint in enumerate(phase.moving):
-        place[names.index(joint), column] = 1.0
-    drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
-    speed = DM([phase.robot.joint(joint).velocity_limit_rad_s for joint in phase.moving])
-    return [
-        Constraint(
+
+    parameters = (SUPPLY,)
+    reads_motion = True
+
+    def __init__(self, robot: Robot, ratings: Sequence[Motor]) -> None:
+        self._robot, self._ratings = robot, ratings
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Two-sided rows, and an upper bound on the mean squares' roots."""
+        torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
+        n = torque.shape[1]
+        at_samples = [str(k) for k in range(n)]
+        motors = [k for k, joint in enumerate(JOINTS) if joint != SHARED[1]]
+        names = tuple(JOINTS[k] for k in motors)
+        loads = _by_motor(torque)[motors, :]
+        ratings = [self._ratings[k] for k in motors]
+        stall = DM([rating.stall_torque_Nm for rating in ratings])
+        slope = DM([rating.stall_torque_Nm / rating.no_load_rad_s for rating in ratings])
+        place = DM(len(motors), len(moving))
+        for column, joint in enumerate(moving):
+            place[names.index(joint), column] = 1.0
+        drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
+        speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in moving])
+        too_fast = Constraint(
             name="joint_speed",
-            labels=labels(phase.moving, samples),
+            labels=labels(moving, at_samples),
             unit="rad/s",
             scale=SPEED_SCALE,
             value=ca.vec(qd),
             lower=MX(-ca.repmat(speed, n, 1)),
             upper=MX(ca.repmat(speed, n, 1)),
-        ),
-        *(
+        )
+        too_weak = [
             Constraint(
                 name=f"torque_{kind}",
-                labels=labels(names, samples),
+                labels=labels(names, at_samples),
                 unit="Nm",
                 scale=TORQUE_SCALE,
                 value=ca.vec(loads + sign * drop),
@@ -210,37 +189,46 @@ def _motor_rows(phase: Phase, ratings: Sequence[Motor], torque: MX, qd: MX, supp
                 upper=supply * ca.repmat(stall, n, 1),
             )
             for kind, sign in (("forwards", 1.0), ("backwards", -1.0))
-        ),
-        Constraint(
+        ]
+        too_hot = Constraint(
             name="continuous_torque",
             labels=names,
             unit="Nm",
             scale=TORQUE_SCALE,
             value=ca.sqrt(time_mean(loads**2)),
-            upper=MX(DM([ratings[k].continuous_torque_Nm for k in motors])),
-        ),
-    ]
+            upper=MX(DM([rating.continuous_torque_Nm for rating in ratings])),
+        )
+        return Contribution(rows=(too_fast, *too_weak, too_hot))
 
 
-def _ankle_rows(moving: Sequence[str], q: MX) -> list[Constraint]:
-    """Roll of both ankles within the lines over their pitch [rad]."""
-    rows = []
-    for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
-        pitch, roll = (q[moving.index(f"{side}{joint}"), :].T for joint in ("AnklePitch", "AnkleRoll"))
-        least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
-        for name, line, lower, upper in (("least", least, MX(0.0), None), ("greatest", greatest, None, MX(0.0))):
-            rows.append(
-                Constraint(
-                    name=f"{side}AnkleRoll_{name}",
-                    labels=tuple(str(k) for k in range(q.shape[1])),
-                    unit="rad",
-                    scale=ANGLE_SCALE,
-                    value=roll - line,
-                    lower=lower,
-                    upper=upper,
+class AnkleCoupling(Part):
+    """Roll of both ankles within the lines over their pitch."""
+
+    reads_motion = True
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Rows with one bound each."""
+        angles: Mapping[str, MX] = dict(zip(samples.moving, ca.vertsplit(samples.q), strict=True))
+        rows = []
+        for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
+            pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
+            least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
+            for name, line, lower, upper in (
+                ("least", least, MX(0.0), None),
+                ("greatest", greatest, None, MX(0.0)),
+            ):
+                rows.append(
+                    Constraint(
+                        name=f"{side}AnkleRoll_{name}",
+                        labels=tuple(str(k) for k in range(samples.steps + 1)),
+                        unit="rad",
+                        scale=ANGLE_SCALE,
+                        value=roll - line,
+                        lower=lower,
+                        upper=upper,
+                    )
                 )
-            )
-    return rows
+        return Contribution(rows=tuple(rows))
 
 
 def ankle_roll(pitch: MX, column: int) -> MX:

@@ -7,28 +7,27 @@ from typing import NamedTuple
 
 from casadi import MX, SX, fmax, vertcat
 
-from nlp_gait.problem.gait_problem import GaitProblem, Variable
-from nlp_gait.problems.nao.body import (
-    GRAVITY,
-    LEAST_DURATION,
-    leg_joints,
-    nao,
-    upright_links,
-)
-from nlp_gait.problems.nao.curve_limits import Criterion, Swing, with_motion
+from nlp_gait.problem.assembly import InstantPoint, Point, Variable
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.playback import Support
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Signals
+from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
+from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.biped.samples import LEAST_DURATION
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, leg_joints, nao, upright_links
 from nlp_gait.problems.nao.curves import (
     Splines,
     Trajectory,
+    arm_limits,
     arm_motions,
+    grid_for,
     hip_and_arm_units,
     hip_on_spline,
-    motion_options,
-    samples_in_interval,
 )
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables, leg_geometry
-from nlp_gait.problems.nao.limits import phase_problem
-from nlp_gait.problems.nao.motors import motor_options, with_motors
-from nlp_gait.problems.nao.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
@@ -48,12 +47,14 @@ ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
 # Curves that can be splines; the swing foot stays on its line across the walking direction.
 UNITS = hip_and_arm_units(ARM_SWING) | {"foot_x": "m", "foot_z": "m"}
 
+DURATION, LIFT = "single_support_time_s", "swing_height_m"
 OWN_VARIABLES = (
-    Variable(name="swing_height_m", unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
-    Variable(name="single_support_time_s", unit="s", lower=0.4, upper=4.0, description="x9"),
+    Variable(name=LIFT, unit="m", lower=0.015, upper=0.03, description="x8, highest point of the foot"),
+    Variable(name=DURATION, unit="s", lower=0.4, upper=4.0, description="x9"),
 )
 
 
+@maker(("trajectory", "objective", "samples_per_interval"), ("motors",))
 def nao_ssp(
     *,
     robot: str = "nao-v5",
@@ -66,67 +67,50 @@ def nao_ssp(
     objective: Criterion = "power",
     motors: str = "",
 ) -> GaitProblem:
-    """Single support of NAO.
-
-    Args:
-        robot: name or file of the robot.
-        intervals: equal parts of the phase over which torques may change by the limit.
-        derivatives: analytic, or finite differences of the sampled angles as in the paper.
-        rotational_inertia: False takes every link as a point mass, in torques and ZMP.
-        step_length_m: from foot to foot; the swing foot moves by twice as much.
-        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
-            cubics, 4 with splines, which would else bend between the samples.
-        trajectory: of hip, swing foot and arms: the paper's cubics, or more coefficients on top of them.
-        objective: what is minimised: power as in the paper, joint jerk, or the rate of torques.
-        motors: what of the real motors is taken into account, separated by commas, see ``nao_motors``; nothing by default.
-    """
+    """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
     check_step_length(step_length_m)
     model = nao(robot, rotational_inertia)
-    foot = model.feet["left"]
-    stance = stance_of(model, step_length_m)
-    own = (*hip_variables(model), *OWN_VARIABLES)
-    splines = Splines(trajectory=trajectory, units=UNITS, first=len(own))
-    variables = (*own, *splines.variables)
-    samples = samples_in_interval(trajectory, samples_per_interval)
+    stance, foot = stance_of(model, step_length_m), model.feet["left"]
+    splines = Splines(trajectory=trajectory, units=UNITS)
+    real = Motors.parsed(motors, model)
+
+    def path(at: InstantPoint, s: SX) -> SX:
+        return _swing(at, stance, splines.motions(at, single_support_duration(at), s), 0.0, s).position
+
+    richer = (
+        FootClearance(path, sum(stance.swing_x) / 2, LIFT),
+        arm_limits(model, splines, ARM_SWING, single_support_duration),
+    )
     phase = Phase(
         robot=model,
-        variables=len(variables),
-        duration="single_support_time_s",
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        variables=(*hip_variables(model), *OWN_VARIABLES, *splines.variables),
+        duration=DURATION,
         plan=single_support_plan(model, stance, splines),
         loads=single_support_loads(model),
-        intervals=intervals,
-        samples_per_interval=samples,
+        grid=grid_for(trajectory, intervals, samples_per_interval),
         derivatives=derivatives,
+        parts=(
+            *paper_parts(model, single_support_margins(stance.support_xy, foot), single_support_mean_margins(foot)),
+            *(richer if splines.count else ()),
+            *real.parts,
+        ),
+        goal=goal_of(objective, real),
     )
-    problem = phase_problem(
-        name="nao-ssp",
-        title="NAO, single support: least mean power",
-        variables=variables,
-        phase=phase,
-        margins=lambda zmp, ops: single_support_margins(zmp, stance.support_xy, foot, ops),
-        mean_dbm_m=single_support_mean_margins(foot),
-        make=nao_ssp,
-        options={
-            "robot": robot,
-            "intervals": intervals,
-            "derivatives": derivatives,
-            "rotational_inertia": rotational_inertia,
-            "step_length_m": step_length_m,
-            **motion_options(trajectory, objective, samples),
-            **motor_options(motors),
-        },
+    return phase_problem(
+        "nao-ssp",
+        "NAO, single support: least mean power",
+        phase,
+        robot,
+        on_left_foot,
+        start=splines.start_of(phase.names),
     )
 
-    def arms(x: SX, s: SX) -> dict[str, Motion]:
-        duration = single_support_duration(x)
-        return arm_motions(splines.motions(x, duration, s), ARM_SWING, duration, s)
 
-    def path(x: SX, s: SX) -> SX:
-        return _swing(x, stance, splines.motions(x, single_support_duration(x), s), 0.0, s).position
-
-    swing = Swing(path, sum(stance.swing_x) / 2, "swing_height_m")
-    moved = with_motion(problem, phase, splines, objective, arms, swing)
-    return with_motors(moved, phase, motors)
+def on_left_foot(signals: Signals) -> tuple[Support, ...]:
+    """The left foot carries the whole robot."""
+    return (Support(foot="left"),)
 
 
 class Stance(NamedTuple):
@@ -155,14 +139,14 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
     """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
     ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
 
-    def plan(x: SX, margin: SX, phase: SX, ops: Nonsmooth) -> Plan:
-        duration = single_support_duration(x)
-        more = splines.motions(x, duration, phase)
-        hip = hip_on_spline(x, more, stance.hip_x, stance.hip_y, duration, phase)
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+        duration = single_support_duration(at)
+        more = splines.motions(at, duration, phase)
+        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, duration, phase)
         support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
-        swing = _swing(x, stance, more, ankle_heights[1], phase)
-        left, left_reach = leg_joints(robot, "L", hip, support, margin, ops)
-        right, right_reach = leg_joints(robot, "R", hip, swing, margin, ops)
+        swing = _swing(at, stance, more, ankle_heights[1], phase)
+        left, left_reach = leg_joints(robot, "L", hip, support, at[REACH_MARGIN], ops)
+        right, right_reach = leg_joints(robot, "R", hip, swing, at[REACH_MARGIN], ops)
         return Plan(
             joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
             hip=hip.position,
@@ -173,17 +157,15 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
     return plan
 
 
-def single_support_duration(x: SX) -> SX:
-    """Time of the phase [s] from x (n,), never zero."""
-    return fmax(x[8], LEAST_DURATION)
+def single_support_duration(at: InstantPoint) -> SX:
+    """Time of the phase [s], never zero."""
+    return fmax(at[DURATION], LEAST_DURATION)
 
 
-def _swing(x: SX, stance: Stance, more: Mapping[str, Motion], ankle_height: float, phase: SX) -> Motion:
+def _swing(at: InstantPoint, stance: Stance, more: Mapping[str, Motion], ankle_height: float, phase: SX) -> Motion:
     """Motion of the right ankle (3,) [m]: the paper's, and what its curves add."""
-    duration = single_support_duration(x)
-    swing = swing_foot(
-        SX(stance.swing_x[0]), SX(stance.swing_x[1]), stance.swing_y, ankle_height, x[7], duration, phase
-    )
+    ends = SX(stance.swing_x[0]), SX(stance.swing_x[1])
+    swing = swing_foot(*ends, stance.swing_y, ankle_height, at[LIFT], single_support_duration(at), phase)
     return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
 
 
@@ -213,8 +195,8 @@ def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -
     return loads
 
 
-def single_support_margins(zmp: MX, support_xy: tuple[float, float], foot: Foot, ops: Nonsmooth) -> tuple[MX, MX]:
-    """Balance margins in x and y, (1, N + 1) each [m].
+def single_support_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:
+    """Balance margins in x and y on one sole.
 
     In x the distance to the sole's edge on that side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.
     Outside the sole the paper's zero is continued below zero, so that an infeasible gait says how far outside it is.
@@ -222,7 +204,11 @@ def single_support_margins(zmp: MX, support_xy: tuple[float, float], foot: Foot,
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (21), (22).
     """
-    x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
-    dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
-    dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T
-    return dbm_x, dbm_y
+
+    def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
+        dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
+        dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T
+        return dbm_x, dbm_y
+
+    return margins

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from nlp_gait.errors import InputError
+from nlp_gait.problem.assembly import NumericPoint, Objective, Parameter
 from nlp_gait.problem.blocks import Block, Layout
-from nlp_gait.problem.gait_problem import Array, GaitProblem, Objective, Parameter, Signals
+from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.problems.stairs.ideal_model import IdealModel
 from nlp_gait.problems.stairs.ideal_start import planned_angles
-from nlp_gait.problems.stairs.stair import ANGLE_LIMITS, STAIR_PARAMETERS, joint_signals, values_of
+from nlp_gait.problems.stairs.skeleton import skeleton
+from nlp_gait.problems.stairs.stair import ANGLE_LIMITS, COLUMNS, STAIR_PARAMETERS, joint_signals
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
@@ -60,6 +66,7 @@ PARAMETERS = (
 )
 
 
+@maker()
 def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
     """Trajectory optimisation of one step.
 
@@ -81,12 +88,12 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
     layout = _layout(intervals, sole_off, toe_off)
     model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off)
 
-    def start(p: Array, rng: np.random.Generator) -> Array:
-        return _start(layout, intervals, values_of(PARAMETERS, p), rng)
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return _start(layout, intervals, parameters, rng)
 
-    def signals(x: Array, p: Array) -> Signals:
-        values = layout.values(x)
-        step_time = values_of(PARAMETERS, p)["step_time_s"]
+    def motion(at: NumericPoint) -> Signals:
+        values = layout.values(at.x.full().ravel())
+        step_time = float(at["step_time_s"])
         loads = model.loads_at(values)
 
         def held(columns: Array) -> Array:
@@ -102,17 +109,19 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
                 "stance_force": held(loads.stance_force),
                 "zmp": held(loads.stance_pressure)[:, 0],
             },
+            columns=COLUMNS,
         )
 
     return GaitProblem(
         name="stairs-ideal",
         title="Stairs, full trajectory optimisation: least effort",
-        options={"intervals": intervals},
         variables=layout.variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="effort", unit="1"),
         assemble=model.assemble,
-        signals=signals,
+        grid=Grid(intervals=intervals),
+        motion=motion,
+        skeleton=skeleton,
         start=start,
         starts=3,
         searchable=False,
@@ -165,7 +174,7 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
     )
 
 
-def _start(layout: Layout, intervals: int, values: dict[str, float], rng: np.random.Generator) -> Array:
+def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Planned angles with noise, rates and accelerations by differences, a share of the weight behind."""
     tread = values["stair_length_m"] / 2
     angle = planned_angles(tread, values["rise_run_ratio"] * tread, intervals)

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Mapping
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import (
-    Array,
-    Assembly,
-    GaitProblem,
-    Objective,
-    Parameter,
-    Point,
-    Signals,
-    Variable,
-)
+from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs.plan_rows import clearance_rows, ground_rows, phase_rows, posture_rows
 from nlp_gait.problems.stairs.plan_samples import PlannedStep, Samples
 from nlp_gait.problems.stairs.robot import load_biped
-from nlp_gait.problems.stairs.stair import STAIR_PARAMETERS, joint_signals
+from nlp_gait.problems.stairs.skeleton import skeleton
+from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, joint_signals
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
@@ -86,6 +82,7 @@ PARAMETERS = (
 )
 
 
+@maker()
 def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitProblem:
     """Planner of one step.
 
@@ -100,8 +97,6 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     Source:
         Bhardwaj et al., section V and Table III.
     """
-    if minimise not in get_args(Minimise):
-        raise InputError(f"minimise must be one of {', '.join(get_args(Minimise))}, got {minimise!r}")
     if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 4 or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
     step = PlannedStep(per_phase=intervals // len(PHASES))
@@ -109,29 +104,26 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, step, minimise, ops)
 
-    def signals(x: Array, p: Array) -> Signals:
-        point = problem.symbols()
-        names = Samples._fields
-        found = ca.Function("samples", [point.x, point.p], list(step.samples(point, Exact())), ["x", "p"], list(names))
-        arrays = {name: np.array(value).T for name, value in zip(names, found(x, p), strict=True)}
+    def motion(at: NumericPoint) -> Signals:
+        samples = step.samples(at, Exact())
+        arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
         moving = joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
-        return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays})
+        return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=COLUMNS)
 
-    problem = GaitProblem(
+    return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
-        options={"minimise": minimise, "intervals": intervals},
         variables=VARIABLES,
         own_parameters=PARAMETERS,
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         start=_start,
         hessian="limited-memory",
-        refine=lambda factor: stairs_plan(minimise=minimise, intervals=intervals * factor),
-        signals=signals,
+        grid=Grid(intervals=intervals, refined_by="intervals"),
+        motion=motion,
+        skeleton=skeleton,
     )
-    return problem
 
 
 def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:
@@ -157,7 +149,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     )
 
 
-def _start(_: Array, rng: np.random.Generator) -> Array:
+def _start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
     ranges = np.array([variable.upper - variable.lower for variable in VARIABLES])
     return np.array(PLAUSIBLE) + SCATTER * ranges * rng.standard_normal(len(VARIABLES))
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem.gait_problem import Array, Parameter, Point, Variable
-from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING
+from nlp_gait.problem.assembly import Parameter, Point, Variable
+from nlp_gait.problem.signals import Array, Columns, in_space
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.profile import Stair
 
 GRAVITY = 9.81  # [m/s^2]
@@ -30,6 +29,20 @@ ANGLE_LIMITS = {
 }
 KNEE_LIMITS = (0.1, 2.5)  # [rad]
 KNEES = {"knee": ("HK", "KA"), "knee'": ("HK'", "K'A'")}
+
+# Time histories of the stair problems; the plane is sagittal.
+COLUMNS = {
+    "link_q": Columns(unit="rad", labels=MOVING),
+    "link_qd": Columns(unit="rad/s", labels=MOVING),
+    "link_qdd": Columns(unit="rad/s^2", labels=MOVING),
+    "power": Columns(unit="W", labels=JOINTS),
+    "reach": Columns(unit="1", labels=("swing knee", "stance knee")),
+    "stance_force": in_space("N", "xz"),
+    "stance_pressure": in_space("m", "x"),
+    "zmp": in_space("m", "x"),
+    "hip": in_space("m", "xz"),
+    "ankle": in_space("m", "xz"),
+}
 
 STAIR_PARAMETERS = (
     Parameter(
@@ -55,11 +68,6 @@ def stair_of(point: Point) -> Stair[MX]:
     """Tread and rise of one step from the problem's parameters."""
     tread: MX = point["stair_length_m"] / 2
     return Stair(tread, point["rise_run_ratio"] * tread)
-
-
-def values_of(own_parameters: Sequence[Parameter], p: Array) -> dict[str, float]:
-    """Values of a problem's own parameters by name, from its parameter vector (k,), in which they come first."""
-    return {parameter.name: float(value) for parameter, value in zip(own_parameters, p, strict=False)}
 
 
 def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:

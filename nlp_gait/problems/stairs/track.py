@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Mapping
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import (
-    Array,
-    GaitProblem,
-    Objective,
-    Parameter,
-    Point,
-    Signals,
-    Variable,
-)
+from nlp_gait.problem.assembly import NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Array, Columns, Signals
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
-from nlp_gait.problems.stairs.stair import STAIR_PARAMETERS, within
+from nlp_gait.problems.stairs.skeleton import skeleton
+from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, within
 from nlp_gait.problems.stairs.track_rows import track_rows
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -94,6 +91,7 @@ PARAMETERS = (
 )
 
 
+@maker()
 def stairs_track(
     *,
     gains: Gains = "scalar",
@@ -118,13 +116,6 @@ def stairs_track(
     Source:
         Bhardwaj et al., sections VII to X.
     """
-    for option, value, allowed in (
-        ("gains", gains, get_args(Gains)),
-        ("scheme", scheme, get_args(Scheme)),
-        ("inverse_kinematics", inverse_kinematics, get_args(InverseKinematics)),
-    ):
-        if value not in allowed:
-            raise InputError(f"{option} must be one of {', '.join(allowed)}, got {value!r}")
     if not QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
     suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
@@ -143,17 +134,13 @@ def stairs_track(
     def rollout(point: Point, ops: Nonsmooth) -> Rollout:
         return loop.rollout(point, ca.vertcat(*(within(point, variable) for variable in variables)), ops)
 
-    def start(_: Array, rng: np.random.Generator) -> Array:
+    def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
         gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
         ranges = np.array([variable.upper - variable.lower for variable in variables])
         return np.append(gains_about, PLAUSIBLE_TORSO) + SCATTER * ranges * rng.standard_normal(len(variables))
 
-    def signals(x: Array, p: Array) -> Signals:
-        point = problem.symbols()
-        outputs = list(rollout(point, Exact()))
-        desired, state, torque, zmp = (
-            np.array(part).T for part in ca.Function("rollout", [point.x, point.p], outputs)(x, p)
-        )
+    def motion(at: NumericPoint) -> Signals:
+        desired, state, torque, zmp = (np.array(ca.evalf(part)).T for part in rollout(at, Exact()))
         return Signals(
             joints=LINKS,
             arrays={
@@ -165,17 +152,16 @@ def stairs_track(
                 "tau": torque,
                 "zmp": zmp[:, 0],
             },
+            columns={
+                "zmp": COLUMNS["zmp"],
+                "q_desired": Columns(unit="rad", labels=LINKS),
+                "qd_desired": Columns(unit="rad/s", labels=LINKS),
+            },
         )
 
-    problem = GaitProblem(
+    return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
-        options={
-            "gains": gains,
-            "scheme": scheme,
-            "inverse_kinematics": inverse_kinematics,
-            "duration_s": duration_s,
-        },
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
@@ -183,9 +169,9 @@ def stairs_track(
         start=start,
         starts=1,
         long_derivatives=True,
-        signals=signals,
+        motion=motion,
+        skeleton=skeleton,
     )
-    return problem
 
 
 def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> tuple[Variable, ...]:

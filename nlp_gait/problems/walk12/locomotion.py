@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.gait_problem import Array, Signals
+from nlp_gait.problem.signals import Array, Columns, Signals, in_space
 from nlp_gait.problems.walk12.model import Zmp, legs, mass_motion, masses, zero_moment_point
 from nlp_gait.problems.walk12.robot import PointMassBiped
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -25,6 +25,11 @@ JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
 # Columns of a leg's joints in the order of ``Leg.joints``: ankle roll, ankle pitch, knee, hip pitch, hip roll.
 COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
 YAW_COLUMN = {"left": 3, "right": 8}
+COLUMNS_OF = {
+    **{name: in_space("m", "xy") for name in ("zmp", "zmp_foot")},
+    **{name: in_space("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
+    "left_stance": Columns(unit="1"),
+}
 MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
 
 
@@ -77,7 +82,7 @@ def locomotion(
         parts.append({name: array[first:] for name, array in part.items()})
         ankle, heading = part["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
     arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Signals(joints=JOINTS, arrays=arrays)
+    return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
 
 
 def _joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import (
-    Array,
-    Assembly,
-    Constraint,
-    GaitProblem,
-    Objective,
-    Parameter,
-    Point,
-    Signals,
-    Variable,
-)
+from nlp_gait.problem.assembly import Assembly, Constraint, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.registry import maker
+from nlp_gait.problem.signals import Signals
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp, legs, reaches, zero_moment_point
 from nlp_gait.problems.walk12.robot import PointMassBiped, load_biped
+from nlp_gait.problems.walk12.skeleton import skeleton
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Horizon = Literal["step", "1s"]
@@ -70,35 +64,32 @@ PARAMETERS = (
 )
 
 
+@maker()
 def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
     """Gait of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
         intervals: of Simpson's rule over a step; even.
         horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
-        zmp: reading of the zero-moment point, see ``walk12_model.Zmp``.
+        zmp: reading of the zero-moment point, see ``model.Zmp``.
 
     Raises:
         InputError: an option that is not allowed.
     """
     if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
-    for option, value, allowed in (("horizon", horizon, get_args(Horizon)), ("zmp", zmp, get_args(Zmp))):
-        if value not in allowed:
-            raise InputError(f"{option} must be one of {', '.join(allowed)}, got {value!r}")
     robot = load_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)
 
-    def signals(x: Array, p: Array) -> Signals:
-        value = dict(zip((parameter.name for parameter in PARAMETERS), p, strict=False))
+    def motion(at: NumericPoint) -> Signals:
         return locomotion(
             robot,
-            x,
-            step_time_s=value["step_time_s"],
-            turn_rad=value["turn_rad"],
-            reach_margin_rad=value["reach_margin_rad"],
+            at.x.full().ravel(),
+            step_time_s=float(at["step_time_s"]),
+            turn_rad=float(at["turn_rad"]),
+            reach_margin_rad=float(at["reach_margin_rad"]),
             intervals=intervals,
             zmp=zmp,
         )
@@ -106,13 +97,13 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     return GaitProblem(
         name="walk12",
         title="12-joint walk: stability margin against step length",
-        options={"intervals": intervals, "horizon": horizon, "zmp": zmp},
         variables=VARIABLES,
         own_parameters=PARAMETERS,
         objective=Objective(name="f", unit="1", sense="maximise"),
         assemble=assemble,
-        refine=lambda factor: walk12(intervals=intervals * factor, horizon=horizon, zmp=zmp),
-        signals=signals,
+        grid=Grid(intervals=intervals, refined_by="intervals"),
+        motion=motion,
+        skeleton=skeleton(robot),
         hessian="limited-memory",  # from 640 random starts all converge; of those with the exact one, 5 fail
     )
 

@@ -57,7 +57,7 @@ def test_every_problem_can_be_drawn(name):
 def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
     problem = nlp_gait.load("stairs-plan")
     x = problem.start_point(np.random.default_rng(0))
-    arrays = problem.signals(x, problem.p).arrays
+    arrays = problem.signals(x).arrays
     swing = next(limb for limb in drawn("stairs-plan", frames_per_s=0.01).limbs if limb.side == "right").points
     np.testing.assert_allclose(swing[:, 0][:, [0, 2]], arrays["hip"], atol=1e-9)
     in_reach = np.abs(arrays["reach"]).max(axis=1) < 0.99  # beyond it the planner's leg does not meet its ankle

@@ -12,8 +12,8 @@ import pytest
 from nlp_gait.backends.exact import exact_model, row_violations
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.symbolic.splines import finer
 
@@ -89,7 +89,7 @@ def test_each_order_contains_the_one_before(name: str) -> None:
 def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
     problem = load(name, trajectory="spline-2").dense(100)
     assert problem is not None and problem.signals is not None
-    moved, paper = (problem.signals(padded(problem, c), problem.p).arrays for c in (some(problem), 0.0))
+    moved, paper = (problem.signals(padded(problem, c)).arrays for c in (some(problem), 0.0))
     for row in (0, -1):
         for signal in ("q", "qd", "hip", "left_foot", "right_foot"):
             np.testing.assert_allclose(moved[signal][row], paper[signal][row], rtol=0, atol=ROUNDING)
@@ -138,7 +138,7 @@ def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
 def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, signal: str) -> None:
     problem = load("nao-ssp", objective=name)
     assert problem.signals is not None
-    arrays = problem.signals(padded(problem), problem.p).arrays
+    arrays = problem.signals(padded(problem)).arrays
     rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
     cost = float(exact_model(problem).function(padded(problem), problem.p)[0])
     assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)

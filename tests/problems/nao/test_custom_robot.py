@@ -14,8 +14,8 @@ import pytest
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.problem.gait_problem import Array
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.legs import LegGeometry, leg_geometry
@@ -95,7 +95,7 @@ def test_for_nao_the_papers_numbers_come_out_to_the_last_digit(name: str, x_m: f
     assert (problem.value("dbm_x_mean_limit_m"), problem.value("dbm_y_mean_limit_m")) == (x_m, y_m)
     assert problem.signals is not None
     x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: len(problem.names)]
-    arrays = problem.signals(x, problem.p).arrays
+    arrays = problem.signals(x).arrays
     ends = {key: [tuple(arrays[key][k, :2]) for k in (0, -1)] for key in ("hip", "left_foot", "right_foot")}
     expected = {
         "nao-ssp": {
@@ -225,6 +225,6 @@ def test_feet_of_unequal_height_both_reach_the_ground(tmp_path: Path, name: str)
     problem = load(name, robot=written(tmp_path, raw))
     assert problem.signals is not None
     x: Array = (problem.lower + problem.upper) / 2
-    soles = problem.signals(x, problem.p).arrays
+    soles = problem.signals(x).arrays
     assert soles["left_foot"][:, 2] == pytest.approx(0.0, abs=1e-15)
     assert soles["right_foot"][[0, -1], 2] == pytest.approx(0.0, abs=1e-15)

@@ -7,8 +7,8 @@ import pytest
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.robots import load_robot
@@ -132,7 +132,7 @@ def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed
 def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
     assert at_speed.signals is not None
     x = candidates(at_speed)[0]
-    signals = at_speed.signals(x, at_speed.p)
+    signals = at_speed.signals(x)
     assert (np.diff(signals.arrays["t"]) > 0.0).all()
     assert all(len(array) == 21 for array in signals.arrays.values())
     assert signals.arrays["t"][-1] == pytest.approx(2.4)

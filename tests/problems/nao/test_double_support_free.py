@@ -11,8 +11,8 @@ import pytest
 
 from nlp_gait.backends.exact import exact_model, row_violations
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.closed_chain import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
@@ -49,7 +49,7 @@ def leaning(seed: int, lean: float = 0.2) -> Array:
 
 def signals_of(problem: GaitProblem, x: Array) -> Signals:
     assert problem.signals is not None
-    return problem.signals(x, problem.p)
+    return problem.signals(x)
 
 
 def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:

@@ -9,8 +9,8 @@ import pytest
 
 from nlp_gait.backends.exact import exact_model, row_violations
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.robots import load_robot
@@ -42,7 +42,7 @@ def leaning(seed: int) -> Array:
 
 def signals_of(problem: GaitProblem, x: Array) -> Signals:
     assert problem.signals is not None
-    return problem.signals(x, problem.p)
+    return problem.signals(x)
 
 
 @pytest.mark.parametrize("seed", range(4))

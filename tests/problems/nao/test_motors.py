@@ -40,7 +40,7 @@ def test_without_features_it_is_the_same_problem() -> None:
 def test_power_is_that_of_the_time_histories(features: str) -> None:
     problem = load("nao-ssp", motors=features)
     assert problem.signals is not None
-    signals = problem.signals(X, problem.p)
+    signals = problem.signals(X)
     torque, rate = signals.arrays["tau"], signals.arrays["qd"]
     driven = torque * rate
     if "free-braking" in features:
@@ -71,7 +71,7 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
 def test_limits_are_those_of_the_data_sheet() -> None:
     problem = load("nao-ssp", motors="limits")
     assert problem.signals is not None
-    signals = problem.signals(X, problem.p)
+    signals = problem.signals(X)
     knee = signals.joints.index("LKneePitch")
     torque, rate = signals.arrays["tau"][:, knee], signals.arrays["qd"][:, knee]
     motor = load_robot("nao-v5").joint("LKneePitch").motor

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem.gait_problem import Array, Signals
 from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import Standing, floating_model, stand
@@ -47,7 +47,7 @@ def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float
 
 def signals_of(problem: GaitProblem, x: Array) -> Signals:
     assert problem.signals is not None
-    return problem.signals(x, problem.p)
+    return problem.signals(x)
 
 
 @pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])

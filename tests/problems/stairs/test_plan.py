@@ -52,7 +52,7 @@ def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None
 
 
 def test_signals_have_one_row_for_each_sample(problem: GaitProblem) -> None:
-    arrays = problem.signals(np.array(NEAR_BEST), problem.p).arrays
+    arrays = problem.signals(np.array(NEAR_BEST)).arrays
     assert {len(array) for array in arrays.values()} == {44}
     assert arrays["t"][0] == 0.0
     assert arrays["t"][-1] == pytest.approx(3.5)

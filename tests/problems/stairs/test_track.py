@@ -9,7 +9,8 @@ import nlp_gait
 from metaheuristics import AntColony, minimize
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import Array, GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.signals import Array
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
@@ -78,7 +79,7 @@ def test_multiple_shooting_meets_the_ants() -> None:
 
 
 def test_signals(problem: GaitProblem) -> None:
-    arrays: dict[str, Array] = dict(problem.signals(np.array([100.0, 100.0, 1.45]), problem.p).arrays)
+    arrays: dict[str, Array] = dict(problem.signals(np.array([100.0, 100.0, 1.45])).arrays)
     assert arrays["t"][[0, -1]] == pytest.approx([0.01, 3.5])
     assert arrays["q"].shape == arrays["qd"].shape == arrays["tau"].shape == (350, 9)
     error = np.abs(arrays["q"] - arrays["q_desired"]).max()
@@ -89,7 +90,7 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
     (cost, *_), (known, *_) = values(learned, x), values(problem, x)
     assert 0.0 < abs(cost - known) < NETWORK_COST * known
-    angles, expected = (p.signals(np.array(x), p.p).arrays["q_desired"] for p in (learned, problem))
+    angles, expected = (p.signals(np.array(x)).arrays["q_desired"] for p in (learned, problem))
     error = np.abs(angles - expected).max(axis=0)
     legs = np.isin(LINKS, ("HK", "KA", "HK'", "K'A'"))
     assert (error[legs] > 0.0).all()

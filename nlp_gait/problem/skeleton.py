@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
-from nlp_gait.problem.gait_problem import Array
+from nlp_gait.problem.signals import Array
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 
@@ -45,7 +44,6 @@ class Skeleton:
     """A gait as it is drawn; x forward, y left, z up.
 
     Attributes:
-        title: one line.
         t: (T,) [s].
         limbs: lines.
         soles: outlines.
@@ -53,9 +51,9 @@ class Skeleton:
         com: (T, 3) centre of mass [m], if known.
         zmp: (T, 3) zero-moment point on the ground [m], if known.
         planar: only the side view means anything.
+        title: one line.
     """
 
-    title: str
     t: Array
     limbs: tuple[Limb, ...]
     soles: tuple[Sole, ...]
@@ -63,9 +61,12 @@ class Skeleton:
     com: Array | None
     zmp: Array | None
     planar: bool = False
+    title: str = ""
 
     def support(self, k: int) -> Array | None:
         """(M, 2) support polygon at a sample: the hull of the loaded soles, seen from above [m]; None if there is none."""
+        from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
+
         loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
         if not loaded:
             return None
@@ -86,3 +87,13 @@ def flat_ground(*points: Array) -> Array:
     """Line (x, z) at height zero below all points (..., 3)."""
     x = np.concatenate([p[..., 0].ravel() for p in points])
     return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
+
+
+def rectangle(back: float, front: float, right: float, left: float) -> Array:
+    """(4, 3) corners at height zero."""
+    return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
+
+
+def grounded(zmp: Array) -> Array:
+    """(T, 3) from (T, 2)."""
+    return np.column_stack([zmp, np.zeros(len(zmp))])

@@ -1,0 +1,164 @@
+"""What a problem's mathematics is written in: variables, parameters, the symbols of both, and the rows that come out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
+
+import casadi as ca
+from casadi import DM, MX, SX
+
+Expression = TypeVar("Expression", MX, SX, DM)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """Decision variable with its default bounds, in ``unit``; no bound may be set beyond ``minimum`` and ``maximum``."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    description: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """Number that may change without rebuilding; ``minimum`` and ``maximum`` say what is allowed."""
+
+    name: str
+    unit: str
+    default: float
+    description: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Objective:
+    """Name, unit and sense of what is optimised."""
+
+    name: str
+    unit: str
+    sense: Literal["minimise", "maximise"] = "minimise"
+
+    @property
+    def sign(self) -> float:
+        """+1 if minimised, -1 if maximised: sign * objective is what every solver minimises."""
+        return 1.0 if self.sense == "minimise" else -1.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Constraint:
+    """Rows lower <= value <= upper; a missing bound is None.
+
+    Attributes:
+        name: of the group, for example ``"torque_change"``.
+        labels: one per row, naming joint or side and sample; empty for a single row without a label.
+        unit: of value and bounds.
+        scale: violation of this size counts as 1 in the total violation [unit].
+        value: (m, 1).
+        lower: (m, 1) or scalar, a function of parameters only.
+        upper: likewise.
+    """
+
+    name: str
+    labels: tuple[str, ...] = ()
+    unit: str
+    scale: float
+    value: MX
+    lower: MX | None = None
+    upper: MX | None = None
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """For example ``torque_change[LKneePitch, 3]``."""
+        return tuple(f"{self.name}[{label}]" for label in self.labels) if self.labels else (self.name,)
+
+    @property
+    def columns(self) -> tuple[MX, MX, MX]:
+        """Value, lower and upper as columns of equal length; a missing bound is infinite."""
+        m = self.value.shape[0]
+
+        def column(bound: MX | None, missing: float) -> MX:
+            if bound is None:
+                return MX(DM.ones(m) * missing)
+            return bound if bound.shape[0] == m else ca.repmat(bound, m, 1)
+
+        return self.value, column(self.lower, -math.inf), column(self.upper, math.inf)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Assembly:
+    """A problem's mathematics under one interpretation of the non-smooth operations.
+
+    Attributes:
+        objective: scalar, in the problem's own sense.
+        constraints: groups of rows.
+        indexes: named performance figures (scalars); meaningful under ``Exact`` only.
+    """
+
+    objective: MX
+    constraints: tuple[Constraint, ...]
+    indexes: Mapping[str, MX]
+
+    def group(self, name: str) -> Constraint:
+        """Rows of a name; raises KeyError."""
+        for constraint in self.constraints:
+            if constraint.name == name:
+                return constraint
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PointOf(Generic[Expression]):
+    """A point of a problem, read by name: ``point["hip_height_m"]``.
+
+    Attributes:
+        x: (n, 1) decision variables.
+        p: (k, 1) parameters.
+        positions: of each name in x or in p.
+    """
+
+    x: Expression
+    p: Expression
+    positions: Mapping[str, tuple[Literal["x", "p"], int]]
+
+    @classmethod
+    def of(
+        cls, x: Expression, p: Expression, variables: Sequence[str], parameters: Sequence[str]
+    ) -> PointOf[Expression]:
+        """Point whose entries have these names, in this order."""
+        positions: dict[str, tuple[Literal["x", "p"], int]] = {name: ("p", i) for i, name in enumerate(parameters)}
+        return cls(x=x, p=p, positions=positions | {name: ("x", i) for i, name in enumerate(variables)})
+
+    def __getitem__(self, name: str) -> Expression:
+        """Value of a variable or a parameter."""
+        kind, index = self.positions[name]
+        return self.x[index] if kind == "x" else self.p[index]
+
+    def only(self, variables: Sequence[str]) -> PointOf[Expression]:
+        """The point with these variables alone in x, in this order; a name that was a parameter may be among them."""
+        own = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
+        if tuple(variables) == own:
+            return self
+        taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}
+        return PointOf(
+            x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions={**self.positions, **taken}
+        )
+
+    def extended(self, name: str, value: Expression) -> PointOf[Expression]:
+        """The point with one more variable, the last one."""
+        return PointOf(
+            x=ca.vertcat(self.x, value), p=self.p, positions={**self.positions, name: ("x", int(self.x.shape[0]))}
+        )
+
+
+# What a problem is assembled from; one instant of a motion, which is mapped over the samples; numbers.
+Point: TypeAlias = PointOf[MX]
+InstantPoint: TypeAlias = PointOf[SX]
+NumericPoint: TypeAlias = PointOf[Any]

@@ -1,0 +1,271 @@
+"""A support phase of a spatial biped sampled over time: how the robot moves and what that asks of motors and ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.problem.assembly import Assembly, InstantPoint, NumericPoint, Parameter, Point, Variable
+from nlp_gait.problem.gait_problem import Grid
+from nlp_gait.problem.signals import Array, Signals, in_space
+from nlp_gait.problems.biped.goals import Goal
+from nlp_gait.problems.biped.parts import REACH_MARGIN, Part
+from nlp_gait.problems.biped.samples import LEAST_DURATION, Samples, Trace
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.economy import economical, tabulated
+from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion
+
+Derivatives = Literal["analytic", "finite-difference"]
+
+BOTH_FEET = {"L": "left", "R": "right"}
+COLUMNS = {
+    "zmp": in_space("m", "xy"),
+    **{name: in_space("m") for name in ("hip", "com", "left_foot", "right_foot")},
+}
+
+
+class Plan(NamedTuple):
+    """Motion of the whole robot at one instant.
+
+    Attributes:
+        joints: motion of every joint by name [rad].
+        hip: (3,) position of the torso's origin [m].
+        ankles: (3,) positions by side ``"L"``, ``"R"`` [m].
+        reach: (2,) cosines of the left and the right knee.
+    """
+
+    joints: Mapping[str, Motion]
+    hip: SX
+    ankles: Mapping[str, SX]
+    reach: SX
+
+
+class Loads(NamedTuple):
+    """What motors and ground must give at one instant.
+
+    Attributes:
+        torques: by joint name [Nm].
+        zmp: (2,) in the world [m].
+    """
+
+    torques: Mapping[str, SX]
+    zmp: SX
+
+
+# From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
+Planner = Callable[[InstantPoint, SX, Nonsmooth], Plan]
+# From joint motions by name, the hip's position (3,), and points (2,) on the ground under the ankles by side.
+Loader = Callable[[Mapping[str, Motion], SX, Mapping[str, SX]], Loads]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Phase:
+    """A support phase: how the robot moves, what that asks of motors and ground, and what is wanted of it.
+
+    Attributes:
+        robot: with links welded that never move.
+        joints: those whose torques and rates count.
+        planned: those whose angles the phase plans.
+        variables: of the motion, in the order of x.
+        duration: variable that holds the phase's duration.
+        plan: the motion.
+        loads: torques and ZMP.
+        grid: its samples.
+        derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
+        parts: what limits the phase.
+        goal: what it minimises.
+    """
+
+    robot: Robot
+    joints: tuple[str, ...]
+    planned: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    duration: str
+    plan: Planner
+    loads: Loader
+    grid: Grid
+    derivatives: Derivatives = "analytic"
+    parts: Sequence[Part] = field(default=())
+    goal: Goal
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of the goal and of all parts; pairs of bounds stand last, for there are many."""
+        own = (*self.goal.parameters, *(parameter for part in self.parts for parameter in part.parameters))
+        return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
+
+    def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
+        """Rows of all parts, the goal, and the indexes of both."""
+        added = [part.contribute(at, samples, ops) for part in self.parts]
+        goal = self.goal.value(at, samples, ops)
+        return Assembly(
+            objective=goal.value,
+            constraints=tuple(row for part in added for row in part.rows),
+            indexes={
+                **goal.first,
+                **{name: value for part in added for name, value in part.indexes.items()},
+                **goal.last,
+            },
+        )
+
+    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
+        """The phase at N + 1 equidistant samples, each evaluated once; mapped, never unrolled."""
+        traces, motion = self._traces, self._reads_motion
+        if self.derivatives == "analytic":
+            planned, reach, torque, power, zmp, *rest = self._mapped(self._sample(ops, motion, traces), at)
+            moved, seen = rest[: 3 * motion], rest[3 * motion :]
+        else:
+            q, _, _, hip, planned, reach, world, *seen = self._mapped(self._kinematics(ops, traces), at)
+            qd, qdd = self._differences(q, at)
+            torque, moving, zmp = self._dynamics.map(self.grid.parts + 1)(q, qd, qdd, hip, world)
+            power, moved = qd * moving, [q, qd, qdd]
+        return Samples(
+            joints=self.joints,
+            moving=self.moving,
+            per_interval=self.grid.samples_per_interval,
+            duration=at[self.duration],
+            planned=planned,
+            reach=reach,
+            torque=torque,
+            power=power,
+            zmp=zmp,
+            motion=tuple(moved),
+            traces=dict(zip(traces, seen, strict=True)),
+        )
+
+    def signals(self, at: NumericPoint) -> Signals:
+        """Time histories at a point of numbers."""
+        q, qd, qdd, hip, _, _, world = self._mapped(self._kinematics(Exact(), {}), at)
+        if self.derivatives == "finite-difference":
+            qd, qdd = self._differences(q, at)
+        n = self.grid.parts + 1
+        torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
+        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
+        held = np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
+        rows = [self.joints.index(name) for name in self.moving]
+
+        def full(moved: Any, others: Array) -> Array:
+            """(N + 1, J) with the joints that stand still."""
+            values = np.tile(others, (n, 1))
+            values[:, rows] = _numbers(moved)
+            return values
+
+        still_rates = np.zeros(len(self.joints))
+        com, left, right = (_numbers(part) for part in ca.vertsplit(world, 3))
+        arrays = {
+            "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
+            "q": full(q, held),
+            "qd": full(qd, still_rates),
+            "qdd": full(qdd, still_rates),
+            "tau": _numbers(torque),
+            "zmp": _numbers(zmp),
+            "hip": _numbers(hip),
+            "com": com,
+            "left_foot": left,
+            "right_foot": right,
+        }
+        return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Joints whose angle changes over the phase."""
+        joints = self._symbolic_plan(Exact())[1].joints
+        return tuple(name for name in self.joints if not joints[name].velocity.is_zero())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the variables."""
+        return tuple(variable.name for variable in self.variables)
+
+    @property
+    def _traces(self) -> dict[str, Trace]:
+        return {name: trace for part in self.parts for name, trace in part.traces.items()}
+
+    @property
+    def _reads_motion(self) -> bool:
+        return self.goal.reads_motion or any(part.reads_motion for part in self.parts)
+
+    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Plan, InstantPoint]:
+        x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
+        at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
+        return [x, margin, phase], self.plan(at, phase, ops), at
+
+    def _sample(self, ops: Nonsmooth, motion: bool, traces: Mapping[str, Trace]) -> ca.Function:
+        """One sample with analytic derivatives: (x, margin, phase) to torques and what else is read."""
+        inputs, plan, at = self._symbolic_plan(ops)
+        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()})
+        power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
+        torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
+        outputs = [planned, plan.reach, torque, power, loads.zmp]
+        outputs += self._motion(plan) if motion else []
+        outputs += [trace(at, inputs[2]) for trace in traces.values()]
+        return ca.Function("sample", inputs, economical(outputs))
+
+    def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
+        """One sample: angles that move with their derivatives, hip, planned angles, reach, com with both feet, and traces."""
+        inputs, plan, at = self._symbolic_plan(ops)
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
+        tree = tree_from(self.robot, self.robot.feet["left"].link)
+        angles = {name: joint.position for name, joint in plan.joints.items()}
+        com = centre_of_mass(tree, forward_kinematics(tree, angles, plan.ankles["L"]))
+        soles = [
+            plan.ankles[side] - SX([0, 0, self.robot.feet[foot].ankle_height_m]) for side, foot in BOTH_FEET.items()
+        ]
+        world = ca.vertcat(com, *soles)
+        seen = [trace(at, inputs[2]) for trace in traces.values()]
+        return ca.Function("kinematics", inputs, [*self._motion(plan), plan.hip, planned, plan.reach, world, *seen])
+
+    def _motion(self, plan: Plan) -> list[SX]:
+        """Angles of the joints that move, and both derivatives."""
+        return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
+
+    @cached_property
+    def _dynamics(self) -> ca.Function:
+        """One sample: torques, those of the moving joints, and ZMP, from angles and derivatives, hip, and com with feet."""
+        plan = self._symbolic_plan(Exact())[1]
+        parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
+        hip, world = SX.sym("hip", 3), SX.sym("world", 9)
+        _, left, right = ca.vertsplit(world, 3)
+        moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
+        loads = self.loads({**plan.joints, **moved}, hip, {"L": left[:2], "R": right[:2]})
+        torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
+        moving = ca.vertcat(*(loads.torques[name] for name in self.moving))
+        return ca.Function("dynamics", [*parts, hip, world], economical([torque, moving, loads.zmp]))
+
+    def _mapped(self, function: ca.Function, at: Point) -> list[Any]:
+        """A function of (x, margin, phase) at all samples, one column each."""
+        n = self.grid.parts + 1
+        margin = ca.repmat(at[REACH_MARGIN], 1, n)
+        function, table = tabulated(function, DM(np.linspace(0.0, 1.0, n)).T)
+        return list(function.map(n)(ca.repmat(at.only(self.names).x, 1, n), margin, table))
+
+    def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
+        """First and second time derivative of sampled angles (m, N + 1): central, one-sided at the ends, twice.
+
+        Source:
+            Gupta, Pratihar, Deb (2023), section 3.1: "numerical differentiation as per the given time interval"; the
+            stencil is that of MATLAB's ``gradient``, the paper's environment.
+        """
+        n = self.grid.parts + 1
+        stencil = np.zeros((n, n))
+        stencil[0, :2], stencil[-1, -2:] = (-1.0, 1.0), (-1.0, 1.0)
+        for k in range(1, n - 1):
+            stencil[k, k - 1], stencil[k, k + 1] = -0.5, 0.5
+        rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))
+        qd = q @ rate
+        return qd, qd @ rate
+
+
+def _numbers(values: Any) -> Array:
+    """(N + 1, m) from columns of numbers."""
+    return np.asarray(DM(values).full().T)

@@ -1,0 +1,101 @@
+"""What every problem of one NAO phase is made of: its parts, its goal, and the problem around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem.assembly import Assembly, Point
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.playback import Playback, Support
+from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal, MeanPower
+from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
+from nlp_gait.problems.biped.phase import Phase
+from nlp_gait.problems.nao.body import GRAVITY, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.skeleton import skeleton
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+Criterion = Literal["power", "jerk", "torque-smoothness"]
+
+
+def paper_parts(robot: Robot, margins: Margins, mean_limits_m: tuple[float, float]) -> tuple[Part, ...]:
+    """Limits of both published phases (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2)."""
+    return (JointLimits(robot, PLANNED_JOINTS), Reach(), TorqueChange(), BalanceMargins(margins, mean_limits_m))
+
+
+def goal_of(criterion: Criterion, motors: Motors) -> Goal:
+    """What is minimised.
+
+    Raises:
+        InputError: the motors change the power, but something else is minimised.
+    """
+    if criterion != "power" and motors.draw is not None:
+        raise InputError(
+            f"motors={','.join(motors.features)!r} changes the power, but the objective is "
+            f"{SMOOTHNESS[criterion].objective.name}; leave out what changes it"
+        )
+    if criterion != "power":
+        return SMOOTHNESS[criterion]
+    return MeanPower() if motors.draw is None else MeanPower(draw=motors.draw)
+
+
+def phase_problem(
+    name: str,
+    title: str,
+    phase: Phase,
+    robot: str,
+    supports: Callable[[Signals], tuple[Support, ...]],
+    *,
+    start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
+    searchable: bool = True,
+) -> GaitProblem:
+    """Problem of one phase.
+
+    Args:
+        name: of the problem.
+        title: one line.
+        phase: with its parts and its goal.
+        robot: name or file of the robot, with all its joints.
+        supports: how the model divides the robot among its feet.
+        start: start point; None for one within the bounds.
+        searchable: False for a problem that only gradient methods can solve.
+    """
+
+    def assemble(at: Point, ops: Nonsmooth) -> Assembly:
+        return phase.assemble(at, phase.samples(at, ops), ops)
+
+    return GaitProblem(
+        name=name,
+        title=title,
+        variables=phase.variables,
+        own_parameters=phase.parameters,
+        objective=phase.goal.objective,
+        assemble=assemble,
+        grid=phase.grid,
+        motion=phase.signals,
+        start=start,
+        durations=(phase.duration,),
+        searchable=searchable,
+        robot=load_robot(robot),
+        skeleton=skeleton(load_robot(robot)),
+        playback=playback(robot, supports=supports),
+    )
+
+
+def playback(
+    robot: str, *, repeats: bool = False, supports: Callable[[Signals], tuple[Support, ...]] | None = None
+) -> Playback:
+    """How a gait of a robot, by name or file, is played."""
+    return Playback(
+        robot=nao(robot, rotational_inertia=True),
+        gravity=GRAVITY,
+        heat_loss=HEAT_LOSS.name,
+        repeats=repeats,
+        supports=supports,
+    )
