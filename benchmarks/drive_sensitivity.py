@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import nlp_gait
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import Result
 from nlp_gait.simulation import measurements, mjcf, playback
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure

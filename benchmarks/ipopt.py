@@ -13,8 +13,7 @@ from benchmarks.rows import Row
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solvers.derivatives import compiled_nlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.problem.assembly import Point
-from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.problem import GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Angle
 
 QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}

@@ -6,7 +6,7 @@ A quarter of an hour or more; needs the extra ``sim``. The paper's gaits: Gupta,
 """
 
 import nlp_gait
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import plan_of

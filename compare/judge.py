@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 DENSE_INTERVALS = 1000  # at least this many equal parts on the dense grid
 

@@ -7,8 +7,7 @@ from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objecti
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import GaitError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.registry import load, problem_names
+from nlp_gait.problem import GaitProblem, load, problem_names
 from nlp_gait.problem.solution import Solution
 
 __all__ = [

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.robots import Link, Robot
 
 

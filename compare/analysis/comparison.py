@@ -12,7 +12,7 @@ import numpy as np
 from compare.analysis.statistics.run_length import Curve, Weighting, best_known, curve, expected_running_time
 from compare.study.record import RunRecord
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Objective
+from nlp_gait.problem import Objective
 
 DEFAULT_WEIGHTING = Weighting()
 

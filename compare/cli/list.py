@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.common import AsJson, command, print_json, print_table, problem_spec, stdout
-from nlp_gait.problem.registry import problem_names
+from nlp_gait.problem import problem_names
 
 
 @command

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.sampled import sampled
+from nlp_gait.problem import Result, sampled
 from nlp_gait.problem.skeleton import Skeleton
 
 

@@ -14,7 +14,7 @@ from compare.study.task import LABEL
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, without_nan, write_json
-from nlp_gait.problem.assembly import Objective
+from nlp_gait.problem import Objective
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
 
 SCHEMA = 2

@@ -13,7 +13,7 @@ from typing import Any
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 
 class Steps:

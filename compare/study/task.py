@@ -15,7 +15,7 @@ from metaheuristics.interface import Algorithm
 from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.registry import check_options
 
 IPOPT = "ipopt"

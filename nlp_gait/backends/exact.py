@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import RowViolation
 from nlp_gait.symbolic.nonsmooth import Exact
 

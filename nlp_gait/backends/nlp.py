@@ -17,9 +17,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem.assembly import Point
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
 # A derivative below this is zero for the check of the lifting's sense.

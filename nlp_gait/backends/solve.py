@@ -12,8 +12,7 @@ from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
 
 # A bound whose price, times the bound's scale, is below this is numerical dust and not reported.

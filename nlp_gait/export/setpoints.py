@@ -8,9 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.sampled import finely_sampled
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Result, finely_sampled
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 

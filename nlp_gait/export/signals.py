@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from nlp_gait.files import new_file
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import Signals
 
 
 def write_npz(path: Path, signals: Signals) -> None:

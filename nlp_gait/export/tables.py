@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem.result import SCHEMA, Result
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import Result, Signals
+from nlp_gait.problem.result import SCHEMA
 
 
 def write_csv(path: Path, signals: Signals) -> None:

@@ -1,22 +1,44 @@
-"""What a gait problem is, and how to make or change one."""
+"""What a gait problem is, how to make or change one, and a gait of one that was found."""
 
-from nlp_gait.problem.assembly import Assembly, Constraint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.assembly import (
+    Assembly,
+    Constraint,
+    InstantPoint,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    Variable,
+)
 from nlp_gait.problem.gait_problem import GaitProblem, Grid
+from nlp_gait.problem.playback import Playback, Support
 from nlp_gait.problem.registry import load, maker, problem_names
-from nlp_gait.problem.signals import Columns, Signals
+from nlp_gait.problem.result import Result, load_result
+from nlp_gait.problem.sampling import finely_sampled, sampled
+from nlp_gait.problem.signals import Array, Columns, Signals, in_space
 
 __all__ = [
+    "Array",
     "Assembly",
     "Columns",
     "Constraint",
     "GaitProblem",
     "Grid",
+    "InstantPoint",
+    "NumericPoint",
     "Objective",
     "Parameter",
+    "Playback",
     "Point",
+    "Result",
     "Signals",
+    "Support",
     "Variable",
+    "finely_sampled",
+    "in_space",
     "load",
+    "load_result",
     "maker",
     "problem_names",
+    "sampled",
 ]

@@ -9,8 +9,7 @@ import numpy as np
 
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.mjcf import TIME_STEP

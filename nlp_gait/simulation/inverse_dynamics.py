@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.playback import Playback
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Playback, Result, Signals
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import fixed_model

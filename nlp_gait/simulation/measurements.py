@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import SIDES, Plan

@@ -10,9 +10,7 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.sampled import finely_sampled
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Result, Signals, finely_sampled
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 from nlp_gait.simulation.steps import walk

@@ -7,9 +7,7 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model, row_violations
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Constraint, GaitProblem, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

@@ -11,9 +11,7 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.registry import load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Constraint, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, corner, row, toy
 

@@ -7,8 +7,7 @@ from typing import Literal
 
 from casadi import MX
 
-from nlp_gait.problem.assembly import Assembly, Constraint, Objective, Parameter, Point, Variable
-from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.problem import Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # From the two variables, the parameter "limit" and an interpretation, to the objective and the constraints.

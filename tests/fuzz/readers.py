@@ -20,7 +20,7 @@ from compare.study.steps import Steps
 from compare.study.study import Study, check_study
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
-from nlp_gait.problem.result import load_result
+from nlp_gait.problem import load_result
 from nlp_gait.robots import Robot, load_robot
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
 from tests.fuzz.trial import Misread

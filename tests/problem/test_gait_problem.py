@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem.registry import load, problem_names
+from nlp_gait.problem import load, problem_names
 from tests.backends.toys import corner, toy
 
 SINGLE_SUPPORT_NAMES = (

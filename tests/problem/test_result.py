@@ -7,8 +7,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.errors import InputError
-from nlp_gait.problem.result import load_result
-from nlp_gait.problem.sampled import sampled
+from nlp_gait.problem import load_result, sampled
 
 X = dict(
     zip(

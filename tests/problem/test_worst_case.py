@@ -7,8 +7,7 @@ from casadi import MX
 
 from nlp_gait import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.problem import Constraint, GaitProblem
 from nlp_gait.problem.worst_case import worst_case
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, row, toy

@@ -14,8 +14,8 @@ from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solvers.ipopt import WIDTHS, IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
-from nlp_gait.problem.registry import PROBLEMS, GaitProblem, load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, load
+from nlp_gait.problem.registry import PROBLEMS
 
 # Left out of all but the first test, with the reason.
 TRANSCRIBED = {

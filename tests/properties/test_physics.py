@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY, upright_links
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from

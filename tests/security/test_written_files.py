@@ -14,7 +14,7 @@ from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
 from nlp_gait.export.signals import write_npz
 from nlp_gait.files import new_file, write_text
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import Signals
 from nlp_gait.simulation.video import write_video
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import nlp_gait
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import Result
 
 GAITS = {
     # Gupta, Pratihar, Deb (2023), Table 6, and our optimum to the digits that the documentation prints.

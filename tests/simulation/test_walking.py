@@ -12,9 +12,7 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.sampled import finely_sampled
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Result, Signals, finely_sampled
 from nlp_gait.problems.nao.body import nao
 from nlp_gait.simulation.steps import step_of, walk
 

@@ -13,8 +13,7 @@ from compare.drawing.skeletons import skeleton_of
 from compare.drawing.stick_figure import stick_figure
 from compare.papers.nao.findings import ALGORITHMS, NAMES, Findings, PhaseFindings, Points
 from compare.papers.nao.paper import SWING_HEIGHT, SWING_POWER_W
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,7 @@ import numpy as np
 from compare.analysis.statistics.rank_sum_normal import RankSum, rank_sum_normal
 from compare.papers.nao.paper import PrintedPhase
 from compare.papers.nao.runs import Run, judged, power_with_legs_twice
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 ALGORITHMS = ("pso", "ga")
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}

@@ -20,7 +20,7 @@ from compare.study.parallel import Job, run_jobs
 from compare.study.steps import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.files import writable_folder
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 RUNS, EVALUATIONS, STARTS = 11, 10_000, 20
 LEVER_STARTS, SWEEP_STARTS = 5, 2

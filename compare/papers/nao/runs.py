@@ -20,8 +20,7 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, read_bytes
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.nao.body import PLANNED_JOINTS
 
 Run = dict[str, Any]

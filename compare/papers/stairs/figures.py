@@ -12,7 +12,7 @@ from compare.drawing.figures import legend_below, new_figure, save, style
 from compare.papers.stairs.motion import Leg, first_step, two_steps
 from compare.papers.stairs.paper import TABLE_4
 from compare.papers.stairs.runs import best_track, complete, plan_problem, tracked
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.robot import load_biped
 from nlp_gait.problems.stairs.stair import SETBACK

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.gait import Foot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
 from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.problems.stairs.governing import GOVERNING, plan_of

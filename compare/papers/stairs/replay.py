@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.loads import MOVING, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import biped_dynamics
 from nlp_gait.problems.stairs.robot import load_biped

@@ -15,8 +15,7 @@ from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
 from metaheuristics.interface import Algorithm
 from nlp_gait import IpoptSettings, compile_objective, load, solve
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.stairs.closed_loop import InverseKinematics
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.learned_path import LEGS

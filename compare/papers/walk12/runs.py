@@ -15,7 +15,7 @@ from compare.papers.walk12.paper import TABLE_4
 from compare.study.steps import Steps, fingerprint
 from metaheuristics import Algorithm, GeneticAlgorithm, ParticleSwarm
 from nlp_gait.backends.optima.continuation import Continuation
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.walk12.model import Zmp
 from nlp_gait.problems.walk12.problem import Horizon
 

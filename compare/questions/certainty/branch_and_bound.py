@@ -19,8 +19,7 @@ import numpy as np
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 

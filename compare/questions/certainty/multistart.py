@@ -14,8 +14,7 @@ import numpy as np
 from compare.study.steps import Steps, fingerprint
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 BATCH = 250
 

@@ -20,7 +20,7 @@ from compare.study.steps import Steps, fingerprint
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 # Branch and bound is for this many variables at most: its work grows exponentially with them.
 MOST_CERTIFIED = 4

@@ -14,7 +14,7 @@ from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.study.task import ProblemSpec
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

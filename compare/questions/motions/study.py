@@ -17,8 +17,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.symbolic.splines import finer

@@ -13,9 +13,8 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.registry import problem_maker
-from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.

@@ -12,7 +12,7 @@ from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from metaheuristics.interface import Array
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 MOST_CHALLENGES = 1000
 

@@ -13,8 +13,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 # The front ends where another hundredth of the criterion would cost ten times the least power.
 LARGEST_TRADE_OFF = 1000.0

@@ -15,7 +15,7 @@ from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.knees import Bends
 from compare.questions.pareto.search import SearchFront
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,7 +15,7 @@ from compare.study.steps import Steps, fingerprint
 from metaheuristics.interface import Array
 from metaheuristics.multi_objective import MultiObjective, minimize_many
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 # The corner that is dominated by every counted point, with the ranges of the true front as 1: a tenth beyond its worst values.
 REFERENCE = 1.1

@@ -16,7 +16,7 @@ from compare.questions.pareto.search import Scale, SearchFront, best_of_all, sea
 from compare.study.steps import Steps, fingerprint
 from metaheuristics.multi_objective import MultiObjective
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

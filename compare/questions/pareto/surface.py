@@ -16,7 +16,7 @@ from compare.questions.pareto.criteria import Criterion, criterion
 from compare.questions.pareto.front import front_ends
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitiv
 from nlp_gait.backends.solvers.ipopt import ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.perturbation import perturbed_name, quantities, split_name
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.robots.perturbation import perturbed_name, split_name
 
 # Limits for which a worst corner is looked for in one round, dearest violation first, one of each group of rows.

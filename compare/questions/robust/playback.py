@@ -11,7 +11,7 @@ import numpy as np
 from compare.questions.robust.study import Robust
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import averaged_pressure
 from nlp_gait.simulation.plan import SIDES, Plan, plan_of

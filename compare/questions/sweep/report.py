@@ -12,7 +12,7 @@ from compare.drawing.figures import COLOURS, new_figure, save, style
 from compare.drawing.labels import axis_label, quantity
 from compare.questions.sweep.study import SweepPoint
 from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from compare.study.task import IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
 
 MOST_POINTS = 10_000  # of an axis

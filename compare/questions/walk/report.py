@@ -11,9 +11,7 @@ import numpy as np
 from compare.drawing.figures import new_figure, save, style
 from compare.drawing.labels import axis_label
 from compare.questions.walk.study import Gait
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.result import Result
-from nlp_gait.problem.sampled import finely_sampled
+from nlp_gait.problem import GaitProblem, Result, finely_sampled
 from nlp_gait.problems.nao.body import nao
 from nlp_gait.problems.nao.cycle_motion import TIMES
 from nlp_gait.simulation.steps import walk

@@ -14,7 +14,7 @@ from compare.study.task import IPOPT, ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.files import csv_text, write_json, write_text
-from nlp_gait.problem.result import Result
+from nlp_gait.problem import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play

@@ -18,8 +18,7 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.ipopt import ipopt_for
 from nlp_gait.backends.solvers.nlpsol import claimed, solve_with
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import ActiveConstraint
 
 

@@ -12,8 +12,7 @@ from compare.study.record import History, RunRecord, Times
 from compare.study.runs.gradient_run import Outcome, record_of
 from compare.study.task import Task
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 # Forward differences in the scaled variables: the square root of the machine's precision.
 STEP = 1.5e-8

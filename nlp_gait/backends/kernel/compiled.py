@@ -16,8 +16,7 @@ from nlp_gait.backends.kernel.interpreted import InterpretedKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 LOG = logging.getLogger("nlp_gait")
 # Of a wrong library, not of rounding: compiled and interpreted values agree to some 1e-12.

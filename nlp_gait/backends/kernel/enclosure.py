@@ -15,8 +15,7 @@ import numpy as np
 from nlp_gait.backends.kernel.compiler import find_compiler
 from nlp_gait.backends.kernel.kernel_source import kernel_of
 from nlp_gait.backends.kernel.library_cache import load_library
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 SYMBOLS = ("nlp_gait_enclosure_bytes", "nlp_gait_enclose")
 FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")

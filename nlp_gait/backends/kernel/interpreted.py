@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.kernel_source import Kernel
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 
 # Candidates that one call of the virtual machine takes; more would only take more memory.
 BLOCK = 64

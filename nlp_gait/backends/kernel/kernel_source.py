@@ -9,8 +9,7 @@ from importlib.resources import files
 import casadi as ca
 
 from nlp_gait.backends.exact import ExactModel, exact_model
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
 

@@ -11,8 +11,7 @@ from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
 from nlp_gait.backends.solve import outcome_of, solution_of
 from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Solution
 
 

@@ -17,8 +17,7 @@ from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kk
 from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 # Tolerance at which IPOPT tells bounds with a price from those without one: at kinks of |power| both are small.
 SHARP = IpoptSettings(tolerance=1e-12)

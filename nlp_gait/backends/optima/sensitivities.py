@@ -18,8 +18,7 @@ import numpy as np
 from nlp_gait.backends.optima.kkt import column, kkt_functions, kkt_step
 from nlp_gait.backends.optima.optimum import WEAK, Optimum
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6

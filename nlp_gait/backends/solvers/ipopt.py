@@ -20,8 +20,7 @@ from nlp_gait.backends.solvers.ipopt_end import CONVERGED, End, Guess
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, TIME_IS_UP, IterationWatch
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Evaluations
 
 LOG = logging.getLogger("nlp_gait")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, TIME_IS_UP
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problem.solution import Evaluations
 
 STATUS_WORDS = {

@@ -24,8 +24,7 @@ from nlp_gait.backends.solvers.ipopt import WIDTHS
 from nlp_gait.backends.solvers.ipopt_end import STATUS_WORDS
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Evaluations
 
 # Options that keep each solver from printing; a solver joins by a line here.

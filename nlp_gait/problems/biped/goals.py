@@ -9,7 +9,7 @@ from typing import Protocol
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem.assembly import Objective, Parameter, Point
+from nlp_gait.problem import Objective, Parameter, Point
 from nlp_gait.problems.biped.samples import Samples, time_mean
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 

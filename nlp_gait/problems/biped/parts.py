@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem.assembly import Constraint, InstantPoint, Parameter, Point
+from nlp_gait.problem import Constraint, InstantPoint, Parameter, Point
 from nlp_gait.problems.biped.samples import Samples, Trace, labels
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

@@ -11,9 +11,18 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import Assembly, InstantPoint, NumericPoint, Parameter, Point, Variable
-from nlp_gait.problem.gait_problem import Grid
-from nlp_gait.problem.signals import Array, Signals, in_space
+from nlp_gait.problem import (
+    Array,
+    Assembly,
+    Grid,
+    InstantPoint,
+    NumericPoint,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+    in_space,
+)
 from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Part
 from nlp_gait.problems.biped.samples import LEAST_DURATION, Samples, Trace

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import InstantPoint
+from nlp_gait.problem import InstantPoint
 
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
 

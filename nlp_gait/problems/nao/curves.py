@@ -14,9 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.assembly import InstantPoint, Variable
-from nlp_gait.problem.gait_problem import Grid
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Grid, InstantPoint, Variable
 from nlp_gait.problems.biped.parts import AngleLimits
 from nlp_gait.problems.nao.body import arm_joints, hip_motion
 from nlp_gait.robots import Robot

@@ -12,10 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from nlp_gait.problem.assembly import Objective
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
 from nlp_gait.problems.biped.goals import MeanPower
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao

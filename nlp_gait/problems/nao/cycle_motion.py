@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from casadi import SX, fmax, vertcat
 
-from nlp_gait.problem.assembly import InstantPoint, Variable
+from nlp_gait.problem import InstantPoint, Variable
 from nlp_gait.problems.biped.parts import REACH_MARGIN
 from nlp_gait.problems.biped.phase import Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION

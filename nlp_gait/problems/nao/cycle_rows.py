@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem.assembly import Assembly, Constraint, Parameter, Point, Variable
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Assembly, Constraint, Parameter, Point, Signals, Variable
 from nlp_gait.problems.biped.parts import MARGIN_SCALE, TORQUE_SCALE, Margins
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.samples import LEAST_DURATION

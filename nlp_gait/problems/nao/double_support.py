@@ -12,11 +12,7 @@ from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 import casadi as ca
 from casadi import DM, MX, SX, fmax, vertcat
 
-from nlp_gait.problem.assembly import InstantPoint, Variable
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.playback import Support
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import GaitProblem, InstantPoint, Signals, Support, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
 from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION

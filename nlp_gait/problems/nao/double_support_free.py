@@ -7,9 +7,7 @@ from collections.abc import Mapping
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem.assembly import Constraint, InstantPoint, Point
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
+from nlp_gait.problem import Constraint, GaitProblem, Grid, InstantPoint, Point, maker
 from nlp_gait.problems.biped.goals import MeanPower
 from nlp_gait.problems.biped.parts import ANGLE_SCALE, REACH_MARGIN, AngleLimits, Contribution, Part
 from nlp_gait.problems.biped.phase import Phase, Plan

@@ -17,8 +17,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import Constraint, InstantPoint, Point
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Constraint, InstantPoint, Point, Signals
 from nlp_gait.problems.biped.parts import (
     HEIGHT_SCALE,
     REACH_MARGIN,

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Variable
+from nlp_gait.problem import Variable
 from nlp_gait.robots import Joint, Robot
 from nlp_gait.robots.robot import Vector
 

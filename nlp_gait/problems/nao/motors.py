@@ -22,7 +22,7 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem.assembly import Constraint, Parameter, Point
+from nlp_gait.problem import Constraint, Parameter, Point
 from nlp_gait.problems.biped.goals import HEAT_LOSS, Draw
 from nlp_gait.problems.biped.parts import ANGLE_SCALE, TORQUE_SCALE, Contribution, Part
 from nlp_gait.problems.biped.samples import Samples, labels, time_mean

@@ -8,10 +8,7 @@ from typing import Literal
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Assembly, Point
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.playback import Playback, Support
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Assembly, GaitProblem, Playback, Point, Signals, Support
 from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal, MeanPower
 from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.problems.biped.phase import Phase

@@ -7,11 +7,7 @@ from typing import NamedTuple
 
 from casadi import MX, SX, fmax, vertcat
 
-from nlp_gait.problem.assembly import InstantPoint, Point, Variable
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.playback import Support
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import GaitProblem, InstantPoint, Point, Signals, Support, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION

@@ -8,9 +8,7 @@ from functools import cache
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, Grid, maker
 from nlp_gait.problems.biped.goals import MeanPower
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory

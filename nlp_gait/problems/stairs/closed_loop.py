@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import Point
+from nlp_gait.problem import Point
 from nlp_gait.problems.stairs.formulas.loads import LEAST_LOAD, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
 from nlp_gait.problems.stairs.formulas.posture import posture

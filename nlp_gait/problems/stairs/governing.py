@@ -7,7 +7,7 @@ import math
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem.assembly import Parameter, Point, Variable
+from nlp_gait.problem import Parameter, Point, Variable
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.stair import within
 

@@ -7,11 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import NumericPoint, Objective, Parameter
+from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Parameter, Signals, maker
 from nlp_gait.problem.blocks import Block, Layout
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.problems.stairs.ideal_model import IdealModel
 from nlp_gait.problems.stairs.ideal_start import planned_angles

@@ -11,9 +11,8 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import Assembly, Constraint, Point
+from nlp_gait.problem import Array, Assembly, Constraint, Point
 from nlp_gait.problem.blocks import Layout, labels
-from nlp_gait.problem.signals import Array
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, Loads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.formulas.profile import Stair

@@ -12,7 +12,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.leg_network import network_error
 
 Rule = Literal["gradient", "adam"]

@@ -10,10 +10,19 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import (
+    Array,
+    Assembly,
+    GaitProblem,
+    Grid,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+    maker,
+)
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN

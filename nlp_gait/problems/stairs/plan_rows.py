@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from casadi import DM, MX
 
-from nlp_gait.problem.assembly import Constraint, Point
+from nlp_gait.problem import Constraint, Point
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import MOVING

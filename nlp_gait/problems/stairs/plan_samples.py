@@ -10,8 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem.assembly import Point
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Point
 from nlp_gait.problems.stairs.formulas.gait import PHASES, StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, Signals
 from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS

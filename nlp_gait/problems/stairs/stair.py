@@ -5,8 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem.assembly import Parameter, Point, Variable
-from nlp_gait.problem.signals import Array, Columns, in_space
+from nlp_gait.problem import Array, Columns, Parameter, Point, Variable, in_space
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.profile import Stair
 

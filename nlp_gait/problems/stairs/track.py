@@ -9,10 +9,18 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import NumericPoint, Objective, Parameter, Point, Variable
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Array, Columns, Signals
+from nlp_gait.problem import (
+    Array,
+    Columns,
+    GaitProblem,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+    maker,
+)
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem.assembly import Assembly, Constraint, Point
+from nlp_gait.problem import Assembly, Constraint, Point
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, N, Rollout
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem.signals import Array, Columns, Signals, in_space
+from nlp_gait.problem import Array, Columns, Signals, in_space
 from nlp_gait.problems.walk12.model import Zmp, legs, mass_motion, masses, zero_moment_point
 from nlp_gait.problems.walk12.robot import PointMassBiped
 from nlp_gait.symbolic.nonsmooth import Exact

@@ -10,10 +10,19 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Assembly, Constraint, NumericPoint, Objective, Parameter, Point, Variable
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.registry import maker
-from nlp_gait.problem.signals import Signals
+from nlp_gait.problem import (
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Grid,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+    maker,
+)
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp, legs, reaches, zero_moment_point
 from nlp_gait.problems.walk12.robot import PointMassBiped, load_biped

@@ -10,9 +10,7 @@ from casadi import MX
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 

@@ -15,8 +15,7 @@ from nlp_gait.backends.optima.sensitivities import model_sensitivities, paramete
 from nlp_gait.backends.solvers.ipopt import ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

@@ -15,7 +15,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import CONVERGED, STATUS_WORDS, End, Guess
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
-from nlp_gait.problem.assembly import Constraint
+from nlp_gait.problem import Constraint
 from nlp_gait.problem.solution import Evaluations
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, corner, row, toy

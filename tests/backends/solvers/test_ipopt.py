@@ -14,8 +14,7 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem.assembly import Constraint
-from nlp_gait.problem.registry import GaitProblem, load
+from nlp_gait.problem import Constraint, GaitProblem, load
 from nlp_gait.problem.solution import Solution, StartOutcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, toy

@@ -15,7 +15,7 @@ from compare.questions.certainty.multistart import Ends, multistart
 from compare.questions.certainty.report import write_certainty
 from compare.questions.certainty.study import certainty
 from nlp_gait.errors import InputError
-from nlp_gait.problem.assembly import Constraint
+from nlp_gait.problem import Constraint
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 

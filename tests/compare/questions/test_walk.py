@@ -16,7 +16,7 @@ from compare.questions.walk.report import write_figures
 from compare.questions.walk.study import Gait, optimal_gaits, result_of, solves, walk_csv, write_walk
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.interrupts import Interrupted
-from nlp_gait.problem.result import load_result
+from nlp_gait.problem import load_result
 
 # Fewer samples than those of ten intervals: what is tested here is what is done with the gaits.
 SPEC = ProblemSpec(name="nao-cycle", options={"objective": "power", "intervals": 3})

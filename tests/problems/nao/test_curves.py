@@ -12,8 +12,7 @@ import pytest
 from nlp_gait.backends.exact import exact_model, row_violations
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.symbolic.splines import finer
 

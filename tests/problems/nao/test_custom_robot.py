@@ -14,8 +14,7 @@ import pytest
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.solution import Solution
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.legs import LegGeometry, leg_geometry

@@ -7,8 +7,7 @@ import pytest
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.robots import load_robot

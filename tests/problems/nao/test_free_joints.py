@@ -9,8 +9,7 @@ import pytest
 
 from nlp_gait.backends.exact import exact_model, row_violations
 from nlp_gait.errors import InputError
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.robots import load_robot

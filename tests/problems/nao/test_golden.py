@@ -16,8 +16,7 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problems.nao.double_support import TorsoShare, torso_shares
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))

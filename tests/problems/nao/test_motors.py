@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 from nlp_gait import load, solve
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem.registry import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.nao.motors import ANKLE_ROLL, ankle_roll
 from nlp_gait.robots import load_robot
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem.registry import GaitProblem, load
-from nlp_gait.problem.signals import Array, Signals
+from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import Standing, floating_model, stand

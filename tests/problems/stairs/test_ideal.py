@@ -8,7 +8,7 @@ import pytest
 import nlp_gait
 from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 # Optima of an independent prototype of the same formulation, cases of Table IV.
 KNOWN = {1: 43.95, 2: 42.82, 3: 46.02}

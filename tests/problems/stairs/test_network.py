@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.network import NetworkSettings, network_angles
 
 THIGH = SHANK = 0.4

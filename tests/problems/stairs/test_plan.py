@@ -9,7 +9,7 @@ import nlp_gait
 from compare.judge import evaluate
 from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 
 # Best of 20 starts, case 2 of Table IV.
 BEST_ENERGY_J = 110.880

@@ -9,8 +9,7 @@ import nlp_gait
 from metaheuristics import AntColony, minimize
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.

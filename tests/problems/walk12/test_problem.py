@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.robot import load_biped
 from tests.problems.walk12 import oracle
