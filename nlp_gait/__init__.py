@@ -3,12 +3,26 @@
 ``load`` makes a problem, ``solve`` gives it to IPOPT, ``compile_objective`` gives its exact functions to search algorithms.
 """
 
-from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from nlp_gait.errors import GaitError
 from nlp_gait.problem import GaitProblem, load, problem_names
-from nlp_gait.problem.solution import Solution
+
+if TYPE_CHECKING:
+    from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+    from nlp_gait.backends.solve import solve
+    from nlp_gait.backends.solvers.ipopt import IpoptSettings
+    from nlp_gait.problem.solution import Solution
+
+# Imported when first used: a search needs no NLP solver, and a solve no kernel.
+_LATER = {
+    "CompiledObjective": "nlp_gait.backends.kernel.compiled",
+    "compile_objective": "nlp_gait.backends.kernel.compiled",
+    "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
+    "Solution": "nlp_gait.problem.solution",
+    "solve": "nlp_gait.backends.solve",
+}
 
 __all__ = [
     "CompiledObjective",
@@ -21,3 +35,10 @@ __all__ = [
     "problem_names",
     "solve",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """What is imported when first used."""
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_LATER[name]), name)

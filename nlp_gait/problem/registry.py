@@ -14,15 +14,15 @@ from nlp_gait.problem.gait_problem import GaitProblem, is_number
 
 # Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
-    "nao-ssp": ("nao.single_support", "nao_ssp"),
-    "nao-dsp": ("nao.double_support", "nao_dsp"),
-    "nao-ssp-free": ("nao.single_support_free", "nao_ssp_free"),
-    "nao-dsp-free": ("nao.double_support_free", "nao_dsp_free"),
-    "nao-cycle": ("nao.cycle", "nao_cycle"),
-    "walk12": ("walk12.problem", "walk12"),
-    "stairs-plan": ("stairs.plan", "stairs_plan"),
-    "stairs-track": ("stairs.track", "stairs_track"),
-    "stairs-ideal": ("stairs.ideal", "stairs_ideal"),
+    "nao-ssp": "nlp_gait.problems.nao.single_support:nao_ssp",
+    "nao-dsp": "nlp_gait.problems.nao.double_support:nao_dsp",
+    "nao-ssp-free": "nlp_gait.problems.nao.single_support_free:nao_ssp_free",
+    "nao-dsp-free": "nlp_gait.problems.nao.double_support_free:nao_dsp_free",
+    "nao-cycle": "nlp_gait.problems.nao.cycle:nao_cycle",
+    "walk12": "nlp_gait.problems.walk12.problem:walk12",
+    "stairs-plan": "nlp_gait.problems.stairs.plan:stairs_plan",
+    "stairs-track": "nlp_gait.problems.stairs.track:stairs_track",
+    "stairs-ideal": "nlp_gait.problems.stairs.ideal:stairs_ideal",
 }
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
@@ -78,8 +78,8 @@ def problem_maker(name: str) -> Maker:
     """
     if name not in PROBLEMS:
         raise unknown("problem", name, PROBLEMS)
-    module, function = PROBLEMS[name]
-    make: Maker = getattr(importlib.import_module(f"nlp_gait.problems.{module}"), function)
+    module, _, function = PROBLEMS[name].partition(":")
+    make: Maker = getattr(importlib.import_module(module), function)
     return make
 
 
