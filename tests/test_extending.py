@@ -95,7 +95,11 @@ def test_a_problem_is_one_function_and_one_line(monkeypatch: pytest.MonkeyPatch)
     problem = nlp_gait.load("hopping-foot", intervals=10)
     assert problem.options == {"intervals": 10}
     solution = nlp_gait.solve(problem, starts=2)
-    assert solution.success and solution.x[LIFT] == pytest.approx(0.03, abs=1e-6) and solution.x[TIME] == pytest.approx(2.0)
+    assert (
+        solution.success
+        and solution.x[LIFT] == pytest.approx(0.03, abs=1e-6)
+        and solution.x[TIME] == pytest.approx(2.0)
+    )
     verdict = evaluate(problem, problem.check_x(solution.x))
     assert verdict.feasible and verdict.dense_intervals == 1000
     assert problem.signals(solution.x).arrays["q"].max() == pytest.approx(0.03, abs=1e-6)

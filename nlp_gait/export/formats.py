@@ -11,7 +11,6 @@ from nlp_gait.export.tables import write_csv, write_json
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import write_text
 from nlp_gait.problem import Result, sampled
-from nlp_gait.robots import load_robot
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import free_model
 from nlp_gait.simulation.plan import plan_of
@@ -52,10 +51,10 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
 
 def _motor_set_points(result: Result, period_ms: int) -> SetPoints:
     """Set-points, if their joints are those of a robot."""
-    robot = result.problem.options.get("robot")
-    if not isinstance(robot, str):
+    robot = result.problem.robot
+    if robot is None:
         raise InputError(f"problem {result.problem.name!r} has no robot with motors; export it as csv or json")
     points = set_points(result, period_ms)
     for joint in points.joints:
-        load_robot(robot).joint(joint)
+        robot.joint(joint)
     return points
