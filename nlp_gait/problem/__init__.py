@@ -11,7 +11,7 @@ from nlp_gait.problem.assembly import (
     Variable,
 )
 from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.playback import Playback, Support
+from nlp_gait.problem.playback import Playback
 from nlp_gait.problem.registry import load, maker, problem_names
 from nlp_gait.problem.result import Result, load_result
 from nlp_gait.problem.sampling import finely_sampled, sampled
@@ -32,7 +32,6 @@ __all__ = [
     "Point",
     "Result",
     "Signals",
-    "Support",
     "Variable",
     "finely_sampled",
     "in_space",

@@ -14,7 +14,6 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # Histories with a column for each joint.
 JOINT_UNITS = {"q": "rad", "qd": "rad/s", "qdd": "rad/s^2", "tau": "Nm"}
-SPACE = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)

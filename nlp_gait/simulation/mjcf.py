@@ -21,19 +21,6 @@ FLOOR = "floor"
 Shapes = Mapping[str, Sequence[Shape]]
 
 
-def fixed_model(tree: Sequence[Body], gravity: float) -> str:
-    """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to.
-
-    Args:
-        tree: bodies, parents first.
-        gravity: [m/s^2], along -z.
-    """
-    root, option = _document("fixed", gravity)
-    Xml.SubElement(option, "flag", constraint="disable")
-    _add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, free=False)
-    return _text(root)
-
-
 def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, friction: float = FRICTION) -> str:
     """The whole robot on a floor, driven by position servos; every shape can touch the floor, and nothing else.
 
@@ -44,7 +31,7 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
         gravity: [m/s^2], along -z.
         friction: coefficient of sliding friction between robot and floor.
     """
-    root, option = _document(robot.name, gravity)
+    root, option = document(robot.name, gravity)
     Xml.SubElement(option, "flag", autoreset="disable")  # a simulation that diverges must show it
     Xml.SubElement(
         Xml.SubElement(root, "default"),
@@ -60,7 +47,7 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
     world = Xml.SubElement(root, "worldbody")
     Xml.SubElement(world, "light", pos="0.6 -1 2", dir="-0.3 0.5 -1", diffuse="0.7 0.7 0.7")
     Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
-    bodies = _add_bodies(world, tree_from(robot, robot.root), shapes, free=True)
+    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, free=True)
     for side, foot in robot.feet.items():
         Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
     actuators = Xml.SubElement(root, "actuator")
@@ -68,10 +55,11 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
         limit = drive.torque_limit(joint)
         actuator = Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit))
         actuator.attrib |= {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
-    return _text(root)
+    return text_of(root)
 
 
-def _document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
+def document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
+    """Root and options of an empty model."""
     root = Xml.Element("mujoco", model=name)
     Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
     option = Xml.SubElement(
@@ -100,7 +88,7 @@ def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
                 Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
 
 
-def _add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free: bool) -> dict[str, Xml.Element]:
+def add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free: bool) -> dict[str, Xml.Element]:
     """Bodies nested as in the tree, each with its frame at its reference point; elements by link."""
     elements: list[Xml.Element] = []
     for body in tree:
@@ -139,6 +127,7 @@ def _numbers(*values: float) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _text(root: Xml.Element) -> str:
+def text_of(root: Xml.Element) -> str:
+    """A model as MuJoCo reads it."""
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"

@@ -23,7 +23,6 @@ JOINTS = tuple(
     f"{side}{joint}" for part in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in part
 )
 PLANNED_JOINTS = tuple(f"{side}{joint}" for side in "LR" for joint in LEG_JOINTS)
-HEAD_JOINTS = ("HeadYaw", "HeadPitch")
 HELD_ARM_ANGLES = {  # section 3.1 [rad]
     "LShoulderRoll": 0.26,
     "RShoulderRoll": -0.26,

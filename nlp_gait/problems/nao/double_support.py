@@ -6,13 +6,12 @@ torso, which depends on where the hip is between the feet.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
-import casadi as ca
 from casadi import DM, MX, SX, fmax, vertcat
 
-from nlp_gait.problem import GaitProblem, InstantPoint, Signals, Support, Variable, maker
+from nlp_gait.problem import GaitProblem, InstantPoint, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
 from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
@@ -95,25 +94,8 @@ def nao_dsp(
         "NAO, double support: least mean power",
         phase,
         robot,
-        on_both_feet(model, torso_share),
         start=splines.start_of(phase.names),
     )
-
-
-def on_both_feet(robot: Robot, rule: TorsoShare) -> Callable[[Signals], tuple[Support, ...]]:
-    """Each foot carries its own leg and arm, and its share of the torso (eqs. 28, 29)."""
-
-    def supports(signals: Signals) -> tuple[Support, ...]:
-        feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
-        hip = SX.sym("hip")
-        shares = ca.Function("shares", [hip], list(torso_shares(hip, rule, feet_y).values()))
-        carried = [share.full().ravel() for share in shares(signals.arrays["hip"][:, 1])]
-        return tuple(
-            Support(foot=foot, joints=_joints_on(side), torso_share=share)
-            for (side, foot), share in zip(BOTH_FEET.items(), carried, strict=True)
-        )
-
-    return supports
 
 
 def _joints_on(side: str) -> tuple[str, ...]:

@@ -31,7 +31,6 @@ from nlp_gait.problems.nao.double_support import (
     double_support_loads,
     double_support_margins,
     double_support_mean_margins,
-    on_both_feet,
     soles_of,
     standing_ankles,
     support_box,
@@ -113,7 +112,6 @@ def nao_dsp_free(
         "NAO, double support with a leaning torso: least mean power",
         phase,
         robot,
-        on_both_feet(model, torso_share),
         start=splines.start_of(phase.names),
         searchable=False,
     )

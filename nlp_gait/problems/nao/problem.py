@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Assembly, GaitProblem, Playback, Point, Signals, Support
+from nlp_gait.problem import Array, Assembly, GaitProblem, Playback, Point
 from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal, MeanPower
 from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.problems.biped.phase import Phase
@@ -47,7 +47,6 @@ def phase_problem(
     title: str,
     phase: Phase,
     robot: str,
-    supports: Callable[[Signals], tuple[Support, ...]],
     *,
     start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
     searchable: bool = True,
@@ -59,7 +58,6 @@ def phase_problem(
         title: one line.
         phase: with its parts and its goal.
         robot: name or file of the robot, with all its joints.
-        supports: how the model divides the robot among its feet.
         start: start point; None for one within the bounds.
         searchable: False for a problem that only gradient methods can solve.
     """
@@ -81,18 +79,15 @@ def phase_problem(
         searchable=searchable,
         robot=load_robot(robot),
         skeleton=skeleton(load_robot(robot)),
-        playback=playback(robot, supports=supports),
+        playback=playback(robot),
     )
 
 
-def playback(
-    robot: str, *, repeats: bool = False, supports: Callable[[Signals], tuple[Support, ...]] | None = None
-) -> Playback:
+def playback(robot: str, *, repeats: bool = False) -> Playback:
     """How a gait of a robot, by name or file, is played."""
     return Playback(
         robot=nao(robot, rotational_inertia=True),
         gravity=GRAVITY,
         heat_loss=HEAT_LOSS.name,
         repeats=repeats,
-        supports=supports,
     )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from casadi import MX, SX, fmax, vertcat
 
-from nlp_gait.problem import GaitProblem, InstantPoint, Point, Signals, Support, Variable, maker
+from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
@@ -99,14 +99,8 @@ def nao_ssp(
         "NAO, single support: least mean power",
         phase,
         robot,
-        on_left_foot,
         start=splines.start_of(phase.names),
     )
-
-
-def on_left_foot(signals: Signals) -> tuple[Support, ...]:
-    """The left foot carries the whole robot."""
-    return (Support(foot="left"),)
 
 
 class Stance(NamedTuple):

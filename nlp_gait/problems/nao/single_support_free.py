@@ -20,7 +20,6 @@ from nlp_gait.problems.nao.single_support import (
     OWN_VARIABLES,
     UNITS,
     nao_ssp,
-    on_left_foot,
     single_support_duration,
     single_support_loads,
     single_support_margins,
@@ -94,7 +93,6 @@ def nao_ssp_free(
         "NAO, single support with free joints: least mean power",
         phase,
         robot,
-        on_left_foot,
         start=start,
         searchable=False,
     )

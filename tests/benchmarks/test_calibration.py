@@ -6,9 +6,9 @@ import pytest
 pytest.importorskip("mujoco")
 
 import nlp_gait  # noqa: E402
+from benchmarks.calibration import calibrate, random_gait, shortest_true_s  # noqa: E402
 from compare.judge import evaluate  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
-from nlp_gait.simulation.calibration import calibrate, random_gait, shortest_true_s  # noqa: E402
 
 
 def test_gaits_are_feasible_seeded_and_go_from_slow_to_fast():
@@ -25,7 +25,7 @@ def test_gaits_are_feasible_seeded_and_go_from_slow_to_fast():
 
 
 def test_a_duration_without_feasible_gaits_is_an_error(monkeypatch):
-    monkeypatch.setattr("nlp_gait.simulation.calibration.DRAWS", 1)
+    monkeypatch.setattr("benchmarks.calibration.DRAWS", 1)
     with pytest.raises(InputError, match=r"none of 2000 .* double_support_time_s = 0.2"):
         random_gait(nlp_gait.load("nao-dsp"), "double_support_time_s", 0.2, np.random.default_rng(0))
 

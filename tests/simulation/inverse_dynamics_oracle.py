@@ -1,0 +1,70 @@
+"""The engine's own inverse dynamics of a planned motion: an oracle for the model's torques."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as Xml
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.problem import Array, Result, Signals
+from nlp_gait.problems.biped.phase import BOTH_FEET
+from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.double_support import torso_shares
+from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.mjcf import add_bodies, document, text_of
+
+
+def engine_torques(result: Result, signals: Signals) -> Array:
+    """Torques (T, J) that MuJoCo needs for the planned angles, rates and accelerations, supporting feet fixed [Nm].
+
+    A phase on one foot is one tree. In double support the model parts the robot in two, each half on its own foot with a share
+    of the torso (eqs. 28, 29); so does this.
+
+    Args:
+        result: gait of ``nao-ssp`` or ``nao-dsp``, with rotational inertia: an engine takes no point masses.
+        signals: its time histories.
+    """
+    options = result.problem.options
+    robot = nao(str(options["robot"]), rotational_inertia=True)
+    torques = np.zeros_like(signals.arrays["tau"])
+    if result.problem.name == "nao-ssp":
+        _fill(torques, tree_from(robot, robot.feet["left"].link), signals)
+        return torques
+    hip = SX.sym("hip")
+    feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
+    by_side = torso_shares(hip, options["torso_share"], feet_y)  # type: ignore[arg-type]
+    for side, foot in BOTH_FEET.items():
+        tree = tree_from(robot, robot.feet[foot].link, [j for j in signals.joints if j.startswith(side)])
+        share = ca.Function("share", [hip], [by_side[side]])(signals.arrays["hip"][:, 1]).full().ravel()
+        _fill(torques, tree, signals, robot.root, share)
+    return torques
+
+
+def _fill(
+    torques: Array, tree: Sequence[Body], signals: Signals, shared: str | None = None, share: Array | None = None
+) -> None:
+    """Write the torques of a tree's joints into their columns; ``share`` (T,) scales mass and inertia of one link."""
+    engine = mujoco()
+    model = engine.MjModel.from_xml_string(fixed_model(tree))
+    data = engine.MjData(model)
+    columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
+    body = None if shared is None else model.body(shared)
+    whole = None if body is None else (float(body.mass[0]), body.inertia.copy())
+    for k in range(len(torques)):
+        if body is not None and whole is not None and share is not None:
+            body.mass[0], body.inertia[:] = share[k] * whole[0], share[k] * whole[1]
+        data.qpos[:], data.qvel[:], data.qacc[:] = (signals.arrays[name][k, columns] for name in ("q", "qd", "qdd"))
+        engine.mj_inverse(model, data)
+        torques[k, columns] = data.qfrc_inverse
+
+
+def fixed_model(tree: Sequence[Body]) -> str:
+    """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to."""
+    root, option = document("fixed", GRAVITY)
+    Xml.SubElement(option, "flag", constraint="disable")
+    add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, free=False)
+    return text_of(root)
