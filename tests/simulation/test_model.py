@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.problems.nao.body import GRAVITY, HEAD_JOINTS
+from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.conditions import Conditions
@@ -16,6 +16,7 @@ from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import free_model
 from nlp_gait.simulation.shapes import Prism, link_shapes
 
+HEAD_JOINTS = ("HeadYaw", "HeadPitch")
 NAO = load_robot("nao-v5")
 
 
