@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from nlp_gait.problem import GaitProblem
+
 
 def axis_label(name: str, unit: str) -> str:
     """Label of an axis, for example ``hip height [m]``."""
@@ -20,3 +22,9 @@ def name_in_words(name: str, unit: str) -> str:
         if name.endswith(f".{end}"):
             return f"{end} bound of {name_in_words(name.removesuffix(f'.{end}'), unit)}"
     return name.removesuffix("_" + unit.replace("/", "_").replace("^", "")).replace("_", " ")
+
+
+def units_of(problem: GaitProblem) -> dict[str, str]:
+    """Units of a problem's variables and parameters, by name."""
+    variables = {variable.name: variable.unit for variable in problem.variables}
+    return variables | {parameter.name: parameter.unit for parameter in problem.parameters}

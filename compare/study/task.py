@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -49,6 +49,10 @@ class ProblemSpec:
     def title(self) -> str:
         """Label, or name without one."""
         return self.label or self.name
+
+    def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
+        """The same with other options beside those that it has."""
+        return replace(self, options={**self.options, **options})
 
     def load(self) -> GaitProblem:
         """The problem, built once in each process."""
@@ -132,7 +136,7 @@ class Task:
         problem = self.problem.load()
         named = isinstance(self.algorithm, str)
         parts: dict[str, Any] = {
-            "problem": {"name": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)},
+            "problem": {"name": problem.name, **made_with(problem)},
             "objective": asdict(problem.objective),
             "algorithm": self.algorithm if named else plain_settings(self.algorithm),
             "settings": dict(self.settings),
@@ -191,6 +195,11 @@ def check_task(task: Task) -> None:
         )
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
+
+
+def made_with(problem: GaitProblem) -> dict[str, Any]:
+    """Options and changed parameter values of a problem, as plain data."""
+    return {"options": dict(problem.options), "parameters": dict(problem.values)}
 
 
 def plain_settings(settings: Any) -> dict[str, Any]:

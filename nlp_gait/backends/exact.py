@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,6 +16,26 @@ from nlp_gait.symbolic.nonsmooth import Exact
 
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6
+
+
+class ExactValues(NamedTuple):
+    """Exact values at a point.
+
+    Attributes:
+        cost: sign * objective: what is minimised.
+        violation: sum over all rows, each divided by its scale; NaN if a row is.
+        g: (m,) rows, the bounds of the variables last.
+        lower: (m,).
+        upper: (m,).
+        indexes: performance figures by name.
+    """
+
+    cost: float
+    violation: float
+    g: Array
+    lower: Array
+    upper: Array
+    indexes: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,6 +56,14 @@ class ExactModel:
     row_units: tuple[str, ...]
     row_scales: Array
     index_names: tuple[str, ...]
+
+    def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
+        """Values at x (n,) and parameter values p (k,)."""
+        cost, violation, g, lower, upper, indexes = (
+            np.array(value).ravel() for value in self.function(np.asarray(x), p)
+        )
+        named = dict(zip(self.index_names, indexes.tolist(), strict=True))
+        return ExactValues(float(cost[0]), float(violation[0]), g, lower, upper, named)
 
 
 def exact_model(problem: GaitProblem) -> ExactModel:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from compare.cli.common import AsJson, Seed, command, fail, print_json, print_table, progress_bar, stdout
+from compare.cli.common import AsJson, Seed, command, fail, progress_bar
+from compare.cli.questions.answers import hand_out
 from compare.cli.resumable import resumable
-
-if TYPE_CHECKING:
-    from compare.questions.motions.study import Motion
 
 
 @command
@@ -38,20 +36,16 @@ def motions(
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """
-    from compare.questions.motions.report import write_motions
+    from compare.questions.motions.report import motions_answer
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
     from nlp_gait.files import writable_folder
 
     folder = writable_folder(out)
     study = tasks(problem, orders=_names(orders), free_orders=_names(free_orders), robot=robot, starts=starts)
-    with resumable(folder, f"motions/{problem}-*.json"), progress_bar("motions", len(study)) as advance:
-        found = run(study, folder / "motions", seed=seed, progress=advance)
-    written = write_motions(folder, found, problem)
-    if as_json:
-        print_json({"problem": problem, "motions": [m.to_json() for m in found], "files": [str(p) for p in written]})
-    else:
-        _print(problem, found, written)
+    with resumable(folder), progress_bar("motions", len(study)) as advance:
+        found = run(study, folder, seed=seed, progress=advance)
+    hand_out(motions_answer(found, problem), folder, as_json)
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))
@@ -59,13 +53,3 @@ def motions(
 
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _print(problem: str, found: list[Motion], written: list[Path]) -> None:
-    from compare.questions.motions.report import HEADER, rows, sentences
-
-    print_table(f"{problem}: richer motions", HEADER, rows(found))
-    for sentence in sentences(found):
-        stdout.print(sentence, soft_wrap=True)
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)

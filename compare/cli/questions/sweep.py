@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -21,17 +19,13 @@ from compare.cli.common import (
     Set,
     command,
     end_interrupted,
-    print_json,
-    print_table,
     problem_spec,
     progress_bar,
-    stdout,
 )
-from nlp_gait.errors import OutputError
+from compare.cli.questions.answers import hand_out
 
 if TYPE_CHECKING:
     from compare.questions.sweep.study import SweepPoint
-    from nlp_gait.problem.gait_problem import GaitProblem
 
 
 @command
@@ -55,7 +49,7 @@ def sweep(
 
     Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
     """
-    from compare.questions.sweep.report import write_sweep
+    from compare.questions.sweep.report import sweep_answer
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
     from nlp_gait.backends.interrupts import Interrupted
@@ -74,40 +68,13 @@ def sweep(
                 starts=starts,
                 evaluations=evaluations,
                 seed=seed,
-                progress=lambda: advance(""),
+                progress=advance,
             )
         except Interrupted as interrupt:
             points, stopped = cast("list[SweepPoint]", interrupt.partial), interrupt.sentence
             if not points:
                 end_interrupted(f"{stopped}; nothing was written")
-    loaded = spec.load()
-    written: list[Path] = []
-    unwritten: OutputError | None = None
-    try:
-        written = write_sweep(folder, points, loaded, algorithm)
-    except OutputError as error:  # the points are printed all the same
-        unwritten = error
-    if as_json:
-        print_json({"problem": problem, "points": [asdict(p) for p in points], "files": [str(p) for p in written]})
-    else:
-        _print(points, loaded, algorithm, written)
-    if unwritten is not None:
-        raise unwritten
+    hand_out(sweep_answer(points, spec.load(), algorithm), folder, as_json)
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
         end_interrupted(f"{stopped}; these are in {folder}{not_twice}")
-
-
-def _print(points: Sequence[SweepPoint], loaded: GaitProblem, algorithm: str, written: Sequence[Path]) -> None:
-    header = (*points[0].at, loaded.objective.name, "status")
-    rows = [
-        (
-            *(f"{v:g}" for v in p.at.values()),
-            f"{p.objective:.6f} {loaded.objective.unit}" if p.feasible else "-",
-            p.status,
-        )
-        for p in points
-    ]
-    print_table(f"{loaded.name} by {algorithm}", header, rows)
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -19,16 +18,13 @@ from compare.cli.common import (
     command,
     end_interrupted,
     fail,
-    print_json,
-    print_table,
     problem_spec,
     progress_bar,
-    stdout,
 )
+from compare.cli.questions.answers import hand_out
 
 if TYPE_CHECKING:
     from compare.questions.walk.study import Gait
-    from nlp_gait.simulation.walking import Walk
 
 
 @command
@@ -58,8 +54,8 @@ def walk(
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
     from compare.questions.sweep.study import parse_axis
-    from compare.questions.walk.report import write_figures
-    from compare.questions.walk.study import CYCLE, optimal_gaits, played, result_of, solves, write_walk
+    from compare.questions.walk.report import walk_answer
+    from compare.questions.walk.study import CYCLE, optimal_gaits, played, solves
     from nlp_gait.backends.interrupts import Interrupted
     from nlp_gait.files import writable_folder
     from nlp_gait.simulation.engine import mujoco
@@ -71,7 +67,7 @@ def walk(
     stopped = ""
     try:
         with progress_bar("solves", solves(axis)) as advance:
-            gaits = optimal_gaits(spec, axis, starts=starts, seed=seed, progress=lambda: advance(""))
+            gaits = optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
         with progress_bar("walks", len(gaits)) as advance:
             for i, gait in enumerate(gaits if steps else ()):
                 gaits[i] = played(spec, gait, steps)
@@ -82,66 +78,8 @@ def walk(
             end_interrupted(f"{stopped}; nothing was written")
     except KeyboardInterrupt:
         stopped = "interrupted while the gaits were played"
-    feasible = [gait for gait in gaits if gait.found.feasible]
-    cheapest = min(feasible, key=lambda gait: gait.indexes["cost_of_transport"], default=None)
-    written = write_walk(folder, spec, gaits)
-    shown = None if cheapest is None else result_of(spec, cheapest.found)
-    written += write_figures(folder, gaits, spec.load(), shown)
-    if as_json:
-        print_json({"gaits": [gait.to_json() for gait in gaits], "files": [str(path) for path in written]})
-    else:
-        _print(gaits)
-        for path in written:
-            stdout.print(f"wrote {path}", soft_wrap=True)
+    hand_out(walk_answer(spec, gaits), folder, as_json)
     if stopped:
         end_interrupted(f"{stopped}; what was found is in {folder}")
-    if not feasible:
+    if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)
-
-
-def _print(gaits: Sequence[Gait]) -> None:
-    (name,) = gaits[0].found.at
-    units = ("power_W", "W", ".4f"), ("cost_of_transport", "", ".4f"), ("step_length_m", "m", ".4f")
-    times = "single_support_time_s", "double_support_time_s"
-    header = (name, "power", "cost of transport", "step", "single support", "double support")
-    rows = [
-        (
-            f"{gait.at:g}",
-            *(f"{gait.indexes[key]:{digits}} {unit}".rstrip() for key, unit, digits in units),
-            *(f"{gait.found.x[time]:.3f} s" for time in times),
-        )
-        for gait in gaits
-        if gait.found.feasible
-    ]
-    print_table("Cheapest cycles", header, rows)
-    for gait in gaits:
-        if not gait.found.feasible:
-            stdout.print(f"{name} = {gait.at:g}: {gait.found.status}", soft_wrap=True)
-    walks = [(gait, gait.walk) for gait in gaits if gait.walk is not None]
-    if walks:
-        _print_walks(name, walks)
-
-
-def _print_walks(name: str, walks: Sequence[tuple[Gait, Walk]]) -> None:
-    measured = ("fate", "walked", "of", "drift", "heading", "tilt", "tracking", "mechanical power", "model", "energy")
-    table = []
-    for gait, walk in walks:
-        found = walk.measurements
-        fate = "walks" if found.fell_at_s is None else f"falls at {found.fell_at_s:.2f} s"
-        table.append(
-            (
-                f"{gait.at:g}",
-                fate if walk.steps_done == walk.steps else f"{fate}, {walk.steps_done} steps",
-                *(
-                    "-" if value is None else f"{1000 * value:.0f} mm"
-                    for value in (walk.walked_m, walk.planned_m, walk.drift_m)
-                ),
-                "-" if walk.heading_deg is None else f"{walk.heading_deg:.1f} deg",
-                f"{found.largest_tilt_deg:.1f} deg",
-                f"{found.tracking_max_rad:.3f} rad",
-                f"{found.measured.mechanical_W:.3f} W",
-                f"{found.predicted.mechanical_W:.3f} W",
-                "-" if walk.energy_J_per_m is None else f"{walk.energy_J_per_m:.1f} J/m",
-            )
-        )
-    print_table(f"{walks[0][1].steps} steps in the physics engine, open loop", (name, *measured), table)

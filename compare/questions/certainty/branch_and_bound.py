@@ -10,12 +10,12 @@ Source:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
@@ -70,7 +70,7 @@ def certify(
     *,
     tolerance: float = 0.01,
     time_limit_s: float = 300.0,
-    progress: Callable[[int, float], None] = lambda boxes, bound: None,
+    progress: Progress = unwatched,
 ) -> Certificate:
     """Bound on the optimum over all variables' bounds.
 
@@ -88,12 +88,12 @@ def certify(
     if not (tolerance > 0.0 and time_limit_s > 0.0):
         raise InputError(f"tolerance and time limit must be positive, got {tolerance}, {time_limit_s} s")
     x = problem.check_x(incumbent)
-    cost, violation = (float(v) for v in exact_model(problem).function(x, problem.p)[:2])
-    if not violation <= FEASIBILITY_TOLERANCE:
-        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {violation:.3g}")
+    at = exact_model(problem).at(x, problem.p)
+    if not at.violation <= FEASIBILITY_TOLERANCE:
+        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
     enclosure = Enclosure(problem)
-    target = cost - tolerance * abs(cost)
+    target = at.cost - tolerance * abs(at.cost)
     boxes = np.stack([problem.lower, problem.upper], axis=-1)[None]
     bounds, smears, boxes = _assessed(enclosure, boxes, target)
     enclosed = 1
@@ -109,9 +109,9 @@ def certify(
         new_bounds, new_smears, new_boxes = _assessed(enclosure, halves, target)
         boxes = np.concatenate([boxes[rest], new_boxes])
         bounds, smears = np.concatenate([bounds[rest], new_bounds]), np.concatenate([smears[rest], new_smears])
-        progress(enclosed, bound())
+        progress(f"{enclosed} boxes, bound {bound():.6g}")
     return Certificate(
-        objective=problem.objective.sign * cost,
+        objective=problem.objective.sign * at.cost,
         bound=bound(),
         tolerance=tolerance,
         closed=not len(bounds),

@@ -19,8 +19,8 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimum:
-    """A local optimum.
+class LocalOptimum:
+    """A distinct local optimum, and how often it was reached.
 
     Attributes:
         objective: of the best end in it, in the problem's sense.
@@ -57,7 +57,7 @@ class Unseen:
     largest_missed: float
 
 
-def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
+def cluster(problem: GaitProblem, ends: Ends) -> list[LocalOptimum]:
     """Distinct optima among the ends that converged and are feasible, best first."""
     kept = np.flatnonzero(ends.success)
     order = kept[np.argsort(problem.objective.sign * ends.objective[kept], kind="stable")]
@@ -74,7 +74,7 @@ def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
             heads.append(int(i))
             counts.append(1)
     return [
-        Optimum(
+        LocalOptimum(
             objective=float(ends.objective[head]),
             count=count,
             share=count / len(kept),
@@ -84,7 +84,7 @@ def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
     ]
 
 
-def unseen(optima: list[Optimum]) -> Unseen:
+def unseen(optima: list[LocalOptimum]) -> Unseen:
     """Estimates from the counts of at least one optimum."""
     counts: Array = np.array([optimum.count for optimum in optima], dtype=float)
     n, w = float(counts.sum()), float(len(counts))

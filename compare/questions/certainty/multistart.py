@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
 from nlp_gait.errors import InputError
@@ -45,7 +45,7 @@ def multistart(
     starts: int,
     seed: int = 0,
     settings: IpoptSettings | None = None,
-    progress: Callable[[int, str], None],
+    progress: Progress = unwatched,
 ) -> Ends:
     """Ends of IPOPT from random starts; batch k draws its start points from the seed and k, whatever ran before.
 
@@ -55,7 +55,7 @@ def multistart(
         starts: how many.
         seed: of the start points.
         settings: of IPOPT; by default with compiled functions where there is a compiler.
-        progress: told how many starts are done more, and a note.
+        progress: told of each batch when it begins and when it is done.
 
     Raises:
         InputError: no start.
@@ -65,14 +65,14 @@ def multistart(
         raise InputError(f"starts must be at least 1, got {starts}")
     chosen = settings or IpoptSettings()
     ipopt = ipopt_for(problem, chosen, starts)
-    steps = Steps(out, lambda note: progress(0, note), code=[sys.modules[__name__]])
+    steps = Steps(out, progress, code=[sys.modules[__name__]])
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
     rows: list[list[Any]] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
         rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ipopt, seed, k, count))
-        progress(count, f"{len(rows)} starts")
+        progress(f"{len(rows)} starts")
     x, objective, success, status, time_s = zip(*rows, strict=True)
     return Ends(
         x=np.array(x, dtype=float),

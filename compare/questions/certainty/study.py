@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,14 @@ import numpy as np
 import metaheuristics
 from compare.questions.certainty import branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
-from compare.questions.certainty.clusters import Optimum, Unseen, cluster, unseen
+from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import Ends, multistart
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
+from compare.study.task import made_with
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
 from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 
@@ -59,7 +61,7 @@ class Certainty:
     problem: GaitProblem
     starts: int
     statuses: dict[str, int]
-    optima: tuple[Optimum, ...]
+    optima: tuple[LocalOptimum, ...]
     unseen: Unseen
     ends: Ends
     search: LongSearch | None
@@ -101,8 +103,7 @@ class Certainty:
         certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
         return {
             "problem": self.problem.name,
-            "options": dict(self.problem.options),
-            "parameters": dict(self.problem.values),
+            **made_with(self.problem),
             "starts": self.starts,
             "statuses": self.statuses,
             "optima": [asdict(optimum) for optimum in self.optima],
@@ -123,7 +124,7 @@ def certainty(
     tolerance: float = 0.01,
     time_limit_s: float = 600.0,
     seed: int = 0,
-    progress: Callable[[int, str], None],
+    progress: Progress = unwatched,
 ) -> Certainty:
     """Starts, a long search and, for few variables, branch and bound; what is done is kept under ``out``.
 
@@ -135,7 +136,7 @@ def certainty(
         tolerance: relative, of the certificate.
         time_limit_s: of the certificate [s]; 0 for none.
         seed: of starts and search.
-        progress: told how many starts are done more, and a note.
+        progress: told each step, and how far it is.
 
     Raises:
         InputError: no start converged, or tolerance or time limit are not allowed.
@@ -154,7 +155,7 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, lambda note: progress(0, note), code=[branch_and_bound])
+    steps = Steps(out, progress, code=[branch_and_bound])
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -167,22 +168,19 @@ def certainty(
 
     def proven() -> dict[str, Any]:
         certificate = certify(
-            problem,
-            np.array(best.x),
-            tolerance=tolerance,
-            time_limit_s=time_limit_s,
-            progress=lambda boxes, bound: progress(0, f"{boxes} boxes, bound {bound:.6g}"),
+            problem, np.array(best.x), tolerance=tolerance, time_limit_s=time_limit_s, progress=progress
         )
         return {**asdict(certificate), "bound": certificate.bound if math.isfinite(certificate.bound) else None}
 
     search = certificate = None
     if evaluations:
-        search = LongSearch(**steps("cma", {**identity, "evaluations": evaluations, "seed": seed}, searched))
+        inputs = {**identity, "evaluations": evaluations, "seed": seed}
+        search = decoded(LongSearch, steps("cma", inputs, searched))
     if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
         kept = steps("certificate", inputs, proven)
         bound = -problem.objective.sign * math.inf if kept["bound"] is None else kept["bound"]
-        certificate = Certificate(**{**kept, "x": tuple(kept["x"]), "bound": bound})
+        certificate = decoded(Certificate, {**kept, "bound": bound})
     return Certainty(
         problem=problem,
         starts=starts,

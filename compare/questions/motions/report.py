@@ -1,36 +1,24 @@
-"""Table and pictures of the comparison of motions."""
+"""The comparison of motions as an answer: tables, sentences and pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, legend_below, new_figure, save, style
+from compare.drawing.figures import COLOURS, legend_below, new_figure, style
+from compare.questions.answer import Answer, all_digits
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
-from compare.study.task import ProblemSpec
-from nlp_gait.files import csv_text, write_text
+from compare.report.document import Document, Figure, Table, text_table
 from nlp_gait.problem import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
-HEADER = (
-    "motion",
-    "variables",
-    "power [W]",
-    "saved [%]",
-    "IPOPT [s]",
-    "iterations",
-    "starts",
-    "dense power [W]",
-    "dense violation",
-)
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
 # Points of a drawn path.
@@ -44,10 +32,16 @@ def title(motion: Motion) -> str:
     return KIND_WORDS[motion.task.kind] + motion.task.trajectory
 
 
-def rows(found: Sequence[Motion]) -> list[tuple[str, ...]]:
-    """Cells under ``HEADER``."""
-    base = found[0].power_W
-    return [
+def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
+    """What richer motions save.
+
+    Args:
+        found: the first is the one to compare with.
+        problem: name of the phase.
+    """
+    stem, base = f"{problem}-motions", found[0].power_W
+    header = ("motion", "variables", "power [W]", "saved [%]", "IPOPT [s]", "iterations", "starts")
+    rows = [
         (
             title(m),
             str(m.variables),
@@ -61,6 +55,38 @@ def rows(found: Sequence[Motion]) -> list[tuple[str, ...]]:
         )
         for m in found
     ]
+    over = (
+        "Least power over the coefficients beyond the paper's cubics, with the value that the richest motions point to."
+    )
+    along = "Paths of the hip, and of the swing foot if it moves."
+    return Answer(
+        stem=stem,
+        document=Document(
+            title=f"{problem}: richer motions",
+            verdict=sentences(found),
+            parts=(
+                text_table((*header, "dense power [W]", "dense violation"), rows, "Optima"),
+                Figure(name=stem, caption=over, drawing=power_figure(found)),
+                Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(paths(found))),
+                _numbers(stem, found),
+            ),
+        ),
+        data={"problem": problem, "motions": [m.to_json() for m in found]},
+    )
+
+
+def _numbers(stem: str, found: Sequence[Motion]) -> Table:
+    header = (
+        "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation "
+        "converged starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status"
+    ).split()
+    rows = [
+        [m.task.kind, m.task.problem, m.task.trajectory, m.task.options.get("objective", "power")]
+        + [m.task.options["samples_per_interval"], m.variables, m.power_W, m.dense_power_W, m.worst, m.converged]
+        + [m.attempts, m.iterations, f"{m.time_s:.3f}", *(m.objectives.values() or (None, None)), m.status]
+        for m in found
+    ]
+    return all_digits(stem, header, rows)
 
 
 def sentences(found: Sequence[Motion]) -> list[str]:
@@ -91,31 +117,7 @@ def sentences(found: Sequence[Motion]) -> list[str]:
     return said
 
 
-def motions_csv(found: Sequence[Motion]) -> str:
-    """One row for each motion, units in the header."""
-    table: list[Sequence[object]] = []
-    table.append(
-        "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation converged "
-        "starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status".split()
-    )
-    for m in found:
-        options = m.task.options
-        values: list[float | str] = [*m.objectives.values()] or ["", ""]
-        table.append(
-            [
-                m.task.kind,
-                m.task.problem,
-                m.task.trajectory,
-                options.get("objective", "power"),
-                options["samples_per_interval"],
-            ]
-            + [m.variables, repr(m.power_W), repr(m.dense_power_W), m.worst, m.converged, m.attempts, m.iterations]
-            + [f"{m.time_s:.3f}", *values, m.status]
-        )
-    return csv_text(table)
-
-
-def power_figure(found: Sequence[Motion]) -> Figure:
+def power_figure(found: Sequence[Motion]) -> Drawing:
     """Power against the number of free coefficients, with the floor that the richest motions point to."""
     with style():
         figure = new_figure(4.6, 3.0)
@@ -162,14 +164,14 @@ def paths(found: Sequence[Motion]) -> list[Path3]:
     drawn = [found[0], *(m for m in chosen.values() if m is not found[0])]
     result = []
     for m in drawn:
-        problem = ProblemSpec(name=m.task.problem, options=m.task.options).load().dense(DRAWN)
+        problem = m.task.spec.load().dense(DRAWN)
         assert problem is not None  # a phase has one; for the type checker
         arrays: Mapping[str, Array] = problem.signals(m.x).arrays
         result.append(Path3(label=title(m), hip=arrays["hip"], foot=arrays["right_foot"]))
     return result
 
 
-def path_figure(drawn: Sequence[Path3]) -> Figure:
+def path_figure(drawn: Sequence[Path3]) -> Drawing:
     """Hip from above and from the side, and the swing foot from the side if it moves."""
     swings = bool(np.ptp(drawn[0].foot[:, 0]) > 0.0)
     colours = (COLOURS["ipopt"], *(colour for colour, _, _ in LOOKS.values()))
@@ -187,12 +189,3 @@ def path_figure(drawn: Sequence[Path3]) -> Figure:
             axes.set(xlabel=along, ylabel=up)
         legend_below(figure)
     return figure
-
-
-def write_motions(folder: Path, found: Sequence[Motion], problem: str) -> list[Path]:
-    """Write table and pictures; returns their paths."""
-    stem = folder / f"{problem}-motions"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, motions_csv(found))
-    power = save(power_figure(found), stem)
-    return [table, *power, *save(path_figure(paths(found)), folder / f"{problem}-motions-paths")]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compare.questions.pareto.criteria import Criterion
+from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
+from compare.study.progress import Progress, unwatched
 from metaheuristics.interface import Array
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.problem import GaitProblem
@@ -96,11 +97,11 @@ def quality(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[
 
 def challenge(
     free: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
     most: int = MOST_CHALLENGES,
-    progress: Callable[[str], None] = lambda note: None,
+    progress: Progress = unwatched,
 ) -> Challenge:
     """Solve for the least power at the criterion of points, from the point itself and from the front's nearest point.
 
@@ -114,15 +115,14 @@ def challenge(
         most: solved at most for so many.
         progress: told the point.
     """
-    exact = exact_model(free)
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:most]
     solved: list[FrontPoint] = []
     excess: list[float] = []
     infeasible = moved = 0
     for point in lowest:
-        power, violation = (float(v) for v in exact.function(np.array(point.x), free.p)[:2])
-        if not violation <= FEASIBILITY_TOLERANCE:
+        exact = exact_model(free).at(point.x, free.p)
+        if not exact.violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue
         near = front[int(np.argmin(np.abs(values - point.value)))]
@@ -130,12 +130,12 @@ def challenge(
         of_front, of_search = (point_at(free, criterion, at, np.array(start.x)) for start in (near, point))
         candidates = [p for p in (of_front, of_search) if p is not None]
         if not candidates:
-            excess.append(power / near.power_W - 1.0 if near.value >= point.value else -np.inf)
+            excess.append(exact.cost / near.power_W - 1.0 if near.value >= point.value else -np.inf)
             continue
         best = min(candidates, key=lambda p: p.power_W)
         moved += of_front is None or best.power_W < of_front.power_W * (1.0 - 1e-6)
         solved.append(best)
-        excess.append(power / best.power_W - 1.0)
+        excess.append(exact.cost / best.power_W - 1.0)
         progress(f"{criterion.name} {point.value:.5g} {criterion.unit}")
     return Challenge(
         points=len(points),

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compare.questions.pareto.criteria import REWARD, Criterion, rewarding
+from compare.questions.pareto.competing import REWARD, CompetingObjective, rewarding
+from compare.study.progress import Progress, unwatched
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.optima.continuation import Attempt, Continuation, best_end
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Solution
 
 # The front ends where another hundredth of the criterion would cost ten times the least power.
 LARGEST_TRADE_OFF = 1000.0
@@ -47,12 +50,12 @@ class FrontPoint:
 
 def pareto_front(
     problem: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     *,
     points: int = 40,
     starts: int = 5,
     seed: int = 0,
-    progress: Callable[[str], None] = lambda note: None,
+    progress: Progress = unwatched,
 ) -> list[FrontPoint]:
     """Points of the front, by rising criterion, about evenly spaced along it.
 
@@ -118,7 +121,7 @@ def pareto_front(
     return nondominated([p for at in sorted(found) if (p := _point(path, free, criterion, at, found[at])) is not None])
 
 
-def point_at(free: GaitProblem, criterion: Criterion, least: float, x0: Array) -> FrontPoint | None:
+def point_at(free: GaitProblem, criterion: CompetingObjective, least: float, x0: Array) -> FrontPoint | None:
     """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
     limited = criterion.limited(free, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
@@ -137,32 +140,27 @@ def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     return kept[::-1]
 
 
-def front_ends(free: GaitProblem, criterion: Criterion, starts: int, seed: int) -> tuple[FrontPoint, FrontPoint]:
+def front_ends(
+    free: GaitProblem, criterion: CompetingObjective, starts: int, seed: int
+) -> tuple[FrontPoint, FrontPoint]:
     """Least power, and the point beyond which the criterion is too dear."""
     solution = solve(free, starts=2 * starts, seed=seed)
     if not solution.success:
         raise InputError(f"{free.name} has no front: {solution.status}")
-    low = _at(free, criterion, np.array(list(solution.x.values())))
+    low = _at(free, criterion, solution)
     reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
     ending = rewarding(free, criterion).with_values(**{REWARD: reward})
     solution = solve(ending, starts=2 * starts, seed=seed)
     if not solution.success:
         raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
-    return low, _at(free, criterion, np.array(list(solution.x.values())))
+    return low, _at(free, criterion, solution)
 
 
-def _at(problem: GaitProblem, criterion: Criterion, x: Array) -> FrontPoint:
-    from compare.judge import evaluate
-
-    judged = evaluate(problem, x)
-    value = criterion.value(problem, x)
+def _at(problem: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
+    x = problem.check_x(solution.x)
+    exact, value = exact_model(problem).at(x, problem.p), criterion.value(problem, x)
     return FrontPoint(
-        demanded=value,
-        value=value,
-        power_W=float(judged.objective["value"]),
-        price=0.0,
-        violation=judged.violation,
-        x=tuple(x.tolist()),
+        demanded=value, value=value, power_W=exact.cost, price=0.0, violation=exact.violation, x=tuple(x.tolist())
     )
 
 
@@ -177,12 +175,12 @@ def _largest_gap(found: dict[float, list[Attempt]]) -> tuple[float, list[End]]:
 
 
 def _point(
-    path: Continuation, free: GaitProblem, criterion: Criterion, at: float, attempts: list[Attempt]
+    path: Continuation, free: GaitProblem, criterion: CompetingObjective, at: float, attempts: list[Attempt]
 ) -> FrontPoint | None:
     solution = path.solution(criterion.limited(free, at), attempts)
     if not solution.success:
         return None
-    x = np.array(list(solution.x.values()))
+    x = free.check_x(solution.x)
     return FrontPoint(
         demanded=at,
         value=criterion.value(free, x),

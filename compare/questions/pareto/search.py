@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.questions.pareto.criteria import Criterion
+from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
 from metaheuristics.interface import Array
 from metaheuristics.multi_objective import MultiObjective, minimize_many
@@ -34,14 +36,14 @@ class Scale:
         return np.column_stack([(powers - self.least_power) / self.power_range, (self.largest - values) / self.range])
 
     def back(self, F: Array) -> tuple[Array, Array]:
-        """Criterion and power of (P, 2)."""
+        """CompetingObjective and power of (P, 2)."""
         return self.largest - self.range * F[:, 1], self.least_power + self.power_range * F[:, 0]
 
 
-class PowerAndCriterion:
+class PowerAndCompeting:
     """The compiled objective with a criterion beside the power; see ``metaheuristics.multi_objective.ManyObjectives``."""
 
-    def __init__(self, objective: CompiledObjective, criterion: Criterion, scale: Scale) -> None:
+    def __init__(self, objective: CompiledObjective, criterion: CompetingObjective, scale: Scale) -> None:
         self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
         self._objective, self._criterion, self._scale = objective, criterion, scale
 
@@ -74,15 +76,14 @@ class SearchFront:
 
 def search_fronts(
     problem: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     scale: Scale,
     out: Path,
     *,
-    algorithms: Sequence[str],
-    budgets: Sequence[int],
+    searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
-    progress: Callable[[str], None],
+    progress: Progress = unwatched,
 ) -> list[SearchFront]:
     """Fronts of all runs; each run is kept as a file when it is done.
 
@@ -91,8 +92,7 @@ def search_fronts(
         criterion: beside power.
         scale: of both, so that no algorithm's distances are dominated by one of them.
         out: folder.
-        algorithms: of pymoo.
-        budgets: evaluations, rising.
+        searches: rising numbers of evaluations by algorithm of pymoo.
         runs: run k uses seed + k.
         seed: of the first run.
         progress: told which run is done.
@@ -101,20 +101,16 @@ def search_fronts(
         SearchError: an algorithm or a budget that cannot be.
         OutputError: a run cannot be kept.
     """
-    steps = Steps(out, lambda note: None)
-    compiled = PowerAndCriterion(compile_objective(problem), criterion, scale)
+    steps = Steps(out, unwatched)
+    compiled = PowerAndCompeting(compile_objective(problem), criterion, scale)
     ranges = [scale.least_power, scale.power_range, scale.largest, scale.range]
-    identity = {**fingerprint(problem), "criterion": criterion.name, "budgets": list(budgets), "scale": ranges}
+    identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}
     fronts = []
-    for name in algorithms:
+    for name, budgets in searches.items():
         algorithm = MultiObjective(algorithm=name)
         for run in range(runs):
-            inputs = {**identity, "algorithm": repr(algorithm), "seed": seed + run}
-
-            def compute(algorithm: MultiObjective = algorithm, run: int = run) -> list[dict[str, Any]]:
-                snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed + run)
-                return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
-
+            inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed + run}
+            compute = partial(_snapshots, compiled, algorithm, budgets, seed + run)
             kept = steps(f"{name.lower()}-{run}", inputs, compute)
             for budget, snapshot in zip(budgets, kept, strict=True):
                 values, powers = scale.back(np.array(snapshot["F"]).reshape(-1, 2))
@@ -122,6 +118,14 @@ def search_fronts(
                 fronts.append(SearchFront(algorithm=name, run=run, budget=budget, values=values, powers=powers, X=X))
             progress(f"{name}, run {run}")
     return fronts
+
+
+def _snapshots(
+    compiled: PowerAndCompeting, algorithm: MultiObjective, budgets: Sequence[int], seed: int
+) -> list[dict[str, Any]]:
+    """What one run had found after each budget, as plain data."""
+    snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed)
+    return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
 
 
 def best_of_all(fronts: Sequence[SearchFront]) -> list[FrontPoint]:

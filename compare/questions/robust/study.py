@@ -11,18 +11,18 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from compare.questions.robust.family import Box, Corner, Family, Worst
+from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem.solution import Solution
 from nlp_gait.problem.worst_case import worst_case
-from nlp_gait.robots import load_robot
 
 ROUNDS = 8
 
@@ -68,11 +68,11 @@ class Robust:
 
 def boxes(spec: ProblemSpec, mass: float, sole_m: float) -> dict[str, Box]:
     """Boxes of uncertainty, each wider than the one before: soles alone, with the whole robot's mass, with each link's."""
-    robot = str(spec.load().options.get("robot", ""))
-    if not spec.name.startswith("nao-") or not robot:
-        raise InputError(f"only the NAO problems have a robot to be uncertain about, got {spec.name!r}")
+    robot = spec.load().robot
+    if robot is None:
+        raise InputError(f"problem {spec.name!r} has no robot to be uncertain about; the NAO problems have one")
     soles = {"sole_x_m": sole_m, "sole_y_m": sole_m}
-    links = {f"{link}.mass": mass for link in load_robot(robot).links}
+    links = {f"{link}.mass": mass for link in robot.links}
     return {
         "soles": soles,
         "soles, mass of the whole": {"mass": mass, **soles},
@@ -88,7 +88,7 @@ def robust(
     starts: int = 10,
     seed: int = 0,
     samples: int = 20,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = unwatched,
 ) -> Robust:
     """Robust optimum over a box of robots.
 
@@ -99,18 +99,17 @@ def robust(
         starts: random starts of the nominal problem.
         seed: of the starts and of the random corners.
         samples: random corners on which the robust optimum is checked.
-        progress: called with a note as the work goes on.
+        progress: told each step when it begins.
     """
-    note = progress or (lambda _: None)
     family = Family(spec, box)
-    note(f"{name}: nominal optimum")
+    progress(f"{name}: nominal optimum")
     nominal = solve(family.nominal, starts=starts, seed=seed)
     _require(nominal, "the nominal problem")
-    first = x = np.array([nominal.x[variable] for variable in family.nominal.names])
+    first = x = family.nominal.check_x(nominal.x)
     corners: list[Corner] = [family.centre]
     found, settled, rounds = nominal, False, 0
     for rounds in range(1, ROUNDS + 1):
-        note(f"{name}: round {rounds}, {len(corners)} scenarios")
+        progress(f"{name}: round {rounds}, {len(corners)} scenarios")
         worse = family.worst_corners(x, corners, float(found.objective))
         if not worse:
             settled = True
@@ -118,10 +117,10 @@ def robust(
         corners += worse
         found = solve(worst_case([family.problem(corner) for corner in corners]), x0=x)
         _require(found, f"{len(corners)} scenarios together ({name})")
-        x = np.array([found.x[variable] for variable in family.nominal.names])
+        x = family.nominal.check_x(found.x)
     rng = np.random.default_rng(seed)
     random = [tuple(rng.choice((-1, 1), len(box)).tolist()) for _ in range(samples)]
-    note(f"{name}: {samples} random corners")
+    progress(f"{name}: {samples} random corners")
     return Robust(
         name=name,
         box=dict(box),
@@ -134,7 +133,7 @@ def robust(
         nominal_W=nominal.objective,
         nominal_worst=family.worst(first, corners),
         x=found.x,
-        power_W=family.values(family.centre, x)[0],
+        power_W=family.values(family.centre, x).cost,
         worst_W=found.objective,
         worst=family.worst(x, corners),
         random_worst=family.worst(x, random or corners),

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
+from compare.study.record import RunRecord
 from compare.study.runner import run_task
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
@@ -84,7 +86,7 @@ def sweep(
     starts: int = 5,
     evaluations: int = 10_000,
     seed: int = 0,
-    progress: Callable[[], None] | None = None,
+    progress: Progress = unwatched,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
 
@@ -98,7 +100,7 @@ def sweep(
         starts: random starts of IPOPT at both ends of its walk, and where no neighbour helps.
         evaluations: budget of a search run.
         seed: of starts and searches.
-        progress: called ``count_solves`` times.
+        progress: told of each solve, ``count_solves`` times.
 
     Raises:
         UnknownNameError: an axis is neither a variable nor a parameter; no such algorithm.
@@ -109,8 +111,9 @@ def sweep(
     if len(set(names)) < len(names):
         raise InputError(f"each axis must be named once, got {', '.join(names)}")
     walk = _snake(axes)
-    specs = [_with(spec, axes, at) for at in walk]  # all checked before the work
     named = [dict(zip(names, at, strict=True)) for at in walk]
+    problem = spec.load()
+    specs = [replace(spec, values=dict(placed(problem, at).values)) for at in named]  # all checked before the work
     if algorithm == IPOPT:
         solutions, sentence = _solutions([s.load() for s in specs], starts, seed, progress)
         points = [None if s is None else _ipopt_point(at, s) for at, s in zip(named, solutions, strict=True)]
@@ -132,13 +135,10 @@ def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
     return math.prod(len(axis.values) for axis in axes) * (2 if algorithm == IPOPT else 1)
 
 
-def _with(spec: ProblemSpec, axes: Sequence[Axis], at: Sequence[float]) -> ProblemSpec:
-    """The problem at one point of the grid."""
-    problem = spec.load()
-    for axis, value in zip(axes, at, strict=True):
-        fixed = axis.name in problem.names
-        problem = problem.fix(**{axis.name: value}) if fixed else problem.with_values(**{axis.name: value})
-    return replace(spec, values=dict(problem.values))
+def placed(problem: GaitProblem, at: Mapping[str, float]) -> GaitProblem:
+    """The problem at one point of the grid: parameters set, variables fixed."""
+    fixed = {name: value for name, value in at.items() if name in problem.names}
+    return problem.with_values(**{name: at[name] for name in at if name not in fixed}).fix(**fixed)
 
 
 def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
@@ -154,26 +154,27 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
 
 
 def _solutions(
-    problems: Sequence[GaitProblem], starts: int, seed: int, progress: Callable[[], None] | None
+    problems: Sequence[GaitProblem], starts: int, seed: int, progress: Progress
 ) -> tuple[Sequence[Solution | None], str]:
     """Solutions along the walk, and how far it came if it was interrupted."""
     try:
-        return solve_both_ways(problems, starts=starts, seed=seed, progress=progress), ""
+        return solve_both_ways(problems, starts=starts, seed=seed, progress=lambda: progress("")), ""
     except Interrupted as interrupt:
         return cast("list[Solution | None]", interrupt.partial), interrupt.sentence
 
 
 def _search_points(
-    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Callable[[], None] | None
+    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Progress
 ) -> tuple[list[SweepPoint | None], str]:
     """Points along the walk, and how far it came if it was interrupted."""
     points: list[SweepPoint | None] = []
     try:
         for at, task in zip(named, tasks, strict=True):
             with remembered_interrupts() as check:
-                point = _search_point(at, task, progress)
+                record = run_task(task)
+                progress("")
                 check()
-            points.append(point)
+            points.append(_search_point(at, record))
     except KeyboardInterrupt:
         return points, f"interrupted after {len(points)} of {len(tasks)} points"
     return points, ""
@@ -192,10 +193,7 @@ def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
     )
 
 
-def _search_point(at: Mapping[str, float], task: Task, progress: Callable[[], None] | None) -> SweepPoint:
-    record = run_task(task)
-    if progress is not None:
-        progress()
+def _search_point(at: Mapping[str, float], record: RunRecord) -> SweepPoint:
     verdict = record.verdict
     return SweepPoint(
         at=at,

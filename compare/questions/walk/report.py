@@ -1,36 +1,150 @@
-"""Pictures of walking: what it costs along an axis, and one cycle over two steps."""
+"""What walking costs along an axis, as an answer: tables, and pictures of the cost and of one cycle over two steps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import new_figure, save, style
-from compare.drawing.labels import axis_label
-from compare.questions.walk.study import Gait
+from compare.drawing.figures import new_figure, style
+from compare.drawing.labels import axis_label, name_in_words, units_of
+from compare.questions.answer import Answer, all_digits
+from compare.questions.sweep.report import mark
+from compare.questions.walk.study import Gait, result_of
+from compare.report.document import Document, Figure, Part, Table, Value, text_table
+from compare.study.task import ProblemSpec, made_with
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
-from nlp_gait.problems.nao.body import nao
-from nlp_gait.problems.nao.cycle_motion import TIMES
 from nlp_gait.simulation.steps import walk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
 LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+# Indexes of the table of numbers.
+INDEXES = (
+    "power_W",
+    "energy_J_per_m",
+    "cost_of_transport",
+    "speed_m_s",
+    "step_length_m",
+    "ssp_power_W",
+    "dsp_power_W",
+    "ssp_dbm_x_min_m",
+    "ssp_dbm_y_min_m",
+    "ssp_dbm_x_mean_m",
+    "ssp_dbm_y_mean_m",
+    "dsp_dbm_x_mean_m",
+    "dsp_dbm_y_mean_m",
+    "touch_down_torque_jump_Nm",
+    "lift_off_torque_jump_Nm",
+)
+# What it says of the walk in the engine, and of the measurements there.
+WALKED = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
+MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
 
 
-def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
+def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
+    """What walking costs along the axis, from at least one gait."""
+    (name,), problem = gaits[0].found.at, spec.load()
+    feasible = [gait for gait in gaits if gait.found.feasible]
+    results = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
+    header = (name, "power", "cost of transport", "step", *(_phase(time) for time in problem.durations))
+    rows = [
+        (
+            f"{gait.at:g}",
+            f"{gait.indexes['power_W']:.4f} W",
+            f"{gait.indexes['cost_of_transport']:.4f}",
+            f"{gait.indexes['step_length_m']:.4f} m",
+            *(f"{gait.found.x[time]:.3f} s" for time in problem.durations),
+        )
+        for gait in feasible
+    ]
+    costs = Figure(
+        name=f"{problem.name}-cost",
+        caption="Cost of transport, step and times; crosses where no feasible cycle was found.",
+        drawing=cost_figure(gaits, problem),
+    )
+    parts: list[Part] = [
+        text_table(header, rows, "Cheapest cycles"),
+        *(f"{name} = {gait.at:g}: {gait.found.status}" for gait in gaits if not gait.found.feasible),
+        *_walks(name, gaits),
+        costs,
+    ]
+    if feasible:
+        cheapest = min(feasible, key=lambda gait: gait.indexes["cost_of_transport"])
+        drawing = cycle_figure(result_of(spec, cheapest.found))
+        caption = "Two steps of the cheapest cycle: hip and feet, and the left leg's angles."
+        parts.append(Figure(name=problem.name, caption=caption, drawing=drawing))
+    stem = f"{problem.name}-walk"
+    parts.append(_numbers(stem, gaits))
+    return Answer(
+        stem=stem,
+        document=Document(title=f"{problem.name}: cheapest cycles over {name}", parts=parts),
+        data={"gaits": [gait.to_json() for gait in gaits]},
+        results={
+            stem: {"problem": problem.name, **made_with(result.problem), "x": result.problem.by_name(result.x)}
+            for stem, result in results.items()
+        },
+    )
+
+
+def _phase(duration: str) -> str:
+    """A phase by the variable that holds its duration, for example ``single support``."""
+    return name_in_words(duration, "s").removesuffix(" time")
+
+
+def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
+    """How the gaits that were played fared."""
+    header = ("fate", "walked", "of", "drift", "heading", "tilt", "tracking", "mechanical power", "model", "energy")
+    walks = [(gait.at, gait.walk) for gait in gaits if gait.walk is not None]
+    rows = []
+    for at, played in walks:
+        found = played.measurements
+        fate = "walks" if found.fell_at_s is None else f"falls at {found.fell_at_s:.2f} s"
+        lengths = (played.walked_m, played.planned_m, played.drift_m)
+        rows.append(
+            (
+                f"{at:g}",
+                fate if played.steps_done == played.steps else f"{fate}, {played.steps_done} steps",
+                *("-" if value is None else f"{1000 * value:.0f} mm" for value in lengths),
+                "-" if played.heading_deg is None else f"{played.heading_deg:.1f} deg",
+                f"{found.largest_tilt_deg:.1f} deg",
+                f"{found.tracking_max_rad:.3f} rad",
+                f"{found.measured.mechanical_W:.3f} W",
+                f"{found.predicted.mechanical_W:.3f} W",
+                "-" if played.energy_J_per_m is None else f"{played.energy_J_per_m:.1f} J/m",
+            )
+        )
+    title = f"{walks[0][1].steps} steps in the physics engine, open loop" if walks else ""
+    return [text_table((name, *header), rows, title)] if walks else []
+
+
+def _numbers(stem: str, gaits: Sequence[Gait]) -> Table:
+    (name,), x = gaits[0].found.at, gaits[0].found.x
+    own = f"at {name}" if name in x or name in INDEXES else name
+    header = [own, "feasible", *INDEXES, *x, *(f"engine_{key}" for key in (*WALKED, *MEASURED)), "status"]
+    rows: list[list[Value]] = []
+    for gait in gaits:
+        engine: list[Value] = [None] * (len(WALKED) + len(MEASURED))
+        if gait.walk is not None:
+            found = gait.walk.measurements
+            engine = [getattr(gait.walk, key) for key in WALKED]
+            engine += [found.largest_tilt_deg, found.tracking_max_rad]
+            engine += [found.measured.mechanical_W, found.measured.heat_W]
+        indexes = [gait.indexes[key] for key in INDEXES]
+        rows.append([gait.at, gait.found.feasible, *indexes, *gait.found.x.values(), *engine, gait.found.status])
+    return all_digits(stem, header, rows)
+
+
+def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
     """Cost of transport, step length and times along the axis; infeasible points as crosses at the bottom."""
     (name,) = gaits[0].found.at
-    units = {v.name: v.unit for v in problem.variables} | {q.name: q.unit for q in problem.parameters}
     good = [gait for gait in gaits if gait.found.feasible]
     at = [gait.at for gait in good]
     with style():
@@ -38,23 +152,19 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
         cost.plot(at, [gait.indexes["cost_of_transport"] for gait in good], "o-", color=MODEL, label="model")
         _engine_costs(cost, good)
-        bad = [gait.at for gait in gaits if not gait.found.feasible]
-        if bad:
-            cost.plot(
-                bad, np.full(len(bad), 0.03), "x", color="0.4", label="infeasible", transform=cost.get_xaxis_transform()
-            )
+        mark(cost, [gait.at for gait in gaits if not gait.found.feasible], "infeasible")
         cost.set_ylabel("cost of transport\nP / (m g v)")
         cost.set_ylim(bottom=0.0)
         cost.legend()
         lengths.plot(at, [1000.0 * gait.indexes["step_length_m"] for gait in good], "o-", color=MODEL)
         lengths.set_ylabel("step\n[mm]")
         lengths.set_ylim(bottom=0.0)
-        for phase, label, colour in (("ssp", "single support", LEFT), ("dsp", "double support", RIGHT)):
-            times.plot(at, [gait.found.x[TIMES[phase]] for gait in good], "o-", color=colour, label=label)
+        for time, colour in zip(problem.durations, (LEFT, RIGHT), strict=True):
+            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=_phase(time))
         times.set_ylabel("time [s]")
         times.set_ylim(bottom=0.0)
         times.legend(ncols=2)
-        times.set_xlabel(axis_label(name, units[name]))
+        times.set_xlabel(axis_label(name, units_of(problem)[name]))
     return figure
 
 
@@ -68,19 +178,17 @@ def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
     if points:
         axes.plot(*zip(*points, strict=True), "s--", color=ENGINE, label="physics engine")
     fallen = [gait.at for gait in gaits if gait.walk is not None and gait.walk.measurements.fallen]
-    if fallen:
-        axes.plot(
-            fallen, np.full(len(fallen), 0.1), "v", color=RIGHT, label="falls", transform=axes.get_xaxis_transform()
-        )
+    mark(axes, fallen, "falls", "v", RIGHT, 0.1)
 
 
-def cycle_figure(result: Result) -> Figure:
+def cycle_figure(result: Result) -> Drawing:
     """Two steps of a cycle: paths of hip and feet from the side and from above, and the angles of the left leg."""
-    robot = nao(str(result.problem.options["robot"]), rotational_inertia=True)
-    signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
+    problem = result.problem
+    assert problem.playback is not None  # a cycle can be played; for the type checker
+    signals = walk(finely_sampled(result), problem.playback.robot, STEPS_SHOWN)
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
-    single, double = (float(result.x[result.problem.variable_index(TIMES[phase])]) for phase in ("ssp", "dsp"))
-    switches = np.cumsum([0.0] + [single, double] * STEPS_SHOWN)
+    durations = [float(result.x[problem.variable_index(name)]) for name in problem.durations]
+    switches = np.cumsum([0.0] + durations * STEPS_SHOWN)
     with style():
         figure = new_figure(6.3, 7.2)
         side, above, place, angles = figure.subplots(4, 1, height_ratios=(1.0, 1.2, 1.2, 1.6))
@@ -111,11 +219,3 @@ def cycle_figure(result: Result) -> Figure:
         for axes in (side, above, place, angles):
             axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=1.0)
     return figure
-
-
-def write_figures(folder: Path, gaits: Sequence[Gait], problem: GaitProblem, shown: Result | None) -> list[Path]:
-    """Write both pictures, that of a cycle only if there is one; returns the paths."""
-    written = list(save(cost_figure(gaits, problem), folder / "nao-cycle-cost"))
-    if shown is not None:
-        written += save(cycle_figure(shown), folder / "nao-cycle")
-    return written

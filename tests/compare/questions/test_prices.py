@@ -25,10 +25,11 @@ def test_the_command_prices_every_limit_and_writes_table_and_picture(tmp_path: P
     assert dearest["name"] == "f2max_m"
     # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
     assert dearest["slope"] == pytest.approx(-0.85 / 0.13, rel=1e-6)
-    table, *pictures = (Path(name) for name in answer["files"])
-    rows = list(csv.DictReader(table.read_text().splitlines()))
+    written = [Path(name) for name in answer["files"]]
+    rows = list(csv.DictReader((tmp_path / "walk12-prices.csv").read_text().splitlines()))
     assert [row["quantity"] for row in rows] == [price["name"] for price in answer["limits"]]
-    assert all(picture.stat().st_size > 0 for picture in pictures)
+    assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
+    assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_the_table_says_units_and_steps(tmp_path: Path) -> None:

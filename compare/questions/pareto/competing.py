@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
-import numpy as np
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model
@@ -19,39 +17,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 POWER, SPEED = "power", "speed"
 MARGINS = ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min")
 REWARD = "reward_W_per_unit"
-
-
-class Criterion(Protocol):
-    """A quantity that is to be large, and whose least value can be demanded by a parameter."""
-
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-
-    @property
-    def unit(self) -> str:
-        """Of the values."""
-
-    def demanded(self, problem: GaitProblem) -> float:
-        """Least value that the problem as it is demands; -inf if none."""
-
-    def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The problem without a demand on it."""
-
-    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """The problem with a least value."""
-
-    def value(self, problem: GaitProblem, x: Array) -> float:
-        """Exact value at x (n,)."""
-
-    def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """(P,) values of candidates (P, n)."""
-
-    def expression(self, point: Point, assembly: Assembly) -> MX:
-        """Scalar."""
-
-    def price(self, solution: Solution) -> float:
-        """Change of the least power per unit of the demand [W/unit]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +32,7 @@ class Margin:
         return f"{self.name}_limit_m"
 
     def demanded(self, problem: GaitProblem) -> float:
-        """See ``Criterion``."""
+        """Least value that the problem as it is demands."""
         return problem.value(self.parameter)
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
@@ -75,29 +40,27 @@ class Margin:
         return problem.with_values(**{self.parameter: 0.0})
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """See ``Criterion``."""
+        """The problem with a least value."""
         return problem.with_values(**{self.parameter: least})
 
     def value(self, problem: GaitProblem, x: Array) -> float:
-        """See ``Criterion``."""
-        exact = exact_model(problem)
-        indexes = np.array(exact.function(x, problem.p)[-1]).ravel()
-        return float(indexes[exact.index_names.index(f"{self.name}_m")])
+        """Exact value at x (n,)."""
+        return exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """See ``Criterion``."""
+        """(P,) values of candidates (P, n)."""
         rows = [i for i, name in enumerate(objective.row_names) if name.partition("[")[0] == self._group]
         margins: Array = objective.constraints(X)[:, rows].min(axis=1)
         return margins
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
-        """See ``Criterion``; the mean margins only, which are smooth but for the jump that is smoothed anyway."""
+        """Scalar for the assembly of a problem, of the mean margins only: smooth but for the jump that is smoothed anyway."""
         if not self.name.endswith("_mean"):
             raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
         return assembly.group(self.name).value
 
     def price(self, solution: Solution) -> float:
-        """See ``Criterion``."""
+        """Change of the least power per unit of the demand [W/unit]."""
         return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self._group), 0.0)
 
     @property
@@ -121,7 +84,7 @@ class Speed:
     unit: str = "m/s"
 
     def demanded(self, problem: GaitProblem) -> float:
-        """See ``Criterion``."""
+        """Least value that the problem as it is demands."""
         return self.way_m / problem.value(f"{self.duration}.upper")
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
@@ -129,35 +92,39 @@ class Speed:
         return problem
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """See ``Criterion``."""
+        """The problem with a least value."""
         end = f"{self.duration}.upper"
         return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.way_m / least)})
 
     def value(self, problem: GaitProblem, x: Array) -> float:
-        """See ``Criterion``."""
+        """Exact value at x (n,)."""
         return self.way_m / float(x[problem.variable_index(self.duration)])
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """See ``Criterion``."""
+        """(P,) values of candidates (P, n)."""
         return self.way_m / X[:, objective.names.index(self.duration)]
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
-        """See ``Criterion``."""
+        """Scalar for the assembly of a problem."""
         return self.way_m / point[self.duration]
 
     def price(self, solution: Solution) -> float:
-        """See ``Criterion``: dP/dv = dP/dT dT/dv with T = way / v."""
+        """Change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = way / v."""
         per_second = sum(
             a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
         )
         return -per_second * solution.x[self.duration] ** 2 / self.way_m
 
 
-def criterion(name: str, problem: GaitProblem) -> Criterion:
-    """Criterion of a NAO phase by name.
+CompetingObjective = Margin | Speed
+"""A quantity that is to be large, and whose least value can be demanded by a parameter."""
+
+
+def competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
+    """What a NAO phase trades against power, by name.
 
     Raises:
-        UnknownNameError: no such criterion.
+        UnknownNameError: no such objective.
         InputError: the problem has no power, margins and duration to trade.
     """
     durations = problem.durations
@@ -172,7 +139,7 @@ def criterion(name: str, problem: GaitProblem) -> Criterion:
     return Speed(duration=durations[0], way_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
-def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
+def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
     """The problem that minimises power less a reward for the criterion, whose size is the parameter ``reward_W_per_unit``."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
@@ -191,7 +158,7 @@ def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
 
 
 def parse_objectives(text: str) -> Sequence[str]:
-    """Criteria beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
+    """Objectives beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
 
     Raises:
         InputError: power is missing, or a name stands twice, or there are less than two or more than three.
