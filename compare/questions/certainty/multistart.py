@@ -58,7 +58,7 @@ def multistart(
         progress: told of each batch when it begins and when it is done.
 
     Raises:
-        InputError: no start.
+        InputError: fewer than one start.
         OutputError: a batch cannot be kept.
     """
     if starts < 1:

@@ -19,7 +19,7 @@ DRAWN, LISTED = 20, 10  # best distinct optima
 
 
 def certainty_answer(study: Certainty) -> Answer:
-    """How certain it is that the best optimum known is the global one."""
+    """How certain it is that the best known optimum is the global one."""
     problem, estimate = study.problem, study.unseen
     unit = "" if problem.objective.unit == "1" else f" {problem.objective.unit}"
     optima = [(f"{o.objective:.6f}{unit}", f"{o.count:,}", f"{100 * o.share:.2f} %") for o in study.optima[:LISTED]]
@@ -42,7 +42,7 @@ def certainty_answer(study: Certainty) -> Answer:
             parts=(
                 text_table((problem.objective.name, "starts", "share"), optima, listed),
                 text_table(
-                    ("status", "starts"), [(k, f"{n:,}") for k, n in study.statuses.items()], "Ends of the starts"
+                    ("status", "starts"), [(k, f"{n:,}") for k, n in study.statuses.items()], "How the starts ended"
                 ),
                 text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, no proof"),
                 Figure(name=stem, caption=shown, drawing=certainty_figure(study)),

@@ -1,4 +1,4 @@
-"""How certain it is that the best optimum known is the global one: what is proven, and what is only supported."""
+"""How certain it is that the best known optimum is the global one: what is proven, and what is only supported."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ class LongSearch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certainty:
-    """Evidence.
+    """Evidence that the best known optimum is the global one.
 
     Attributes:
         problem: with its parameter values.
         starts: of IPOPT.
-        statuses: how often they ended how.
+        statuses: number of starts by how they ended.
         optima: distinct local optima, best first.
         unseen: what the counts say about others.
         ends: of all starts.
@@ -126,7 +126,7 @@ def certainty(
     seed: int = 0,
     progress: Progress = unwatched,
 ) -> Certainty:
-    """Starts, a long search and, for few variables, branch and bound; what is done is kept under ``out``.
+    """Evidence by many starts, a long search and, for few variables, branch and bound; each step is kept under ``out``.
 
     Args:
         problem: with its current parameter values.
@@ -143,7 +143,7 @@ def certainty(
         SearchError: CMA-ES is asked for and not installed.
         CompilerError: branch and bound is asked for and there is no compiler.
     """
-    # What is wrong is said now, not after the starts.
+    # Checked before the starts, which take long.
     if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
         raise InputError(
             f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"

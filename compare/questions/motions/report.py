@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from compare.questions.answer import Answer, all_digits
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.report.document import Document, Figure, Table, text_table
-from nlp_gait.problem import Array
+from nlp_gait.problem import Signals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
 
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
-# Points of a drawn path.
-DRAWN = 20
+DRAWN = 20  # samples of a drawn path for each of the problem's own
 
 
 def title(motion: Motion) -> str:
@@ -67,7 +65,7 @@ def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
             parts=(
                 text_table((*header, "dense power [W]", "dense violation"), rows, "Optima"),
                 Figure(name=stem, caption=over, drawing=power_figure(found)),
-                Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(paths(found))),
+                Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
                 _numbers(stem, found),
             ),
         ),
@@ -90,7 +88,7 @@ def _numbers(stem: str, found: Sequence[Motion]) -> Table:
 
 
 def sentences(found: Sequence[Motion]) -> list[str]:
-    """What the table says: the limits of the orders, the cheat between 11 samples, the price of smoothness."""
+    """What the table says: where the orders lead, what hides between 11 samples, the price of smoothness."""
     said = []
     for kind, (_, _, words) in LOOKS.items():
         powers = [m.power_W for m in found if m.task.kind == kind]
@@ -146,46 +144,35 @@ def power_figure(found: Sequence[Motion]) -> Drawing:
     return figure
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Path3:
-    """Paths (n, 3) of hip and swing foot [m]."""
+def path_figure(found: Sequence[Motion]) -> Drawing:
+    """Paths of the paper's cubics, of the richest planned motion and of the richest one with free joints.
 
-    label: str
-    hip: Array
-    foot: Array
-
-
-def paths(found: Sequence[Motion]) -> list[Path3]:
-    """Of the paper's cubics, the richest planned motion and the richest with free joints."""
-    chosen: dict[str, Motion] = {}
-    for m in found:
-        if m.task.kind in LOOKS:
-            chosen[m.task.kind] = m
-    drawn = [found[0], *(m for m in chosen.values() if m is not found[0])]
-    result = []
-    for m in drawn:
-        problem = m.task.spec.load().dense(DRAWN)
-        assert problem is not None  # a phase has one; for the type checker
-        arrays: Mapping[str, Array] = problem.signals(m.x).arrays
-        result.append(Path3(label=title(m), hip=arrays["hip"], foot=arrays["right_foot"]))
-    return result
-
-
-def path_figure(drawn: Sequence[Path3]) -> Drawing:
-    """Hip from above and from the side, and the swing foot from the side if it moves."""
-    swings = bool(np.ptp(drawn[0].foot[:, 0]) > 0.0)
+    The hip from above and from the side, and the swing foot from the side if it moves.
+    """
+    richest = {m.task.kind: m for m in found if m.task.kind in LOOKS}
+    drawn = [found[0], *(m for m in richest.values() if m is not found[0])]
+    arrays = [_signals(m).arrays for m in drawn]
+    swings = bool(np.ptp(arrays[0]["right_foot"][:, 0]) > 0.0)
     colours = (COLOURS["ipopt"], *(colour for colour, _, _ in LOOKS.values()))
     with style():
         figure = new_figure(6.3 if swings else 4.6, 2.4)
         panels: Sequence[Axes] = figure.subplots(1, 3 if swings else 2)
-        for path, colour, line in zip(drawn, colours, ("--", "-", "-"), strict=False):
-            x, y, z = 1e3 * path.hip.T
-            panels[0].plot(x, y, line, color=colour, label=path.label)
+        for motion, path, colour, line in zip(drawn, arrays, colours, ("--", "-", "-"), strict=False):
+            x, y, z = 1e3 * path["hip"].T
+            panels[0].plot(x, y, line, color=colour, label=title(motion))
             panels[1].plot(x, z, line, color=colour)
             if swings:
-                panels[2].plot(1e3 * path.foot[:, 0], 1e3 * path.foot[:, 2], line, color=colour)
+                foot = 1e3 * path["right_foot"]
+                panels[2].plot(foot[:, 0], foot[:, 2], line, color=colour)
         names = [("hip x [mm]", "hip y [mm]"), ("hip x [mm]", "hip height [mm]"), ("foot x [mm]", "foot height [mm]")]
         for axes, (along, up) in zip(panels, names, strict=False):
             axes.set(xlabel=along, ylabel=up)
         legend_below(figure)
     return figure
+
+
+def _signals(motion: Motion) -> Signals:
+    """Time histories that are dense enough to be drawn."""
+    problem = motion.task.spec.load().dense(DRAWN)
+    assert problem is not None  # a phase has one; for the type checker
+    return problem.signals(motion.x)

@@ -26,7 +26,7 @@ class Quality:
         algorithm: of pymoo.
         budget: evaluations.
         runs: number.
-        empty: runs without a feasible point; they count as hypervolume 0 and not in what follows.
+        empty: runs without a feasible point; they count as hypervolume 0 and are left out of what follows.
         hypervolume: (least, median, greatest) share of the true front's, with both ranges as 1 and the reference 1.1.
         igd: (least, median, greatest) mean distance from a point of the true front to the nearest one found.
         excess: (least, median, greatest) over runs of the mean power above the true front's at an equal criterion, relative.
@@ -43,11 +43,11 @@ class Quality:
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """The points of all runs that no other betters, those nearest to the front beside the least power at their own criterion.
+    """The best points of all runs, those nearest to the front compared with the least power at their own criterion.
 
     Attributes:
-        points: how many no other betters.
-        solved: how many of these were solved for.
+        points: how many are bettered by no other.
+        solved: for how many of these the least power was solved for.
         infeasible: of these, by the judge's exact functions.
         least_excess: smallest power above the least one found at an equal criterion, relative; negative if a point betters it.
         median_excess: likewise.
@@ -66,6 +66,8 @@ class Challenge:
 
 def quality(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[Quality]:
     """One row for each algorithm and budget."""
+    if not fronts:
+        return []
     from pymoo.indicators.hv import HV
     from pymoo.indicators.igd import IGD
 

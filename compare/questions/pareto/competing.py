@@ -1,4 +1,4 @@
-"""What is traded against power: a balance margin or the walking speed, each as a limit, a number and an expression."""
+"""Objectives that compete with power, a balance margin or the walking speed: each as a limit, a number and an expression."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Margin:
         return problem.value(self.parameter)
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
-        """Only zero is demanded: the ZMP within the soles' box."""
+        """The problem with the least demand: zero, which keeps the ZMP within the soles' box."""
         return problem.with_values(**{self.parameter: 0.0})
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
@@ -71,49 +71,49 @@ class Margin:
 
 @dataclass(frozen=True, kw_only=True)
 class Speed:
-    """Mean speed of the hip over the phase: the way that the phase prescribes, divided by the time that it takes.
+    """Mean speed of the hip over the phase: the distance that the phase prescribes, divided by its duration.
 
     Attributes:
         duration: variable that holds the phase's duration.
-        way_m: of the hip along x.
+        distance_m: of the hip along x.
     """
 
     duration: str
-    way_m: float
+    distance_m: float
     name: str = SPEED
     unit: str = "m/s"
 
     def demanded(self, problem: GaitProblem) -> float:
         """Least value that the problem as it is demands."""
-        return self.way_m / problem.value(f"{self.duration}.upper")
+        return self.distance_m / problem.value(f"{self.duration}.upper")
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The phase may last as long as the problem's own bound allows: no speed is demanded beyond that."""
+        """The problem itself: its bound on the duration stays, and no speed is demanded beyond that."""
         return problem
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
         """The problem with a least value."""
         end = f"{self.duration}.upper"
-        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.way_m / least)})
+        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.distance_m / least)})
 
     def value(self, problem: GaitProblem, x: Array) -> float:
         """Exact value at x (n,)."""
-        return self.way_m / float(x[problem.variable_index(self.duration)])
+        return self.distance_m / float(x[problem.variable_index(self.duration)])
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
         """(P,) values of candidates (P, n)."""
-        return self.way_m / X[:, objective.names.index(self.duration)]
+        return self.distance_m / X[:, objective.names.index(self.duration)]
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
         """Scalar for the assembly of a problem."""
-        return self.way_m / point[self.duration]
+        return self.distance_m / point[self.duration]
 
     def price(self, solution: Solution) -> float:
-        """Change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = way / v."""
+        """Change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
         per_second = sum(
             a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
         )
-        return -per_second * solution.x[self.duration] ** 2 / self.way_m
+        return -per_second * solution.x[self.duration] ** 2 / self.distance_m
 
 
 CompetingObjective = Margin | Speed
@@ -136,7 +136,7 @@ def competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
         raise unknown("objective beside power", name, (*MARGINS, SPEED))
     middle = (problem.lower + problem.upper) / 2
     hip = problem.signals(middle).arrays["hip"]
-    return Speed(duration=durations[0], way_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
+    return Speed(duration=durations[0], distance_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
 def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
@@ -161,7 +161,7 @@ def parse_objectives(text: str) -> Sequence[str]:
     """Objectives beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
 
     Raises:
-        InputError: power is missing, or a name stands twice, or there are less than two or more than three.
+        InputError: power is missing, or a name stands twice, or there are fewer than two or more than three.
     """
     names = [part.strip() for part in text.split(",")]
     others = [name for name in names if name != POWER]

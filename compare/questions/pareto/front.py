@@ -143,7 +143,7 @@ def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
 def front_ends(
     free: GaitProblem, criterion: CompetingObjective, starts: int, seed: int
 ) -> tuple[FrontPoint, FrontPoint]:
-    """Least power, and the point beyond which the criterion is too dear."""
+    """Least power, and the point beyond which the criterion costs too much."""
     solution = solve(free, starts=2 * starts, seed=seed)
     if not solution.success:
         raise InputError(f"{free.name} has no front: {solution.status}")

@@ -83,8 +83,8 @@ def _searches(study: ParetoStudy) -> tuple[Table | str, ...]:
     ]
     return (
         text_table(header, rows, "Searches: median over runs (least to greatest)"),
-        f"{outcome.points} points that no search point betters; {outcome.solved} lowest of these solved for: the nearest is "
-        f"{100 * outcome.least_excess:+.4f} % above the least power at its {study.criterion.name}; "
+        f"{outcome.points} points of the searches are bettered by no other; {outcome.solved} of these, the lowest, were solved "
+        f"for. The nearest is {100 * outcome.least_excess:+.4f} % above the least power at its {study.criterion.name}; "
         f"{outcome.moved} of them moved the front, {outcome.infeasible} are infeasible for the exact functions",
     )
 

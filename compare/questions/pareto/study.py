@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,7 @@ def pareto_study(
     seed: int,
     progress: Progress = unwatched,
 ) -> ParetoStudy:
-    """The front, and the searches beside it; what is done is kept under ``out`` and not done again.
+    """The front, and the searches beside it; finished steps are kept under ``out`` and not done again.
 
     Args:
         problem: of the front.
@@ -92,44 +93,33 @@ def pareto_study(
     """
     beside = competing_objective(name, problem)
     for algorithm, budgets in searches.items():
-        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # said now, not after the front
+        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # before the front, which takes long
     free = beside.freed(problem)
     steps = Steps(out, progress, code=[front_module])
     identity = {**fingerprint(free), "criterion": name}
 
-    def solved() -> list[dict[str, Any]]:
-        front = pareto_front(problem, beside, points=points, starts=starts, seed=seed, progress=progress)
-        return [asdict(point) for point in front]
-
     inputs = {**identity, "points": points, "starts": starts, "seed": seed}
-    front = [decoded(FrontPoint, point) for point in steps(f"front-{name}", inputs, solved)]
-    if not searches:
-        return _study(free, beside, front, (), None)
-    found = search_fronts(free, beside, Scale(front), out, searches=searches, runs=runs, seed=seed, progress=progress)
-    best = best_of_all(found)
-
-    def answered() -> dict[str, Any]:
-        return asdict(challenge(free, beside, front, best, progress=progress))
-
-    asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
-    outcome = decoded(Challenge, steps(f"challenge-{name}", asked, answered))
-    return _study(free, beside, outcome.front, found, outcome)
-
-
-def _study(
-    free: GaitProblem,
-    beside: CompetingObjective,
-    front: Sequence[FrontPoint],
-    found: Sequence[SearchFront],
-    outcome: Challenge | None,
-) -> ParetoStudy:
+    solved = partial(pareto_front, problem, beside, points=points, starts=starts, seed=seed, progress=progress)
+    kept = steps(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
+    front = [decoded(FrontPoint, point) for point in kept]
+    found: list[SearchFront] = []
+    outcome = None
+    if searches:
+        found = search_fronts(
+            free, beside, Scale(front), out, searches=searches, runs=runs, seed=seed, progress=progress
+        )
+        best = best_of_all(found)
+        asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
+        answered = partial(challenge, free, beside, front, best, progress=progress)
+        outcome = decoded(Challenge, steps(f"challenge-{name}", asked, lambda: asdict(answered())))
+        front = list(outcome.front)
     return ParetoStudy(
         problem=free,
         criterion=beside,
         front=tuple(front),
         bends=bends(front),
         searches=tuple(found),
-        qualities=tuple(quality(front, found)) if found else (),
+        qualities=tuple(quality(front, found)),
         challenge=outcome,
     )
 

@@ -12,9 +12,9 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, ExactValues, exact_model
 from nlp_gait.problem import Array, GaitProblem
 
-# Limits for which a worst corner is looked for in one round, dearest violation first, one of each group of rows.
+# Limits for which a round looks for the worst corner: the largest violations, one of each group of rows.
 CORNERS_IN_ROUND = 3
-# A corner costs more if it does so by this share of the worst known one.
+# A corner costs more than the worst known one if it does so by more than this share.
 COST_TOLERANCE = 1e-6
 
 Box = Mapping[str, float]  # half-widths by the robot's quantity

@@ -1,12 +1,12 @@
 """The price of a motion that keeps its limits whatever masses and soles turn out to be within their tolerances.
 
 The uncertain robots form a box: each mass within a share, each sole within a distance. A scenario problem over a few of its
-corners is solved; then the corner that is worst for each limit, by the rows' derivatives, joins them, until no corner that is
-found so breaks a limit or costs more.
+corners is solved; then the corner that is worst for each limit, by the rows' derivatives, joins them, until none that is found in
+this way breaks a limit or costs more.
 
 Source:
     Mutapcic, Boyd (2009), Cutting-set methods for robust convex optimization with pessimizing oracles, used here on a problem
-    that is not convex: the corners found are checked exactly, that there is no worse point in the box is not proven.
+    that is not convex: the corners are checked exactly, but it is not proven that the box holds no worse point.
 """
 
 from __future__ import annotations
