@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from compare.study.progress import Progress, unwatched
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 

@@ -18,11 +18,11 @@ from compare.questions.certainty.multistart import Ends, multistart
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
 from compare.study.task import made_with
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 # Branch and bound is for this many variables at most: its work grows exponentially with them.
 MOST_CERTIFIED = 4

@@ -108,7 +108,7 @@ def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int)
         starts=task.starts + 1,
         seed=seed,
         x0=x0,
-        settings=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
+        solver=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
     )
     x = problem.check_x(solution.x)
     verdict = evaluate(problem, x)

@@ -12,8 +12,9 @@ from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from compare.study.progress import Progress, unwatched
 from metaheuristics.interface import Array
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 MOST_CHALLENGES = 1000
 

@@ -39,8 +39,7 @@ def padded(problem: GaitProblem, coefficients: float | Array = 0.0) -> Array:
 
 
 def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    exact = exact_model(problem)
-    return dict(zip(exact.index_names, np.array(exact.function(x, problem.p)[5]).ravel().tolist(), strict=True))
+    return exact_model(problem).at(x, problem.p).indexes
 
 
 def some(problem: GaitProblem, seed: int = 0) -> Array:
@@ -139,7 +138,7 @@ def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, sign
     assert problem.signals is not None
     arrays = problem.signals(padded(problem)).arrays
     rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
-    cost = float(exact_model(problem).function(padded(problem), problem.p)[0])
+    cost = exact_model(problem).at(padded(problem), problem.p).cost
     assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)
 
 
