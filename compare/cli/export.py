@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import ResultFile, command, output_file, stdout
+from compare.cli.command import command
+from compare.cli.common import output_file, print_written
+from compare.cli.options import ResultFile
 from nlp_gait.errors import unknown
 from nlp_gait.export.setpoints import PERIOD_MS
 
@@ -33,4 +35,4 @@ def export(
     loaded = load_result(result)
     target = output_file(out if out is not None else result.with_name(result.stem + FORMATS[format_]))
     write_as(format_, target, loaded, period_ms)
-    stdout.print(f"wrote {target}", soft_wrap=True, markup=False)
+    print_written(target)

@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import AsJson, command, print_json, stdout
+from compare.cli.command import command
+from compare.cli.common import print_result
+from compare.cli.options import AsJson
 from nlp_gait.errors import InputError
 
 
@@ -35,8 +37,4 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     written = rebuild_report(folder, weighting)
-    if as_json:
-        print_json({"files": [str(path) for path in written]})
-        return
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)
+    print_result(as_json, {}, written, lambda: None)

@@ -7,26 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    print_json,
-    print_table,
-    problem_spec,
-    progress_bar,
-    stdout,
-)
-from compare.cli.resumable import resumable, whole
+from compare.analysis.units import with_unit
+from compare.cli.command import command
+from compare.cli.common import print_result, print_rows, progress_bar, stdout
+from compare.cli.interrupts import resumable, whole
+from compare.cli.options import AsJson, NamedProblem, Seed
 from nlp_gait.errors import InputError
-from nlp_gait.files import write_json
+from nlp_gait.files import writable_folder, write_json
 
 if TYPE_CHECKING:
     from compare.questions.pareto.study import ParetoStudy
@@ -36,7 +23,7 @@ SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 
 @command
 def pareto(
-    problem: ProblemName,
+    *,
     objectives: Annotated[
         str,
         typer.Option(
@@ -54,12 +41,7 @@ def pareto(
     ] = None,
     runs: Annotated[int, typer.Option(min=1, help="Runs of each search.")] = 11,
     seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
+    problem: NamedProblem,
     out: Annotated[Path, typer.Option(help="Folder; finished runs in it are kept.")] = Path("pareto"),
     as_json: AsJson = False,
 ) -> None:
@@ -73,7 +55,6 @@ def pareto(
     from compare.questions.pareto.report import write_front
     from compare.questions.pareto.study import pareto_study, parse_searches
     from compare.questions.pareto.surface import pareto_surface, surface_json, write_surface
-    from nlp_gait.files import writable_folder
 
     names = parse_objectives(objectives)
     searches = parse_searches(search or SEARCHES)
@@ -81,7 +62,7 @@ def pareto(
     if three and search and searches:
         raise InputError("three objectives are traded without searches; leave out --search")
     folder = writable_folder(out)
-    loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
+    loaded = problem.spec().load()
     with whole() if three else resumable(folder), progress_bar("front", None) as advance:
         if three:
             surface = pareto_surface(loaded, names, points=points, starts=starts, seed=seed, progress=advance)
@@ -101,64 +82,59 @@ def pareto(
             )
             written = write_front(folder, study.front, study.bends, study.searches, loaded, study.criterion)
             data = study.to_json()
-    target = folder / f"{problem}-pareto-{'-'.join(names)}.json"
+    target = folder / f"{problem.name}-pareto-{'-'.join(names)}.json"
     write_json(target, data)
-    if as_json:
-        print_json({**data, "files": [str(path) for path in (*written, target)]})
-        return
-    if not three:
-        _print(study)
-    for path in (*written, target):
-        stdout.print(f"wrote {path}", soft_wrap=True)
+    print_result(as_json, data, [*written, target], lambda: None if three else _print(study))
 
 
 def _print(study: ParetoStudy) -> None:
-    unit, front = study.criterion.unit, study.front
+    name, unit, front = study.criterion.name, study.criterion.unit, study.front
+    price_unit = f"W per {unit}"
     shown = [front[i] for i in sorted({round(k * (len(front) - 1) / 9) for k in range(10)})]
-    print_table(
-        f"{study.problem.name}: front of power against {study.criterion.name}, {len(front)} points, {len(shown)} shown",
-        (study.criterion.name, "power", "price"),
-        [(f"{p.value:.5f} {unit}", f"{p.power_W:.5f} W", f"{p.price:.4g} W per {unit}") for p in shown],
+    print_rows(
+        f"{study.problem.name}: front of power against {name}, {len(front)} points, {len(shown)} shown",
+        shown,
+        {
+            name: lambda p: with_unit(p.value, unit, ".5f"),
+            "power": lambda p: with_unit(p.power_W, "W", ".5f"),
+            "price": lambda p: with_unit(p.price, price_unit, ".4g"),
+        },
     )
-    print_table(
+    print_rows(
         "Knees: turns of at least 15 degrees within a tenth of the front's length, both ranges being 1",
-        (study.criterion.name, "power", "turn", "price before", "price after"),
-        [
-            (
-                f"{k.value:.5f} {unit}",
-                f"{k.power_W:.5f} W",
-                f"{k.turn_deg:.0f} degrees",
-                f"{k.price_before:.4g} W per {unit}",
-                f"{k.price_after:.4g} W per {unit}",
-            )
-            for k in study.bends.knees
-        ],
+        study.bends.knees,
+        {
+            name: lambda k: with_unit(k.value, unit, ".5f"),
+            "power": lambda k: with_unit(k.power_W, "W", ".5f"),
+            "turn": lambda k: with_unit(k.turn_deg, "degrees", ".0f"),
+            "price before": lambda k: with_unit(k.price_before, price_unit, ".4g"),
+            "price after": lambda k: with_unit(k.price_after, price_unit, ".4g"),
+        },
     )
     if study.challenge is None:
         return
-    print_table(
+    print_rows(
         "Searches: median over runs (least to greatest)",
-        ("algorithm", "evaluations", "hypervolume, of the front's", "IGD", "mean power above the front"),
-        [
-            (
-                q.algorithm,
-                f"{q.budget:,}",
-                _spread(q.hypervolume, 100, " %"),
-                "-" if q.igd is None else _spread(q.igd, 1, ""),
-                "-" if q.excess is None else _spread(q.excess, 100, " %"),
-            )
-            for q in study.qualities
-        ],
+        study.qualities,
+        {
+            "algorithm": lambda q: q.algorithm,
+            "evaluations": lambda q: f"{q.budget:,}",
+            "hypervolume, of the front's": lambda q: _spread(q.hypervolume, 100, " %"),
+            "IGD": lambda q: _spread(q.igd, 1, ""),
+            "mean power above the front": lambda q: _spread(q.excess, 100, " %"),
+        },
     )
     c = study.challenge
     stdout.print(
         f"{c.points} points that no search point betters; {c.solved} lowest of these solved for: the nearest is "
-        f"{100 * c.least_excess:+.4f} % above the least power at its {study.criterion.name}; "
+        f"{100 * c.least_excess:+.4f} % above the least power at its {name}; "
         f"{c.moved} of them moved the front, {c.infeasible} are infeasible for the exact functions",
         soft_wrap=True,
     )
 
 
-def _spread(values: tuple[float, float, float], factor: float, unit: str) -> str:
+def _spread(values: tuple[float, float, float] | None, factor: float, unit: str) -> str:
+    if values is None:
+        return "-"
     least, median, greatest = (f"{factor * value:.3g}" for value in values)
     return f"{median}{unit} ({least} to {greatest}{unit})"
