@@ -44,7 +44,7 @@ app = typer.Typer(
 )
 app.command("list")(list_problems)
 for function in (*COMPARISON, *QUESTIONS, *ROBOT):
-    app.command()(function)
+    app.command(function.__name__)(function)
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ def animate(
         Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
     ] = None,
     frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second.")] = 12.5,
-    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="1 is real time.")] = 1.0,
+    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
     poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.

@@ -21,7 +21,7 @@ def export(
     out: Annotated[
         Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
     ] = None,
-    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows.")] = PERIOD_MS,
+    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows [ms].")] = PERIOD_MS,
 ) -> None:
     """Write a gait in a format that other tools read.
 

@@ -18,6 +18,7 @@ from nlp_gait.problem.registry import problem_maker
 ResultFile = Annotated[
     Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
 ]
+ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
 Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
@@ -78,7 +79,7 @@ class ProblemOptions:
 class NamedProblem(ProblemOptions):
     """A problem by its name, how it is built, and its values."""
 
-    name: Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
+    name: ProblemName
 
     def spec(self) -> ProblemSpec:
         """The problem, checked; raises as ``spec_of``."""
@@ -89,9 +90,7 @@ class NamedProblem(ProblemOptions):
 class NaoPhase(NamedProblem):
     """A problem that is nao-ssp unless another is named."""
 
-    name: Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-dsp; see `nlp-gait list`.")] = (
-        "nao-ssp"
-    )
+    name: ProblemName = "nao-ssp"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,9 +110,9 @@ class SearchOptions:
         None
     )
     stagnation: Annotated[
-        int | None, typer.Option(min=1, help="End a search after so many generations without progress.")
+        int | None, typer.Option(min=1, help="End a search after this many generations without progress.")
     ] = None
-    time_limit: Annotated[float | None, typer.Option(help="End a run after so many seconds.")] = None
+    time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
     polish: Annotated[
         bool, typer.Option("--polish", help="IPOPT from each search's result, as a solver of its own.")
     ] = False

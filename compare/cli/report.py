@@ -16,12 +16,12 @@ from nlp_gait.errors import InputError
 
 @command
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: what --out was.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     gradient_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts (default n + 1).")
+        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts as (default n + 1).")
     ] = None,
     hessian_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts (default (n + 1)(n + 2)/2).")
+        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts as (default (n + 1)(n + 2)/2).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def simulate(
     result: ResultFile,
     steps: Annotated[
-        int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")
+        int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
     ] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,

@@ -97,7 +97,7 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
         axis.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
     else:
         axis.axhline(0.0, color=GROUND, lw=1.0)
-    draw_pose(axis, skeleton, k, (across, up), 0.25 if view == "above" else 1.0)
+    _draw_pose(axis, skeleton, k, (across, up), 0.25 if view == "above" else 1.0)
     low, high = skeleton.box()
     ground_low = min(float(low[2]), 0.0 if not skeleton.planar else float(skeleton.ground[:, 1].min()))
     low = np.array([low[0], low[1], ground_low])
@@ -110,16 +110,8 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
     axis.set_ylabel(AXIS_NAMES[up])
 
 
-def draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opacity: float = 1.0) -> None:
-    """Soles, limbs, centre of mass and ZMP at sample k.
-
-    Args:
-        axis: to draw in, of two or three dimensions.
-        skeleton: the gait.
-        k: sample.
-        seen: coordinates along the axes.
-        opacity: of the limbs.
-    """
+def _draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opacity: float = 1.0) -> None:
+    """Soles, limbs, centre of mass and ZMP at sample k, in axes of two or three dimensions that show these coordinates."""
     for sole in skeleton.soles:
         axis.plot(*outline(sole, k)[:, seen].T, color=COLOURS[sole.side], lw=1.0)
     for limb in skeleton.limbs:
@@ -141,7 +133,7 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     if support is not None:
         corners = np.column_stack([support, np.zeros(len(support))])
         axis.add_collection3d(Poly3DCollection([corners], color=SUPPORT, alpha=0.3, lw=0))
-    draw_pose(axis, skeleton, k, (0, 1, 2))
+    _draw_pose(axis, skeleton, k, (0, 1, 2))
     low, high = skeleton.box()
     low = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN
     high = high + MARGIN

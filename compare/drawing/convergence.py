@@ -33,14 +33,7 @@ def convergence_figure(comparison: Comparison) -> Figure:
 
 
 def cost_figure(comparison: Comparison, draw: Draw, words: str, both: bool = False) -> Figure:
-    """Two axes, of evaluations and of seconds, with something drawn for each solver.
-
-    Args:
-        comparison: the solvers.
-        draw: called with the axes, a solver, its look, and the name of the cost: ``"evaluations"`` or ``"seconds"``.
-        words: of the y axis.
-        both: whether the y axis is logarithmic too.
-    """
+    """Axes of evaluations and of seconds; ``draw`` gets the axes, a solver, its look, and which of both the costs are."""
     look = looks([solver.name for solver in comparison.solvers])
     with style():
         figure = new_figure(7.4, 2.8)

@@ -25,9 +25,9 @@ SHOWN = 4  # changes of a robot that are named in a table, largest first
 @command
 def robust(
     *,
-    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Half-width of every mass [%].")] = 5.0,
+    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
     sole: Annotated[
-        float, typer.Option(min=0.0, max=20.0, help="Half-width of the soles' position, x and y [mm].")
+        float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
     ] = 2.0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts of the nominal problem.")] = 10,
     seed: Seed = 0,
@@ -37,7 +37,7 @@ def robust(
     out: TableFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
-    """Find the least power of a gait that keeps its limits whatever masses and soles are within their tolerances.
+    """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """

@@ -29,7 +29,8 @@ def walk(
         typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,..."),
     ] = "speed_m_s=0.01:0.1:10",
     steps: Annotated[
-        int, typer.Option(min=0, max=1000, help="Play so many steps of each gait in MuJoCo (extra sim); 0 plays none.")
+        int,
+        typer.Option(min=0, max=1000, help="Play this many steps of each gait in MuJoCo (extra sim); 0 plays none."),
     ] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
@@ -39,7 +40,7 @@ def walk(
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
-    The problem is nao-cycle at least power; each point starts from its neighbours. A cycle is played open loop.
+    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. A cycle is played open loop.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --steps 10`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
