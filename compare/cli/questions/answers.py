@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.cli.common import print_json, print_table, stdout
+from compare.cli.common import print_result, print_table, stdout
 from nlp_gait.errors import OutputError
 
 if TYPE_CHECKING:
@@ -24,12 +24,7 @@ def hand_out(answer: Answer, folder: Path, as_json: bool) -> None:
         written = answer.write(folder)
     except OutputError as error:
         unwritten = error
-    if as_json:
-        print_json({**answer.data, "files": [str(path) for path in written]})
-    else:
-        _print(answer)
-        for path in written:
-            stdout.print(f"wrote {path}", soft_wrap=True)
+    print_result(as_json, answer.data, written, lambda: _print(answer))
     if unwritten is not None:
         raise unwritten
 

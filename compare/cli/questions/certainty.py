@@ -7,40 +7,27 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    problem_spec,
-    progress_bar,
-)
+from compare.cli.command import command
+from compare.cli.common import progress_bar
+from compare.cli.interrupts import resumable
+from compare.cli.options import AsJson, NamedProblem, Seed
 from compare.cli.questions.answers import hand_out
-from compare.cli.resumable import resumable
+from nlp_gait.files import writable_folder
 
 
 @command
 def certainty(
-    problem: ProblemName,
+    *,
     starts: Annotated[int, typer.Option(min=1, help="Random starts of IPOPT.")] = 10_000,
-    evaluations: Annotated[int, typer.Option(min=0, help="Of one long CMA-ES with restarts; 0 for none.")] = 1_000_000,
-    tolerance: Annotated[float, typer.Option(help="Of the certificate, relative to the objective.")] = 0.01,
+    evaluations: Annotated[
+        int, typer.Option(min=0, help="Budget of one long CMA-ES with restarts; 0 for none.")
+    ] = 1_000_000,
+    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
     time_limit: Annotated[
-        float, typer.Option(min=0.0, help="Of the certificate [s], for at most four variables; 0 for none.")
+        float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables; 0 for none.")
     ] = 600.0,
     seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
+    problem: NamedProblem,
     out: Annotated[Path, typer.Option(help="Folder; finished batches in it are kept.")] = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
@@ -50,10 +37,9 @@ def certainty(
     """
     from compare.questions.certainty.report import certainty_answer
     from compare.questions.certainty.study import certainty as study_certainty
-    from nlp_gait.files import writable_folder
 
     folder = writable_folder(out)
-    loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
+    loaded = problem.spec().load()
     with resumable(folder), progress_bar("starts, search, proof", None) as advance:
         study = study_certainty(
             loaded,

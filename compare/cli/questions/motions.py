@@ -7,9 +7,12 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import AsJson, Seed, command, fail, progress_bar
+from compare.cli.command import command
+from compare.cli.common import fail, progress_bar
+from compare.cli.interrupts import resumable
+from compare.cli.options import RESULTS, AsJson, Seed, names_in
 from compare.cli.questions.answers import hand_out
-from compare.cli.resumable import resumable
+from nlp_gait.files import writable_folder
 
 
 @command
@@ -24,9 +27,7 @@ def motions(
     starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    out: Annotated[Path, typer.Option(help="Folder for results, table and pictures; continued from there.")] = Path(
-        "results"
-    ),
+    out: Annotated[Path, typer.Option(help="Folder for results, table and pictures; continued from there.")] = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.
@@ -39,17 +40,12 @@ def motions(
     from compare.questions.motions.report import motions_answer
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
-    from nlp_gait.files import writable_folder
 
     folder = writable_folder(out)
-    study = tasks(problem, orders=_names(orders), free_orders=_names(free_orders), robot=robot, starts=starts)
+    study = tasks(problem, orders=names_in(orders), free_orders=names_in(free_orders), robot=robot, starts=starts)
     with resumable(folder), progress_bar("motions", len(study)) as advance:
         found = run(study, folder, seed=seed, progress=advance)
     hand_out(motions_answer(found, problem), folder, as_json)
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]

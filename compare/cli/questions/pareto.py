@@ -7,30 +7,20 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    problem_spec,
-    progress_bar,
-)
+from compare.cli.command import command
+from compare.cli.common import progress_bar
+from compare.cli.interrupts import resumable, whole
+from compare.cli.options import AsJson, NamedProblem, Seed
 from compare.cli.questions.answers import hand_out
-from compare.cli.resumable import resumable, whole
 from nlp_gait.errors import InputError
+from nlp_gait.files import writable_folder
 
 SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 
 
 @command
 def pareto(
-    problem: ProblemName,
+    *,
     objectives: Annotated[
         str,
         typer.Option(
@@ -48,12 +38,7 @@ def pareto(
     ] = None,
     runs: Annotated[int, typer.Option(min=1, help="Runs of each search.")] = 11,
     seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
+    problem: NamedProblem,
     out: Annotated[Path, typer.Option(help="Folder; finished runs in it are kept.")] = Path("pareto"),
     as_json: AsJson = False,
 ) -> None:
@@ -67,7 +52,6 @@ def pareto(
     from compare.questions.pareto.report import front_answer
     from compare.questions.pareto.study import pareto_study, parse_searches
     from compare.questions.pareto.surface import pareto_surface, surface_answer
-    from nlp_gait.files import writable_folder
 
     names = parse_objectives(objectives)
     searches = parse_searches(search or SEARCHES)
@@ -75,7 +59,7 @@ def pareto(
     if three and search and searches:
         raise InputError("three objectives are traded without searches; leave out --search")
     folder = writable_folder(out)
-    loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
+    loaded = problem.spec().load()
     with whole() if three else resumable(folder), progress_bar("front", None) as advance:
         if three:
             surface = pareto_surface(loaded, names, points=points, starts=starts, seed=seed, progress=advance)

@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    end_interrupted,
-    problem_spec,
-    progress_bar,
-)
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, progress_bar
+from compare.cli.options import RESULTS, AsJson, NaoPhase, Seed, TableFolder
 from compare.cli.questions.answers import hand_out
+from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
     from compare.questions.robust.playback import Played
@@ -32,25 +20,20 @@ if TYPE_CHECKING:
 
 @command
 def robust(
-    problem: ProblemName = "nao-ssp",
-    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Half-width of every mass [%].")] = 5.0,
+    *,
+    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
     sole: Annotated[
-        float, typer.Option(min=0.0, max=20.0, help="Half-width of the soles' position, x and y [mm].")
+        float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
     ] = 2.0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts of the nominal problem.")] = 10,
     seed: Seed = 0,
     samples: Annotated[int, typer.Option(min=0, help="Random corners on which each result is checked.")] = 20,
     simulate: Annotated[bool, typer.Option(help="Play both gaits in MuJoCo on the worst robots (extra sim).")] = True,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
-    out: Annotated[Path, typer.Option(help="Folder for the CSV table and the picture.")] = Path("results"),
+    problem: NaoPhase,
+    out: TableFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
-    """Find the least power of a gait that keeps its limits whatever masses and soles are within their tolerances.
+    """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """
@@ -58,14 +41,13 @@ def robust(
     from compare.questions.robust.report import robust_answer
     from compare.questions.robust.study import boxes
     from compare.questions.robust.study import robust as find
-    from nlp_gait.files import writable_folder
 
     if simulate:
         from nlp_gait.simulation.engine import mujoco
 
         mujoco()
     folder = writable_folder(out)
-    spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
+    spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
     found: list[Robust] = []
     runs: Sequence[Played] = ()
@@ -79,6 +61,6 @@ def robust(
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
             end_interrupted(f"{stopped}; nothing was written")
-    hand_out(robust_answer(problem, found, runs), folder, as_json)
+    hand_out(robust_answer(problem.name, found, runs), folder, as_json)
     if stopped:
         end_interrupted(f"{stopped}; what was found is in {folder}")

@@ -2,47 +2,28 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    end_interrupted,
-    problem_spec,
-    progress_bar,
-)
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, progress_bar
+from compare.cli.interrupts import until_interrupted
+from compare.cli.options import RESULTS, AsJson, Evaluations, NamedProblem, Seed, TableFolder
 from compare.cli.questions.answers import hand_out
-
-if TYPE_CHECKING:
-    from compare.questions.sweep.study import SweepPoint
+from nlp_gait.files import writable_folder
 
 
 @command
 def sweep(
-    problem: ProblemName,
+    *,
     over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
-    algorithm: Annotated[str, typer.Option(help="An NLP solver, or a search algorithm; see nlp-gait list.")] = "ipopt",
+    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
     starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
-    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")] = 10_000,
+    evaluations: Evaluations = 10_000,
     seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
-    out: Annotated[Path, typer.Option(help="Folder for the CSV table and the picture.")] = Path("results"),
+    problem: NamedProblem,
+    out: TableFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
@@ -52,17 +33,13 @@ def sweep(
     from compare.questions.sweep.report import sweep_answer
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
-    from compare.study.task import GRADIENT_SOLVERS
-    from nlp_gait.backends.interrupts import Interrupted
-    from nlp_gait.files import writable_folder
 
     folder = writable_folder(out)
-    spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
+    spec = problem.spec()
     axes = [parse_axis(text) for text in over]
-    stopped = ""
     with progress_bar("solves", count_solves(axes, algorithm)) as advance:
-        try:
-            points = run_sweep(
+        points, stopped = until_interrupted(
+            lambda: run_sweep(
                 spec,
                 axes,
                 algorithm=algorithm,
@@ -71,11 +48,8 @@ def sweep(
                 seed=seed,
                 progress=advance,
             )
-        except Interrupted as interrupt:
-            points, stopped = cast("list[SweepPoint]", interrupt.partial), interrupt.sentence
-            if not points:
-                end_interrupted(f"{stopped}; nothing was written")
+        )
     hand_out(sweep_answer(points, spec.load(), algorithm), folder, as_json)
     if stopped:
-        not_twice = ", not all of them solved from both sides" if algorithm in GRADIENT_SOLVERS else ""
+        not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
         end_interrupted(f"{stopped}; these are in {folder}{not_twice}")

@@ -2,53 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Fix,
-    Intervals,
-    Options,
-    Robot,
-    Seed,
-    Set,
-    command,
-    end_interrupted,
-    fail,
-    problem_spec,
-    progress_bar,
-)
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, fail, progress_bar
+from compare.cli.interrupts import until_interrupted
+from compare.cli.options import RESULTS, AsJson, ProblemOptions, Seed
 from compare.cli.questions.answers import hand_out
-
-if TYPE_CHECKING:
-    from compare.questions.walk.study import Gait
+from nlp_gait.files import writable_folder
 
 
 @command
 def walk(
+    *,
     over: Annotated[
         str,
         typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,..."),
     ] = "speed_m_s=0.01:0.1:10",
     steps: Annotated[
-        int, typer.Option(min=0, max=1000, help="Play so many steps of each gait in MuJoCo (extra sim); 0 plays none.")
+        int,
+        typer.Option(min=0, max=1000, help="Play this many steps of each gait in MuJoCo (extra sim); 0 plays none."),
     ] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
-    out: Annotated[Path, typer.Option(help="Folder for the table, the gaits and the pictures.")] = Path("results"),
+    problem: ProblemOptions,
+    out: Annotated[Path, typer.Option(help="Folder for the table, the gaits and the pictures.")] = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
-    The problem is nao-cycle at least power; each point starts from its neighbours. A cycle is played open loop.
+    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. A cycle is played open loop.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --steps 10`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
@@ -56,28 +43,24 @@ def walk(
     from compare.questions.sweep.study import parse_axis
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLE, optimal_gaits, played, solves
-    from nlp_gait.backends.interrupts import Interrupted
-    from nlp_gait.files import writable_folder
     from nlp_gait.simulation.engine import mujoco
 
     if steps:
         mujoco()  # said now if it is missing, not after the work
     folder, axis = writable_folder(out), parse_axis(over)
-    spec = problem_spec(CYCLE, robot, intervals, None, ["objective=power", *(option or ())], values, fix)
-    stopped = ""
-    try:
-        with progress_bar("solves", solves(axis)) as advance:
-            gaits = optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
-        with progress_bar("walks", len(gaits)) as advance:
-            for i, gait in enumerate(gaits if steps else ()):
-                gaits[i] = played(spec, gait, steps)
-                advance(f"{gait.at:g}")
-    except Interrupted as interrupt:
-        gaits, stopped = cast("list[Gait]", interrupt.partial), interrupt.sentence
-        if not gaits:
-            end_interrupted(f"{stopped}; nothing was written")
-    except KeyboardInterrupt:
-        stopped = "interrupted while the gaits were played"
+    spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
+    with progress_bar("solves", solves(axis)) as advance:
+        gaits, stopped = until_interrupted(
+            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
+        )
+    if steps and not stopped:
+        try:
+            with progress_bar("walks", len(gaits)) as advance:
+                for i, gait in enumerate(gaits):
+                    gaits[i] = played(spec, gait, steps)
+                    advance(f"{gait.at:g}")
+        except KeyboardInterrupt:
+            stopped = "interrupted while the gaits were played"
     hand_out(walk_answer(spec, gaits), folder, as_json)
     if stopped:
         end_interrupted(f"{stopped}; what was found is in {folder}")
