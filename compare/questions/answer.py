@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from compare.report.document import Document, Table, Value, text_table
 from compare.report.writing import write_document
 from nlp_gait.files import without_nan, write_json
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
-    """An answer, ready to be printed and written.
+class Answer(Document):
+    """A document that is printed too, with what other programs read. Its tables with a name are for these, not for printing.
 
     Attributes:
-        stem: name of the report and of the data, without ending.
-        document: the answer for people. Its tables with a name are for other programs, the others are printed too.
+        stem: name of the page and of the data, without ending.
         data: the whole answer as plain data.
         results: gaits for the other commands, by the names of their files, without ending.
     """
 
     stem: str
-    document: Document
     data: Mapping[str, Any]
     results: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
@@ -34,11 +34,16 @@ class Answer:
         Raises:
             OutputError: a file cannot be written.
         """
-        written = write_document(folder, self.document, self.stem)
+        written = write_document(folder, self, self.stem)
         for name, data in {**self.results, self.stem: self.data}.items():
             written.append(folder / f"{name}.json")
             write_json(written[-1], without_nan(data))
         return written
+
+
+def table_of(caption: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
+    """Table for people with a row for each item: under each heading, what its column says of the item."""
+    return text_table(tuple(columns), [[cell(item) for cell in columns.values()] for item in items], caption)
 
 
 def all_digits(name: str, header: Sequence[str], rows: Sequence[Sequence[Value]]) -> Table:
@@ -52,7 +57,5 @@ def optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:
     Args:
         optima: x by variable name, under the heading of its column.
     """
-    names = next(iter(optima.values()))
-    return text_table(
-        ("variable", *optima), [(name, *(f"{x[name]:.5g}" for x in optima.values())) for name in names], "Optima"
-    )
+    rows = [(name, *(f"{x[name]:.5g}" for x in optima.values())) for name in next(iter(optima.values()))]
+    return text_table(("variable", *optima), rows, "Optima")

@@ -33,8 +33,7 @@ def _print(answer: Answer) -> None:
     """Sentences and tables in the document's order, without what stands on the page for other programs."""
     from compare.report.document import Table, leaves
 
-    document = answer.document
-    for part in (document.title, *document.verdict, *leaves(document.parts)):
+    for part in (answer.title, *answer.verdict, *leaves(answer.parts)):
         if isinstance(part, str):
             stdout.print(part, soft_wrap=True)
         elif isinstance(part, Table) and not part.name:

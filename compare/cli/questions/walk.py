@@ -40,16 +40,16 @@ def walk(
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --steps 10`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
-    from compare.questions.sweep.study import parse_axis
+    from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.walk.report import walk_answer
-    from compare.questions.walk.study import CYCLE, optimal_gaits, played, solves
+    from compare.questions.walk.study import CYCLE, optimal_gaits, played
     from nlp_gait.simulation.engine import mujoco
 
     if steps:
         mujoco()  # said now if it is missing, not after the work
     folder, axis = writable_folder(out), parse_axis(over)
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
-    with progress_bar("solves", solves(axis)) as advance:
+    with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(
             lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
         )

@@ -29,14 +29,12 @@ class Ends:
         objective: (N,) exact values, in the problem's sense.
         success: (N,) converged, and feasible for the exact functions.
         status: (N,) in words.
-        time_s: (N,) wall time of each solve [s].
     """
 
     x: Array
     objective: Array
     success: np.ndarray[Any, np.dtype[np.bool_]]
     status: tuple[str, ...]
-    time_s: Array
 
 
 def multistart(
@@ -74,23 +72,22 @@ def multistart(
         inputs = {**identity, "batch": k, "count": count}
         rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ready, seed, k, count))
         progress(f"{len(rows)} starts")
-    x, objective, success, status, time_s = zip(*rows, strict=True)
+    x, objective, success, status = zip(*rows, strict=True)
     return Ends(
         x=np.array(x, dtype=float),
         # what is not finite is kept as null
         objective=np.array([np.nan if value is None else value for value in objective], dtype=float),
         success=np.array(success, dtype=bool),
         status=tuple(status),
-        time_s=np.array(time_s, dtype=float),
     )
 
 
 def _batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> list[list[Any]]:
-    """x, objective, success, status and time of each start of a batch, as plain data."""
+    """x, objective, success and status of each start of a batch, as plain data."""
     rng = np.random.default_rng([seed, batch])
     rows: list[list[Any]] = []
     for _ in range(count):
         end = solver.run(problem, problem.start_point(rng))
         objective = end.objective if np.isfinite(end.objective) else None
-        rows.append([end.x.tolist(), objective, bool(end.success), end.status, end.time_s])
+        rows.append([end.x.tolist(), objective, bool(end.success), end.status])
     return rows

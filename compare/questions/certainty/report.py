@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer
 from compare.questions.certainty.study import Certainty
-from compare.report.document import Document, Figure, text_table
+from compare.report.document import Figure, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -21,32 +22,29 @@ DRAWN, LISTED = 20, 10  # best distinct optima
 def certainty_answer(study: Certainty) -> Answer:
     """How certain it is that the best known optimum is the global one."""
     problem, estimate = study.problem, study.unseen
-    unit = "" if problem.objective.unit == "1" else f" {problem.objective.unit}"
-    optima = [(f"{o.objective:.6f}{unit}", f"{o.count:,}", f"{100 * o.share:.2f} %") for o in study.optima[:LISTED]]
+    unit = problem.objective.unit
+    optima = [(with_unit(o.objective, unit), f"{o.count:,}", f"{100 * o.share:.2f} %") for o in study.optima[:LISTED]]
     listed = f"Distinct optima of {study.starts:,} starts, {len(optima)} shown"
-    expected = "-" if estimate.expected_optima is None else f"{estimate.expected_optima:.4g}"
-    covered = "-" if estimate.expected_covered is None else f"{100 * estimate.expected_covered:.4g} %"
+    covered = None if estimate.expected_covered is None else 100 * estimate.expected_covered
     estimates = [
         ("share of starts in unseen optima (Good, Turing)", f"{100 * estimate.good_turing:.3g} %"),
-        ("expected number of all optima (Boender, Rinnooy Kan)", expected),
-        ("expected share of starts in seen optima (the same)", covered),
+        ("expected number of all optima (Boender, Rinnooy Kan)", with_unit(estimate.expected_optima, "1", ".4g")),
+        ("expected share of starts in seen optima (the same)", with_unit(covered, "%", ".4g")),
         ("largest share of one unseen optimum, 95 % confidence", f"{100 * estimate.largest_missed:.3g} %"),
     ]
     stem = f"{problem.name}-certainty"
     shown = "Where the starts ended, with the proven bound and the end of the long search."
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{problem.name}: how certain the optimum is",
-            verdict=(f"Proven: {study.proven}.", f"Supported: {study.supported}."),
-            parts=(
-                text_table((problem.objective.name, "starts", "share"), optima, listed),
-                text_table(
-                    ("status", "starts"), [(k, f"{n:,}") for k, n in study.statuses.items()], "How the starts ended"
-                ),
-                text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, no proof"),
-                Figure(name=stem, caption=shown, drawing=certainty_figure(study)),
+        title=f"{problem.name}: how certain the optimum is",
+        verdict=(f"Proven: {study.proven}.", f"Supported: {study.supported}."),
+        parts=(
+            text_table((problem.objective.name, "starts", "share"), optima, listed),
+            text_table(
+                ("status", "starts"), [(k, f"{n:,}") for k, n in study.statuses.items()], "How the starts ended"
             ),
+            text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, no proof"),
+            Figure(name=stem, caption=shown, drawing=certainty_figure(study)),
         ),
         data=study.to_json(),
     )

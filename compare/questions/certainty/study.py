@@ -14,7 +14,7 @@ import metaheuristics
 from compare.questions.certainty import branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
-from compare.questions.certainty.multistart import Ends, multistart
+from compare.questions.certainty.multistart import multistart
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
 from compare.study.task import made_with
@@ -53,7 +53,6 @@ class Certainty:
         statuses: number of starts by how they ended.
         optima: distinct local optima, best first.
         unseen: what the counts say about others.
-        ends: of all starts.
         search: None if it was not asked for.
         certificate: None if it was not asked for or there are too many variables.
     """
@@ -63,7 +62,6 @@ class Certainty:
     statuses: dict[str, int]
     optima: tuple[LocalOptimum, ...]
     unseen: Unseen
-    ends: Ends
     search: LongSearch | None
     certificate: Certificate | None
 
@@ -187,7 +185,6 @@ def certainty(
         statuses=dict(Counter(ends.status)),
         optima=tuple(optima),
         unseen=unseen(optima),
-        ends=ends,
         search=search,
         certificate=certificate,
     )

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.drawing.figures import COLOURS, legend_below, new_figure, style
-from compare.questions.answer import Answer, all_digits
+from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
-from compare.report.document import Document, Figure, Table, text_table
+from compare.report.document import Figure, Table
 from nlp_gait.problem import Signals
 
 if TYPE_CHECKING:
@@ -38,36 +38,33 @@ def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
         problem: name of the phase.
     """
     stem, base = f"{problem}-motions", found[0].power_W
-    header = ("motion", "variables", "power [W]", "saved [%]", "IPOPT [s]", "iterations", "starts")
-    rows = [
-        (
-            title(m),
-            str(m.variables),
-            f"{m.power_W:.6f}",
-            f"{100 * (1 - m.power_W / base):.2f}",
-            f"{m.time_s:.1f}",
-            str(m.iterations),
-            f"{m.converged}/{m.attempts}",
-            f"{m.dense_power_W:.6f}",
-            m.worst or "none",
-        )
-        for m in found
-    ]
     over = (
         "Least power over the coefficients beyond the paper's cubics, with the value that the richest motions point to."
     )
     along = "Paths of the hip, and of the swing foot if it moves."
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{problem}: richer motions",
-            verdict=sentences(found),
-            parts=(
-                text_table((*header, "dense power [W]", "dense violation"), rows, "Optima"),
-                Figure(name=stem, caption=over, drawing=power_figure(found)),
-                Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
-                _numbers(stem, found),
+        title=f"{problem}: richer motions",
+        verdict=sentences(found),
+        parts=(
+            table_of(
+                "Optima",
+                found,
+                {
+                    "motion": title,
+                    "variables": lambda m: str(m.variables),
+                    "power [W]": lambda m: f"{m.power_W:.6f}",
+                    "saved [%]": lambda m: f"{100 * (1 - m.power_W / base):.2f}",
+                    "IPOPT [s]": lambda m: f"{m.time_s:.1f}",
+                    "iterations": lambda m: str(m.iterations),
+                    "starts": lambda m: f"{m.converged}/{m.attempts}",
+                    "dense power [W]": lambda m: f"{m.dense_power_W:.6f}",
+                    "dense violation": lambda m: m.worst or "none",
+                },
             ),
+            Figure(name=stem, caption=over, drawing=power_figure(found)),
+            Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
+            _numbers(stem, found),
         ),
         data={"problem": problem, "motions": [m.to_json() for m in found]},
     )

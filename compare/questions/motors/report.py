@@ -10,9 +10,9 @@ import numpy as np
 
 from compare.drawing.figures import legend_below, new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
-from compare.questions.answer import Answer, all_digits, optima_table
+from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.motors.study import Variant
-from compare.report.document import Document, Figure, Table, Value, text_table
+from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -29,17 +29,6 @@ def motors_answer(found: Sequence[Variant], problem: GaitProblem) -> Answer:
         problem: as published.
     """
     stem = f"{problem.name}-motors"
-    header = ("motors", "optimum [W]", "published x* [W]", "optimum's power as published [W]", "x* moves most in")
-    rows = [
-        (
-            v.name,
-            f"{v.power_W:.6f}",
-            f"{v.unchanged_power_W:.6f}" + (" (breaks limits)" if v.unchanged_violation > 0.0 else ""),
-            f"{v.published_power_W:.6f}",
-            "-" if v.moved[0] < STILL else f"{v.moved[1]} by {v.moved[0]:.0%} of its range",
-        )
-        for v in found
-    ]
     kinds = tuple(found[0].uses)
     uses = [
         (v.name, *(f"{v.uses[kind].share:.1%} {v.uses[kind].row.partition('[')[2][:-1]}" for kind in kinds))
@@ -49,15 +38,27 @@ def motors_answer(found: Sequence[Variant], problem: GaitProblem) -> Answer:
     shown = "Power at the optimum and at the published one; where x* lies in its ranges."
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{problem.name} with real motors",
-            parts=(
-                text_table(header, rows, "What each feature changes"),
-                text_table(("motors", *kinds), uses, largest),
-                optima_table({v.name: v.x for v in found}),
-                Figure(name=stem, caption=shown, drawing=motors_figure(found, problem)),
-                _numbers(stem, found),
+        title=f"{problem.name} with real motors",
+        parts=(
+            table_of(
+                "What each feature changes",
+                found,
+                {
+                    "motors": lambda v: v.name,
+                    "optimum [W]": lambda v: f"{v.power_W:.6f}",
+                    "published x* [W]": lambda v: (
+                        f"{v.unchanged_power_W:.6f}" + (" (breaks limits)" if v.unchanged_violation > 0.0 else "")
+                    ),
+                    "optimum's power as published [W]": lambda v: f"{v.published_power_W:.6f}",
+                    "x* moves most in": lambda v: (
+                        "-" if v.moved[0] < STILL else f"{v.moved[1]} by {v.moved[0]:.0%} of its range"
+                    ),
+                },
             ),
+            text_table(("motors", *kinds), uses, largest),
+            optima_table({v.name: v.x for v in found}),
+            Figure(name=stem, caption=shown, drawing=motors_figure(found, problem)),
+            _numbers(stem, found),
         ),
         data={"problem": problem.name, "variants": [asdict(variant) for variant in found]},
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class FrontPoint:
     demanded: float
     value: float
     power_W: float
-    price: float
+    price: float = 0.0
     violation: float
     x: tuple[float, ...]
 
@@ -143,21 +143,13 @@ def front_ends(
     solution = solve(free, starts=2 * starts, seed=seed, solver=solver)
     if not solution.success:
         raise InputError(f"{free.name} has no front: {solution.status}")
-    low = _at(free, criterion, solution)
+    low = _reached(free, criterion, solution)
     reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
     ending = rewarding(free, criterion).with_values(**{REWARD: reward})
     solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
     if not solution.success:
         raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
-    return low, _at(free, criterion, solution)
-
-
-def _at(problem: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
-    x = problem.check_x(solution.x)
-    exact, value = exact_model(problem).at(x, problem.p), criterion.value(problem, x)
-    return FrontPoint(
-        demanded=value, value=value, power_W=exact.cost, price=0.0, violation=exact.violation, x=tuple(x.tolist())
-    )
+    return low, _reached(free, criterion, solution)
 
 
 def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
@@ -177,12 +169,18 @@ def _point(
     best = best_success(outcomes)
     if best is None:
         return None
+    price = math.nan if best.guess is None else criterion.price(solution)
+    return replace(_reached(free, criterion, solution), demanded=at, price=price)
+
+
+def _reached(free: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
+    """A solution as a point that demands what it reaches."""
     x = free.check_x(solution.x)
+    value = criterion.value(free, x)
     return FrontPoint(
-        demanded=at,
-        value=criterion.value(free, x),
-        power_W=solution.objective,
-        price=math.nan if best.guess is None else criterion.price(solution),
+        demanded=value,
+        value=value,
+        power_W=exact_model(free).at(x, free.p).cost,
         violation=solution.violation,
         x=tuple(x.tolist()),
     )

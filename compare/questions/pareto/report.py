@@ -10,7 +10,7 @@ from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer, all_digits
 from compare.questions.pareto.study import ParetoStudy
-from compare.report.document import Document, Figure, Table, text_table
+from compare.report.document import Figure, Table, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -33,14 +33,12 @@ def front_answer(study: ParetoStudy, problem: GaitProblem) -> Answer:
     shown = "The front as a line, its knees, and what the searches found; its cheap part on the right."
     return Answer(
         stem=f"{problem.name}-pareto-{criterion.name}",
-        document=Document(
-            title=f"{problem.name}: power against {criterion.name}",
-            parts=(
-                *_tables(study),
-                *_searches(study),
-                Figure(name=stem, caption=shown, drawing=front_figure(study, problem)),
-                _numbers(stem, study),
-            ),
+        title=f"{problem.name}: power against {criterion.name}",
+        parts=(
+            *_tables(study),
+            *_searches(study),
+            Figure(name=stem, caption=shown, drawing=front_figure(study, problem)),
+            _numbers(stem, study),
         ),
         data=study.to_json(),
     )
@@ -76,8 +74,8 @@ def _searches(study: ParetoStudy) -> tuple[Table | str, ...]:
             q.algorithm,
             f"{q.budget:,}",
             _spread(q.hypervolume, 100, " %"),
-            "-" if q.igd is None else _spread(q.igd, 1, ""),
-            "-" if q.excess is None else _spread(q.excess, 100, " %"),
+            _spread(q.igd, 1, ""),
+            _spread(q.excess, 100, " %"),
         )
         for q in study.qualities
     ]
@@ -89,7 +87,9 @@ def _searches(study: ParetoStudy) -> tuple[Table | str, ...]:
     )
 
 
-def _spread(values: tuple[float, float, float], factor: float, unit: str) -> str:
+def _spread(values: tuple[float, float, float] | None, factor: float, unit: str) -> str:
+    if values is None:
+        return "-"
     least, median, greatest = (f"{factor * value:.3g}" for value in values)
     return f"{median}{unit} ({least} to {greatest}{unit})"
 

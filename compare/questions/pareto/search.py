@@ -131,7 +131,7 @@ def _snapshots(
 def best_of_all(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
     """Points of all runs that none of them betters: if these are on or behind a front, all points are."""
     points = [
-        FrontPoint(demanded=v, value=v, power_W=w, price=0.0, violation=0.0, x=tuple(x))
+        FrontPoint(demanded=v, value=v, power_W=w, violation=0.0, x=tuple(x))
         for front in fronts
         for v, w, x in zip(front.values.tolist(), front.powers.tolist(), front.X.tolist(), strict=True)
     ]

@@ -14,7 +14,7 @@ from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import front_ends
-from compare.report.document import Document, Figure
+from compare.report.document import Figure
 from compare.study.progress import Progress, unwatched
 from compare.study.task import made_with
 from nlp_gait.backends.optima.continuation import solve_both_ways
@@ -128,11 +128,9 @@ def surface_answer(surface: Surface) -> Answer:
     figure = Figure(name=f"{problem.name}-surface-{names}", caption=shown, drawing=surface_figure(surface))
     return Answer(
         stem=f"{problem.name}-pareto-{names}",
-        document=Document(
-            title=f"{problem.name}: least power for two demands",
-            verdict=(f"{met} of {all_pairs} pairs of demands can be met.",),
-            parts=(figure,),
-        ),
+        title=f"{problem.name}: least power for two demands",
+        verdict=(f"{met} of {all_pairs} pairs of demands can be met.",),
+        parts=(figure,),
         data={
             "problem": problem.name,
             **made_with(problem),

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from compare.analysis.units import heading, with_unit
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import name_in_words
 from compare.questions.answer import Answer, all_digits
 from compare.questions.prices.price import Price, Prices
-from compare.report.document import Document, Figure, Part, Table, Value, text_table
+from compare.report.document import Figure, Part, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
 def prices_answer(found: Prices, problem: GaitProblem) -> Answer:
     """What holds the optimum back, and which error of the robot would change it most."""
     ranges = problem.by_name(problem.scale)
-    stem, quantity = f"{found.problem}-prices", f"{found.objective_name} {found.objective:.6f} {_unit(found)}".rstrip()
+    stem, optimum = f"{found.problem}-prices", with_unit(found.objective, found.unit)
     parts: list[Part] = []
     if found.limits:
         title = "What holds it back: change of the optimum for one step upwards of a limit or coefficient"
@@ -50,17 +51,16 @@ def prices_answer(found: Prices, problem: GaitProblem) -> Answer:
     parts.append(_numbers(stem, found))
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{found.problem}: what each limit costs", verdict=(f"{quantity}, to {found.sense}",), parts=parts
-        ),
+        title=f"{found.problem}: what each limit costs",
+        verdict=(f"{found.objective_name} {optimum}, to {found.sense}",),
+        parts=parts,
         data=asdict(found),
     )
 
 
 def _header(found: Prices) -> tuple[str, ...]:
-    unit = f" [{_unit(found)}]" if _unit(found) else ""
-    columns = ("quantity", "step", f"by the slope{unit}", f"- step{unit}", f"+ step{unit}")
-    return (*columns, "error of slope, x*", "x* moves most in", "line [steps]")
+    steps = (heading(words, found.unit) for words in ("by the slope", "- step", "+ step"))
+    return ("quantity", "step", *steps, "error of slope, x*", "x* moves most in", "line [steps]")
 
 
 def _row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
@@ -77,10 +77,6 @@ def _agreement(price: Price) -> str:
     if price.one_step is None:
         return "-"
     return ", ".join("-" if error is None else f"{error:.0e}" for error in (price.error, price.x_error))
-
-
-def _unit(found: Prices) -> str:
-    return "" if found.unit == "1" else found.unit
 
 
 def _numbers(stem: str, found: Prices) -> Table:
@@ -111,7 +107,7 @@ def prices_figure(found: Prices) -> Drawing:
         for axes, group, title in zip(figure.subplots(1, len(groups), squeeze=False)[0], groups, titles, strict=False):
             _bars(axes, group[:SHOWN], scale)
             axes.set_title(title)
-            axes.set_xlabel(f"change of {found.objective_name}" + ("" if unit == "1" else f" [{unit}]"))
+            axes.set_xlabel(heading(f"change of {found.objective_name}", unit))
     return figure
 
 

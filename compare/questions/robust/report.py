@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import millimetres
 from compare.drawing.figures import legend_below, new_figure, style
-from compare.questions.answer import Answer, all_digits, optima_table
+from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.other_robot import is_mass
 from compare.questions.robust.family import Worst
 from compare.questions.robust.playback import Played
 from compare.questions.robust.study import Robust
-from compare.report.document import Document, Figure, Table, Value, text_table
+from compare.report.document import Figure, Table, Value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -37,65 +38,54 @@ def robust_answer(problem: str, found: Sequence[Robust], runs: Sequence[Played])
     )
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{problem}: price of robustness",
-            verdict=(f"{found[0].nominal_W:.6f} W for the nominal robot; {_width(found[-1].box)}",),
-            parts=(
-                _prices(found),
-                *(
-                    f"{r.name}: worst for the nominal gait with {_changes(r.nominal_worst.corner)}"
-                    for r in found
-                    if r.nominal_worst.violation > 0.0
-                ),
-                optima_table({"nominal": found[0].nominal_x, **{r.name: r.x for r in found}}),
-                *([_played(found[-1], runs)] if runs else ()),
-                Figure(name=stem, caption=shown, drawing=robust_figure(found, runs)),
-                _numbers(stem, found),
+        title=f"{problem}: price of robustness",
+        verdict=(f"{found[0].nominal_W:.6f} W for the nominal robot; {_width(found[-1].box)}",),
+        parts=(
+            _prices(found),
+            *(
+                f"{r.name}: worst for the nominal gait with {_changes(r.nominal_worst.corner)}"
+                for r in found
+                if r.nominal_worst.violation > 0.0
             ),
+            optima_table({"nominal": found[0].nominal_x, **{r.name: r.x for r in found}}),
+            *([_played(found[-1], runs)] if runs else ()),
+            Figure(name=stem, caption=shown, drawing=robust_figure(found, runs)),
+            _numbers(stem, found),
         ),
         data={"problem": problem, "boxes": [asdict(r) for r in found], "played": [asdict(run) for run in runs]},
     )
 
 
 def _prices(found: Sequence[Robust]) -> Table:
-    header = (
-        "uncertain",
-        "nominal gait breaks",
-        "robust gait, nominal robot",
-        "price",
-        "worst corner",
-        "robust gait breaks: scenarios; random corners",
-        "scenarios",
+    return table_of(
+        "Price of robustness",
+        found,
+        {
+            "uncertain": lambda r: r.name,
+            "nominal gait breaks": lambda r: _violation(r.nominal_worst),
+            "robust gait, nominal robot": lambda r: f"{r.power_W:.6f} W",
+            "price": lambda r: f"{r.power_W - r.nominal_W:+.6f} W, {r.power_W / r.nominal_W - 1.0:+.2%}",
+            "worst corner": lambda r: f"{r.worst_W:.6f} W",
+            "robust gait breaks: scenarios": lambda r: _violation(r.worst),
+            "random corners": lambda r: _violation(r.random_worst),
+            "scenarios": lambda r: f"{len(r.corners)}" + ("" if r.settled else ", not settled"),
+        },
     )
-    rows = [
-        (
-            r.name,
-            _violation(r.nominal_worst),
-            f"{r.power_W:.6f} W",
-            f"{r.power_W - r.nominal_W:+.6f} W, {r.power_W / r.nominal_W - 1.0:+.2%}",
-            f"{r.worst_W:.6f} W",
-            f"{_violation(r.worst)}; {_violation(r.random_worst)}",
-            f"{len(r.corners)}" + ("" if r.settled else ", not settled"),
-        )
-        for r in found
-    ]
-    return text_table(header, rows, "Price of robustness")
 
 
 def _played(widest: Robust, runs: Sequence[Played]) -> Table:
-    header = ("gait", "robot", "in MuJoCo", "largest tilt", "mean lateral margin: model", "MuJoCo")
-    rows = [
-        (
-            run.gait,
-            _changes(widest.corners[widest.robots.index(run.robot)]),
-            "stays up" if run.fell_at_s is None else f"FALLS at {run.fell_at_s:.2f} s",
-            f"{run.largest_tilt_deg:.1f} degrees",
-            f"{1000 * run.predicted_margin_m:.1f} mm",
-            f"{1000 * run.margin_m:.1f} mm",
-        )
-        for run in runs
-    ]
-    return text_table(header, rows, f"Played open loop on the robots of the last box ({widest.name})")
+    return table_of(
+        f"Played open loop on the robots of the last box ({widest.name})",
+        runs,
+        {
+            "gait": lambda run: run.gait,
+            "robot": lambda run: _changes(widest.corners[widest.robots.index(run.robot)]),
+            "in MuJoCo": lambda run: "stays up" if run.fell_at_s is None else f"FALLS at {run.fell_at_s:.2f} s",
+            "largest tilt": lambda run: f"{run.largest_tilt_deg:.1f} degrees",
+            "mean lateral margin: model": lambda run: millimetres(run.predicted_margin_m),
+            "MuJoCo": lambda run: millimetres(run.margin_m),
+        },
+    )
 
 
 def _numbers(stem: str, found: Sequence[Robust]) -> Table:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label, quantity, units_of
 from compare.questions.answer import Answer, all_digits
 from compare.questions.sweep.study import SweepPoint
-from compare.report.document import Document, Figure, Table, Value, text_table
+from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def sweep_answer(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: 
     rows = [
         (
             *(f"{value:g}" for value in p.at.values()),
-            f"{p.objective:.6f} {objective.unit}" if p.feasible else "-",
+            with_unit(p.objective if p.feasible else None, objective.unit),
             p.status,
         )
         for p in points
@@ -35,13 +36,11 @@ def sweep_answer(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: 
     shown = "Optimum over the first axis; crosses where no feasible point was found."
     return Answer(
         stem=stem,
-        document=Document(
-            title=f"{problem.name} by {algorithm}",
-            parts=(
-                text_table((*axes, objective.name, "status"), rows, "Optima"),
-                Figure(name=stem, caption=shown, drawing=sweep_figure(points, problem, algorithm)),
-                _numbers(stem, points, problem),
-            ),
+        title=f"{problem.name} by {algorithm}",
+        parts=(
+            text_table((*axes, objective.name, "status"), rows, "Optima"),
+            Figure(name=stem, caption=shown, drawing=sweep_figure(points, problem, algorithm)),
+            _numbers(stem, points, problem),
         ),
         data={"problem": problem.name, "points": [asdict(point) for point in points]},
     )

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import millimetres, with_unit
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
-from compare.questions.answer import Answer, all_digits
+from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.sweep.report import mark
 from compare.questions.walk.study import Gait, result_of
-from compare.report.document import Document, Figure, Part, Table, Value, text_table
+from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, made_with
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
+from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.steps import walk
+from nlp_gait.simulation.walking import Walk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,24 +57,25 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     (name,), problem = gaits[0].found.at, spec.load()
     feasible = [gait for gait in gaits if gait.found.feasible]
     results = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
-    header = (name, "power", "cost of transport", "step", *(_phase(time) for time in problem.durations))
-    rows = [
-        (
-            f"{gait.at:g}",
-            f"{gait.indexes['power_W']:.4f} W",
-            f"{gait.indexes['cost_of_transport']:.4f}",
-            f"{gait.indexes['step_length_m']:.4f} m",
-            *(f"{gait.found.x[time]:.3f} s" for time in problem.durations),
-        )
-        for gait in feasible
-    ]
+    cheapest_cycles = table_of(
+        "Cheapest cycles",
+        feasible,
+        {
+            name: lambda gait: f"{gait.at:g}",
+            "power": lambda gait: f"{gait.indexes['power_W']:.4f} W",
+            "cost of transport": lambda gait: f"{gait.indexes['cost_of_transport']:.4f}",
+            "step": lambda gait: f"{gait.indexes['step_length_m']:.4f} m",
+            "single support": lambda gait: f"{gait.found.x[problem.durations[0]]:.3f} s",
+            "double support": lambda gait: f"{gait.found.x[problem.durations[1]]:.3f} s",
+        },
+    )
     costs = Figure(
         name=f"{problem.name}-cost",
         caption="Cost of transport, step and times; crosses where no feasible cycle was found.",
         drawing=cost_figure(gaits, problem),
     )
     parts: list[Part] = [
-        text_table(header, rows, "Cheapest cycles"),
+        cheapest_cycles,
         *(f"{name} = {gait.at:g}: {gait.found.status}" for gait in gaits if not gait.found.feasible),
         *_walks(name, gaits),
         costs,
@@ -85,7 +89,8 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     parts.append(_numbers(stem, gaits))
     return Answer(
         stem=stem,
-        document=Document(title=f"{problem.name}: cheapest cycles over {name}", parts=parts),
+        title=f"{problem.name}: cheapest cycles over {name}",
+        parts=parts,
         data={"gaits": [gait.to_json() for gait in gaits]},
         results={
             stem: {"problem": problem.name, **made_with(result.problem), "x": result.problem.by_name(result.x)}
@@ -101,28 +106,29 @@ def _phase(duration: str) -> str:
 
 def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
     """How the gaits that were played fared."""
-    header = ("fate", "walked", "of", "drift", "heading", "tilt", "tracking", "mechanical power", "model", "energy")
-    walks = [(gait.at, gait.walk) for gait in gaits if gait.walk is not None]
-    rows = []
-    for at, played in walks:
-        found = played.measurements
-        fate = "walks" if found.fell_at_s is None else f"falls at {found.fell_at_s:.2f} s"
-        lengths = (played.walked_m, played.planned_m, played.drift_m)
-        rows.append(
-            (
-                f"{at:g}",
-                fate if played.steps_done == played.steps else f"{fate}, {played.steps_done} steps",
-                *("-" if value is None else f"{1000 * value:.0f} mm" for value in lengths),
-                "-" if played.heading_deg is None else f"{played.heading_deg:.1f} deg",
-                f"{found.largest_tilt_deg:.1f} deg",
-                f"{found.tracking_max_rad:.3f} rad",
-                f"{found.measured.mechanical_W:.3f} W",
-                f"{found.predicted.mechanical_W:.3f} W",
-                "-" if played.energy_J_per_m is None else f"{played.energy_J_per_m:.1f} J/m",
-            )
-        )
-    title = f"{walks[0][1].steps} steps in the physics engine, open loop" if walks else ""
-    return [text_table((name, *header), rows, title)] if walks else []
+    walks = [(gait.at, gait.walk, gait.walk.measurements) for gait in gaits if gait.walk is not None]
+    if not walks:
+        return []
+    columns: dict[str, Callable[[tuple[float, Walk, Measurements]], str]] = {
+        name: lambda row: f"{row[0]:g}",
+        "fate": lambda row: _fate(row[1]),
+        "walked": lambda row: millimetres(row[1].walked_m, ".0f"),
+        "of": lambda row: millimetres(row[1].planned_m, ".0f"),
+        "drift": lambda row: millimetres(row[1].drift_m, ".0f"),
+        "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".1f"),
+        "tilt": lambda row: with_unit(row[2].largest_tilt_deg, "deg", ".1f"),
+        "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".3f"),
+        "mechanical power": lambda row: with_unit(row[2].measured.mechanical_W, "W", ".3f"),
+        "model": lambda row: with_unit(row[2].predicted.mechanical_W, "W", ".3f"),
+        "energy": lambda row: with_unit(row[1].energy_J_per_m, "J/m", ".1f"),
+    }
+    return [table_of(f"{walks[0][1].steps} steps in the physics engine, open loop", walks, columns)]
+
+
+def _fate(walked: Walk) -> str:
+    fell_at_s = walked.measurements.fell_at_s
+    fate = "walks" if fell_at_s is None else f"falls at {fell_at_s:.2f} s"
+    return fate if walked.steps_done == walked.steps else f"{fate}, {walked.steps_done} steps"
 
 
 def _numbers(stem: str, gaits: Sequence[Gait]) -> Table:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from compare.questions.sweep.study import Axis, SweepPoint, count_solves, placed, sweep
+from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
 from compare.study.progress import Progress, unwatched
-from compare.study.task import IPOPT, ProblemSpec
+from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.problem import Result
@@ -76,11 +76,6 @@ def optimal_gaits(
         return gaits(sweep(spec, [axis], starts=starts, seed=seed, progress=progress))
     except Interrupted as interrupt:
         raise Interrupted(interrupt.sentence, gaits(cast("list[SweepPoint]", interrupt.partial))) from None
-
-
-def solves(axis: Axis) -> int:
-    """How often ``optimal_gaits`` calls ``progress``."""
-    return count_solves([axis], IPOPT)
 
 
 def played(spec: ProblemSpec, gait: Gait, steps: int) -> Gait:

@@ -62,7 +62,6 @@ def ends(x: list[float], objective: list[float], success: list[bool]) -> Ends:
         objective=np.array(objective),
         success=np.array(success),
         status=("converged",) * len(x),
-        time_s=np.zeros(len(x)),
     )
 
 

@@ -87,7 +87,7 @@ def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
     cubic, quintic, coarse = found
     worse = replace(quintic, power_W=cubic.power_W + 0.01)
     assert "power rises by up to 0.01 W" in sentences([cubic, worse, coarse])[0]
-    assert "-" in motions_answer([cubic, worse], "nao-dsp").document.parts[0].rows[1][3]
+    assert "-" in motions_answer([cubic, worse], "nao-dsp").parts[0].rows[1][3]
 
 
 @pytest.mark.parametrize("phase", ["nao-ssp", "nao-dsp"])

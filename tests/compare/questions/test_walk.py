@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.sweep.study import parse_axis
 from compare.questions.walk.report import walk_answer
-from compare.questions.walk.study import Gait, optimal_gaits, solves
+from compare.questions.walk.study import Gait, optimal_gaits
 from compare.report.document import Figure
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.interrupts import Interrupted
@@ -33,7 +33,6 @@ def gaits() -> list[Gait]:
 
 
 def test_gaits_hold_what_they_were_asked_for(gaits: list[Gait]) -> None:
-    assert solves(AXIS) == 4
     assert [gait.found.feasible for gait in gaits] == [True, True, False]
     for gait in gaits[:2]:
         assert gait.indexes["speed_m_s"] == pytest.approx(gait.at)
@@ -55,7 +54,7 @@ def test_the_table_and_the_results_can_be_read_back(gaits: list[Gait], tmp_path:
 
 def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait]) -> None:
     def pictures(shown: list[Gait]) -> list[str]:
-        parts = walk_answer(SPEC, shown).document.parts
+        parts = walk_answer(SPEC, shown).parts
         return [part.name for part in parts if isinstance(part, Figure)]
 
     assert pictures(gaits) == ["nao-cycle-cost", "nao-cycle"]
