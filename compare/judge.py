@@ -1,7 +1,7 @@
 """The one judge: whatever a solver claims about x, these are the exact functions' values.
 
-A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, where
-violations between the samples show.
+A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, which shows
+violations between the samples.
 """
 
 from __future__ import annotations

@@ -36,7 +36,6 @@ class NlpModel:
         nlp: CasADi's dictionary: x = (z, s), p = (problem parameters, sigmoid width), f, g.
         variables: n, the number of problem variables.
         row_names: names of the problem's rows, the first rows of g.
-        row_units: their units.
         offset: (n,) x at z = 0.
         scale: (n,) range of x.
         row_bounds: function p -> (lower, upper) of the problem's rows.
@@ -50,7 +49,6 @@ class NlpModel:
     nlp: dict[str, MX]
     variables: int
     row_names: tuple[str, ...]
-    row_units: tuple[str, ...]
     offset: Array
     scale: Array
     row_bounds: ca.Function
@@ -119,7 +117,6 @@ def _build(problem: GaitProblem) -> NlpModel:
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
         row_names=row_names,
-        row_units=tuple(c.unit for c in assembly.constraints for _ in range(c.value.shape[0])),
         offset=offset,
         scale=problem.scale,
         row_bounds=bounds,

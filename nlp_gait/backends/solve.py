@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlp_gait.backends.exact import row_violations
+from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
-from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
@@ -80,7 +79,9 @@ def _start_points(problem: GaitProblem, starts: int, seed: int, x0: Sequence[flo
 def solution_of(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:
     """Solution from all starts: the cheapest that succeeded, else the cheapest feasible, else the least infeasible one."""
     best = min(outcomes, key=lambda outcome: outcome.rank)
-    violations = row_violations(problem, best.x)
+    exact = exact_model(problem)
+    values = exact.at(best.x, problem.p)
+    violations = violated_rows(exact.rows(values))
     status = best.status
     if not best.success:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
@@ -107,40 +108,36 @@ def solution_of(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0
         solver=best.solver,
         linear_solver=best.linear_solver,
         functions=best.functions,
-        active_constraints=_active(problem, best.guess) if best.success and best.guess is not None else (),
+        active_constraints=_active(problem, values, best.guess) if best.success and best.guess is not None else (),
         starts=tuple(outcomes),
         seed=seed,
     )
 
 
-def _active(problem: GaitProblem, at: Guess) -> tuple[ActiveConstraint, ...]:
+def _active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[ActiveConstraint, ...]:
     """Bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
 
     Equations of the problem always hold and are left out; a variable that is fixed has a price.
     """
-    model = nlp_model(problem)
-    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    names = (*model.row_names, *(f"bounds[{name}]" for name in problem.names))
-    units = (*model.row_units, *(variable.unit for variable in problem.variables))
-    lowers, uppers = np.concatenate([lower, problem.lower]), np.concatenate([upper, problem.upper])
-    slopes = -np.concatenate([at.rows[: len(lower)], at.bounds[: model.variables] / model.scale])
-    weights = np.abs(slopes) * np.concatenate([np.ones(len(lower)), model.scale])
-    unit = problem.objective.unit
+    exact, unit = exact_model(problem), problem.objective.unit
+    rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
+    slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
+    weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])
     found = []
     for i in np.argsort(-weights, kind="stable"):
         if weights[i] < PRICE_TOLERANCE:
             break
-        if i < len(lower) and lower[i] == upper[i]:
+        if i < rows and values.lower[i] == values.upper[i]:
             continue
         at_upper = slopes[i] < 0  # a higher upper bound lowers the cost, a higher lower bound raises it
         found.append(
             ActiveConstraint(
-                name=names[i],
+                name=exact.row_names[i],
                 side="upper" if at_upper else "lower",
-                bound=float(uppers[i] if at_upper else lowers[i]),
-                unit=units[i],
+                bound=float(values.upper[i] if at_upper else values.lower[i]),
+                unit=exact.row_units[i],
                 price=float(problem.objective.sign * slopes[i]),
-                price_unit=f"{unit} per {units[i]}" if unit != "1" else f"per {units[i]}",
+                price_unit=f"{'' if unit == '1' else f'{unit} '}per {exact.row_units[i]}",
             )
         )
     return tuple(found)

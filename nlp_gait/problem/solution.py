@@ -180,7 +180,7 @@ class Solution:
         solver: for example ``"ipopt"``.
         linear_solver: that it really used; empty if it does not say.
         functions: ``"compiled"`` or ``"interpreted"``.
-        active_constraints: bounds with a price, dearest first.
+        active_constraints: bounds with a price, highest first.
         starts: outcome of every start.
         seed: of the start points.
     """

@@ -12,7 +12,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import IPOPT, Task
 from nlp_gait.backends.solve import solution_of
 from nlp_gait.errors import InputError
-from nlp_gait.problem.solution import Best, Outcome
+from nlp_gait.problem.solution import Best
 
 
 def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
@@ -40,11 +40,16 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     if outcome.linear_solver:
         settings["linear_solver"] = outcome.linear_solver
     solution = solution_of(problem, [outcome])
-    history, times = _history(outcome, prepared_s - compile_s, compile_s)
-    evaluations = outcome.evaluations.by_kind()
+    evaluations, earlier = outcome.evaluations.by_kind(), list[Best]()
+    before, before_s = (0, 0.0) if start is None else (start.evaluations["f"], start.time_s.solve)
     if start is not None:
-        evaluations["f"] += start.evaluations["f"]
-        history, times = _after(start, history, times)
+        evaluations["f"] += before
+        earlier = list(map(Best, start.history.evaluations, start.history.objective, start.time_s.history))
+    # A solver that keeps no history has its end.
+    own = outcome.history or (
+        Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s),
+    )
+    history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
     verdict = Verdict.of(evaluate(problem, outcome.x))
     return RunRecord(
         problem=task.problem.title,
@@ -63,30 +68,14 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
         failed_evaluations=0,
         iterations=outcome.iterations,
         active_constraints=solution.active_constraints,
-        history=history,
-        time_s=times,
-    )
-
-
-def _history(outcome: Outcome, build_s: float, compile_s: float) -> tuple[History, Times]:
-    """Best so far with its times; of a solver that keeps no history the end alone."""
-    end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
-    calls, objective, elapsed_s = zip(*(outcome.history or (end,)), strict=True)
-    return History(evaluations=calls, objective=objective), Times(
-        build=build_s, compile=compile_s, solve=outcome.time_s, objective=outcome.objective_s, history=elapsed_s
-    )
-
-
-def _after(start: RunRecord, history: History, times: Times) -> tuple[History, Times]:
-    """History and times with those of the run that is polished before them."""
-    before, before_s = start.evaluations["f"], start.time_s.solve
-    return History(
-        evaluations=(*start.history.evaluations, *(before + count for count in history.evaluations)),
-        objective=(*start.history.objective, *history.objective),
-    ), Times(
-        build=times.build,
-        compile=times.compile,
-        solve=before_s + times.solve,
-        objective=math.nan,
-        history=(*start.time_s.history, *(before_s + t for t in times.history)),
+        history=History(
+            evaluations=tuple(best.calls for best in history), objective=tuple(best.objective for best in history)
+        ),
+        time_s=Times(
+            build=prepared_s - compile_s,
+            compile=compile_s,
+            solve=before_s + outcome.time_s,
+            objective=outcome.objective_s,
+            history=tuple(best.time_s for best in history),
+        ),
     )

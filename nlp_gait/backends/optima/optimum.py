@@ -1,8 +1,8 @@
 """A local optimum to machine precision, with the bounds that hold it and how firmly they do.
 
 IPOPT stops near an optimum, with every multiplier a little off zero. Here the bounds with a price are taken as equations and the
-first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is let go, one that is
-violated is taken in, until nothing changes.
+first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is released, one that is
+violated is added, until nothing changes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Guess, Outcome
 
-# Tolerance at which IPOPT tells bounds with a price from those without one: at kinks of |power| both are small.
+# Tolerance at which IPOPT distinguishes bounds with a price from those without: at kinks of |power| both are small.
 SHARP = IpoptSettings(tolerance=1e-12)
 ROUNDS = 30
 # The conditions hold to this, in units of cost per range of a variable, and of the rows.
@@ -45,7 +45,7 @@ class Optimum:
         residual: largest violation of the conditions.
         freedom: dimension of the space in which x* and the lifted variables could move along the active bounds.
         dependent: number of active rows that follow from the others: their multipliers are not unique.
-        reason: why no derivative can be had, or None.
+        reason: why there is no derivative, or None.
     """
 
     problem: GaitProblem

@@ -69,11 +69,7 @@ class CasadiSolver(Solver):
 
     quiet: ClassVar[Mapping[str, Any]]
     watched: ClassVar[bool] = False
-
-    @property
-    def limit_s(self) -> float:
-        """Limit of wall time for all stages [s]."""
-        return math.inf
+    time_limit_s: ClassVar[float | None] = None
 
     def check(self, problem: GaitProblem) -> None:
         """See ``Solver``."""
@@ -99,7 +95,7 @@ class CasadiSolver(Solver):
         started = time.perf_counter()
         alone = stop is never and self.watched
         with deferred_interrupts() if alone else contextlib.nullcontext(stop) as asked:
-            watch.begin(asked, started + self.limit_s)
+            watch.begin(asked, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
                 with _silent():
                     result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
@@ -152,12 +148,7 @@ class WatchedSolver(CasadiSolver):
 
     watched: ClassVar[bool] = True
 
-    time_limit_s: float | None = None
-
-    @property
-    def limit_s(self) -> float:
-        """See ``CasadiSolver``."""
-        return math.inf if self.time_limit_s is None else self.time_limit_s
+    time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of those that are not watched
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.prices.study import AGREEMENT, prices
 from compare.study.task import ProblemSpec
+from nlp_gait import solver
+from nlp_gait.errors import InputError
 
 RUN = CliRunner()
 
@@ -47,6 +49,11 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
     turn = next(price for price in found.limits if price.name == "turn_rad")
     assert turn.error is None and turn.one_step is not None
     assert turn.one_step[0] is None and turn.one_step[1] == pytest.approx(turn.per_step, rel=0.05)
+
+
+def test_a_solver_without_multipliers_has_no_prices() -> None:
+    with pytest.raises(InputError, match="need multipliers, which slsqp does not give; solve with ipopt"):
+        prices(ProblemSpec(name="walk12"), starts=2, solver=solver("slsqp"))
 
 
 def test_a_fixed_variable_has_one_price() -> None:

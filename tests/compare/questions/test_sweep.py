@@ -56,6 +56,14 @@ def test_true_price_of_time() -> None:
     assert {p.at["single_support_time_s"]: p.objective for p in points} == pytest.approx(DURATIONS_W, abs=AGREEMENT_W)
 
 
+def test_another_nlp_solver_walks_the_grid_too() -> None:
+    axes = [Axis(name="swing_height_m", values=(0.015, 0.018))]
+    calls: list[None] = []
+    points = sweep(SSP, axes, algorithm="slsqp", starts=1, progress=lambda: calls.append(None))
+    assert len(calls) == count_solves(axes, "slsqp") == 4
+    assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
+
+
 def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
     axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
     calls: list[str] = []
