@@ -135,7 +135,7 @@ class Task:
         problem = self.problem.load()
         named = isinstance(self.algorithm, str)
         parts: dict[str, Any] = {
-            "problem": {"name": problem.name, **made_with(problem)},
+            "problem": {"name": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)},
             "objective": asdict(problem.objective),
             "algorithm": self.algorithm if named else plain_settings(self.algorithm),
             "settings": dict(self.settings),
@@ -196,9 +196,9 @@ def check_task(task: Task) -> None:
         )
 
 
-def made_with(problem: GaitProblem) -> dict[str, Any]:
-    """Options and changed parameter values of a problem, as plain data."""
-    return {"options": dict(problem.options), "parameters": dict(problem.values)}
+def plain_problem(problem: GaitProblem) -> dict[str, Any]:
+    """Name, options and changed parameter values of a problem, as plain data from which ``load_result`` makes it again."""
+    return {"problem": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)}
 
 
 def plain_settings(settings: Any) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, 
 from compare.questions.certainty.multistart import multistart
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
-from compare.study.task import made_with
+from compare.study.task import plain_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
@@ -100,8 +100,7 @@ class Certainty:
         """Plain data; the ends of the starts stay in their files."""
         certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
         return {
-            "problem": self.problem.name,
-            **made_with(self.problem),
+            **plain_problem(self.problem),
             "starts": self.starts,
             "statuses": self.statuses,
             "optima": [asdict(optimum) for optimum in self.optima],

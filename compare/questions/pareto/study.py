@@ -16,7 +16,7 @@ from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
-from compare.study.task import made_with
+from compare.study.task import plain_problem
 from metaheuristics.multi_objective import MultiObjective
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
@@ -51,8 +51,7 @@ class ParetoStudy:
         if self.challenge is not None:
             outcome = {key: value for key, value in asdict(self.challenge).items() if key != "front"}
         return {
-            "problem": self.problem.name,
-            **made_with(self.problem),
+            **plain_problem(self.problem),
             "criterion": {"name": self.criterion.name, "unit": self.criterion.unit},
             "front": [asdict(point) for point in self.front],
             "knees": asdict(self.bends),

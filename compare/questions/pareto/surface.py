@@ -16,7 +16,7 @@ from compare.questions.pareto.competing import CompetingObjective, competing_obj
 from compare.questions.pareto.front import front_ends
 from compare.report.document import Figure
 from compare.study.progress import Progress, unwatched
-from compare.study.task import made_with
+from compare.study.task import plain_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
@@ -132,8 +132,7 @@ def surface_answer(surface: Surface) -> Answer:
         verdict=(f"{met} of {all_pairs} pairs of demands can be met.",),
         parts=(figure,),
         data={
-            "problem": problem.name,
-            **made_with(problem),
+            **plain_problem(problem),
             "criteria": [{"name": criterion.name, "unit": criterion.unit} for criterion in criteria],
             "points": [asdict(point) for point in surface.points],
             "infeasible": [list(at) for at in surface.infeasible],

@@ -14,7 +14,7 @@ from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.sweep.report import mark
 from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
-from compare.study.task import ProblemSpec, made_with
+from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
 from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.steps import walk
@@ -93,7 +93,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
         parts=parts,
         data={"gaits": [gait.to_json() for gait in gaits]},
         results={
-            stem: {"problem": problem.name, **made_with(result.problem), "x": result.problem.by_name(result.x)}
+            stem: {**plain_problem(result.problem), "x": result.problem.by_name(result.x)}
             for stem, result in results.items()
         },
     )
