@@ -16,12 +16,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer(Document):
-    """A document that is printed too, with what other programs read. Its tables with a name are for these, not for printing.
+    """A report that is printed too, with the data that other programs read. Named tables become CSV files and are not printed.
 
     Attributes:
-        stem: name of the page and of the data, without ending.
+        stem: name of the page's and the data's files, without suffix.
         data: the whole answer as plain data.
-        results: gaits for the other commands, by the names of their files, without ending.
+        results: gaits that other commands read, by the names of their files, without suffix.
     """
 
     stem: str

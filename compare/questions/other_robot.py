@@ -1,4 +1,4 @@
-"""A problem with another robot under the same limits: masses, leg lengths and soles are never quite those of the data."""
+"""A problem with another robot under the same limits: real masses, leg lengths and soles are never quite those of the data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def is_mass(quantity: str) -> bool:
 
 
 def present_value(problem: GaitProblem, quantity: str) -> float:
-    """Of a quantity of the problem's robot; see ``nlp_gait.robots.perturbation``."""
+    """Value of a quantity in the problem's own robot; see ``nlp_gait.robots.perturbation``."""
     _, changes = split_name(str(problem.options["robot"]))
     return changes.get(quantity, float(is_mass(quantity)))
 

@@ -40,10 +40,10 @@ class Certificate:
     Attributes:
         objective: exact value of the incumbent, in the problem's sense.
         bound: no x within the variables' bounds that the judge calls feasible has a better objective than this.
-        tolerance: relative distance of both that was asked for.
+        tolerance: requested distance of bound and objective, relative.
         closed: that distance was reached.
-        boxes: enclosed.
-        left: boxes neither dropped nor split at the end.
+        boxes: number that were enclosed.
+        left: number of boxes neither dropped nor split at the end.
         time_s: wall time [s].
         cpu_s: processor time [s].
         x: the incumbent.
@@ -73,13 +73,13 @@ def certify(
     time_limit_s: float = 300.0,
     progress: Progress = unwatched,
 ) -> Certificate:
-    """Bound on the optimum over all variables' bounds.
+    """Bound on the optimum within the variables' bounds.
 
     Args:
         problem: smooth, with few variables: the work grows exponentially with their number.
         incumbent: (n,) feasible point, the best known.
         tolerance: relative distance of bound and objective at which to stop.
-        time_limit_s: wall time after which the bound reached so far is given [s].
+        time_limit_s: wall time after which the bound reached so far is returned [s].
         progress: told the boxes enclosed and the bound, in the problem's sense, after each batch.
 
     Raises:

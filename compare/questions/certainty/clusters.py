@@ -24,7 +24,7 @@ class LocalOptimum:
 
     Attributes:
         objective: of the best end in it, in the problem's sense.
-        count: of starts that ended in it.
+        count: number of starts that ended in it.
         share: of the starts that converged.
         x: of the best end.
     """
@@ -43,7 +43,7 @@ class Unseen:
         good_turing: share of starts that would end in an unseen optimum: optima reached once, divided by N.
         expected_optima: expected number of all local optima, under a uniform prior on their number and shares; None if the
             sample is too small for it.
-        expected_covered: expected share of starts that end in optima seen, under the same prior; None likewise.
+        expected_covered: expected share of starts that end in seen optima, under the same prior; None likewise.
         largest_missed: with 95 % confidence no single unseen optimum attracts more than this share of the starts.
 
     Source:

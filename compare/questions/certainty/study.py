@@ -67,7 +67,7 @@ class Certainty:
 
     @property
     def proven(self) -> str:
-        """In one sentence."""
+        """What is proven, in one sentence."""
         c = self.certificate
         if c is None:
             return "nothing: branch and bound is for smooth problems of at most four variables"
@@ -83,7 +83,7 @@ class Certainty:
 
     @property
     def supported(self) -> str:
-        """In one sentence."""
+        """What is only supported, in one sentence."""
         best = self.optima[0]
         text = (
             f"{best.count} of {sum(o.count for o in self.optima)} converged starts end in the best of {len(self.optima)} "

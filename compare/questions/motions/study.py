@@ -40,7 +40,7 @@ class Motion:
         success: at least one start converged to a feasible point.
         power_W: on the problem's own samples.
         dense_power_W: on the judge's dense grid.
-        objectives: values by name of all that is or could be minimised, with units in the names.
+        objectives: values of what the smooth tasks minimise, by name with its unit.
         worst: row that the dense grid finds violated most, with the amount; empty if none is.
         converged: starts that ended in a feasible optimum, of ``attempts``.
         attempts: number of starts.
@@ -153,7 +153,7 @@ def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> boo
 
 
 def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:
-    """The same motion with more spans, and with curves at zero that it has not."""
+    """The same motion with more spans, and with the curves that it lacks at zero."""
     curves: dict[str, list[float]] = {}
     for name, value in x.items():
         curves.setdefault(name.partition("[")[0], []).append(value)
@@ -179,9 +179,9 @@ def _worst(verdict: Evaluation) -> str:
 
 
 def limit(powers: Sequence[float]) -> float | None:
-    """Where a sequence goes whose differences shrink by a constant factor, from its last three terms.
+    """Limit of a sequence whose differences shrink by a constant factor, from its last three terms.
 
-    None if they do not shrink, and if it would be farther away than the last two terms are apart.
+    None if they do not shrink, or if the limit would be farther away than the last two terms are apart.
 
     Source:
         Aitken's extrapolation, which is Richardson's for an unknown order.

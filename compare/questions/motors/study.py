@@ -1,4 +1,4 @@
-"""What the real motors change: the optimum of a NAO phase under one feature of theirs after the other."""
+"""What real motors change: the optimum of a NAO phase with one set of their features after another."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Variant:
         unchanged_violation: of the published optimum under this variant's limits, 0 if it keeps them.
         published_power_W: at this variant's optimum, as the paper calculates it.
         x: by variable name.
-        moved: distance of x* from the published one, in units of the variables' ranges: the largest, and whose it is.
+        moved: largest distance of a variable from the published optimum, in units of its range, and the variable's name.
         uses: by kind of limit, at this optimum, whether or not the variant has the limits.
     """
 
@@ -117,7 +117,7 @@ def _variant(
     published: GaitProblem,
     limited: GaitProblem,
 ) -> Variant:
-    """A variant from its solution, beside the published optimum ``first`` (n,), which None says it is itself."""
+    """A variant from its solution, compared with the published optimum ``first`` (n,); None where this is the published one."""
     x = problem.check_x(solution.x)
     first = x if first is None else first
     moves = np.abs(x - first) / problem.scale

@@ -106,16 +106,16 @@ def challenge(
     most: int = MOST_CHALLENGES,
     progress: Progress = unwatched,
 ) -> Challenge:
-    """Solve for the least power at the criterion of points, from the point itself and from the front's nearest point.
+    """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
 
-    Of more points than ``most``, those are taken that lie lowest over the front's straight pieces.
+    Of more points than ``most``, those are taken that lie lowest over the straight lines between the front's points.
 
     Args:
         free: the problem without a demand on the criterion.
         criterion: beside power.
         front: the true one, as far as it is known.
         points: of searches.
-        most: solved at most for so many.
+        most: largest number of points to solve for.
         progress: told the point.
     """
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))

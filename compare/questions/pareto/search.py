@@ -36,7 +36,7 @@ class Scale:
         return np.column_stack([(powers - self.least_power) / self.power_range, (self.largest - values) / self.range])
 
     def back(self, F: Array) -> tuple[Array, Array]:
-        """CompetingObjective and power of (P, 2)."""
+        """Criterion and power of (P, 2)."""
         return self.largest - self.range * F[:, 1], self.least_power + self.power_range * F[:, 0]
 
 
@@ -98,7 +98,7 @@ def search_fronts(
         progress: told which run is done.
 
     Raises:
-        SearchError: an algorithm or a budget that cannot be.
+        SearchError: an unknown algorithm, or a budget that is not allowed.
         OutputError: a run cannot be kept.
     """
     steps = Steps(out, unwatched)

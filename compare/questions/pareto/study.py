@@ -86,9 +86,9 @@ def pareto_study(
         progress: told what is done.
 
     Raises:
-        UnknownNameError: no such criterion.
+        UnknownNameError: an unknown criterion.
         InputError: the problem trades nothing, or its front cannot be found.
-        SearchError: no such algorithm, a budget that cannot be, or pymoo is not installed.
+        SearchError: an unknown algorithm, a budget that is not allowed, or pymoo is not installed.
     """
     beside = competing_objective(name, problem)
     for algorithm, budgets in searches.items():

@@ -70,12 +70,12 @@ def pareto_surface(
     seed: int,
     progress: Progress = unwatched,
 ) -> Surface:
-    """Least power over a square grid of at least so many points, from the cheapest values of both criteria to the largest.
+    """Least power over a square grid of at least this many points, from the cheapest values of both criteria to the largest.
 
     Args:
         problem: of the surface.
         names: of two criteria.
-        points: at least so many demands.
+        points: least number of pairs of demands.
         starts: random starts at both ends of the walk over the grid.
         seed: of these.
         progress: told after each solve.

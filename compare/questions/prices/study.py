@@ -72,7 +72,7 @@ def prices(
         spec: the problem.
         starts: random starts.
         seed: of the starts.
-        checks: how many of the robot's dearest quantities are checked by solving again; of the parameters all are.
+        checks: how many of the robot's quantities, largest change first, are checked by solving again; all parameters are.
         solver: one that gives multipliers; None for IPOPT, which in any case sharpens what was found.
         progress: told each step when it begins.
 

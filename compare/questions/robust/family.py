@@ -30,8 +30,8 @@ class Worst:
         violation: largest, of one row, in its unit; 0 if all limits hold.
         row: whose it is.
         unit: of the violation.
-        corner: quantities' changes in the robot that it happens with.
-        power_W: largest, whichever robot it happens with.
+        corner: changes of the quantities of the robot for which it happens.
+        power_W: largest over all robots of the set.
     """
 
     violation: float
@@ -51,7 +51,7 @@ class Family:
 
     @property
     def centre(self) -> Corner:
-        """No change."""
+        """The corner without a change."""
         return (0,) * len(self._box)
 
     def changes(self, corner: Corner) -> dict[str, float]:

@@ -36,7 +36,7 @@ class Robust:
         box: half-widths by quantity.
         corners: changes of the robots in the scenario problem; the first is the nominal one, without changes.
         robots: their names.
-        rounds: in which corners were added.
+        rounds: number of searches for worse corners.
         settled: whether the last round found no worse corner.
         status: of the last solution.
         nominal_x: optimum for the nominal robot alone.

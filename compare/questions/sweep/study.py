@@ -1,4 +1,4 @@
-"""A problem solved over a grid of parameter values or fixed variables: the true curve that search histories only scatter over."""
+"""A problem solved over a grid of parameter values or fixed variables: the true curve, around which search histories scatter."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SweepPoint:
         at: value of each axis.
         objective: exact value, in the problem's sense.
         feasible: a feasible optimum was found.
-        status: in words; names the rows in the way if there is none.
+        status: in words; without a feasible point it names the rows that stand in the way.
         x: by variable name.
         violation: exact total violation.
         evaluations: calls of f.

@@ -79,7 +79,7 @@ def optimal_gaits(
 
 
 def played(spec: ProblemSpec, gait: Gait, steps: int) -> Gait:
-    """The gait with its playback of so many steps; as it is where none was found.
+    """The gait with a playback of this many steps; unchanged where no feasible gait was found.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
