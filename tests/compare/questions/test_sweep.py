@@ -58,8 +58,8 @@ def test_true_price_of_time() -> None:
 
 def test_another_nlp_solver_walks_the_grid_too() -> None:
     axes = [Axis(name="swing_height_m", values=(0.015, 0.018))]
-    calls: list[None] = []
-    points = sweep(SSP, axes, algorithm="slsqp", starts=1, progress=lambda: calls.append(None))
+    calls: list[str] = []
+    points = sweep(SSP, axes, algorithm="slsqp", starts=1, progress=calls.append)
     assert len(calls) == count_solves(axes, "slsqp") == 4
     assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
 
