@@ -84,12 +84,6 @@ def exact_model(problem: GaitProblem) -> ExactModel:
     return problem.built("exact", lambda: _build(problem))
 
 
-def row_violations(problem: GaitProblem, x: Array) -> tuple[ConstraintValue, ...]:
-    """Rows that the exact functions find violated at x, worst first."""
-    exact = exact_model(problem)
-    return violated_rows(exact.rows(exact.at(x, problem.p)))
-
-
 def violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:
     """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
     violated = [row for row in rows if not row.violation <= FEASIBILITY_TOLERANCE]

@@ -69,7 +69,7 @@ class NlpModel:
         return np.concatenate([z, np.array(self.lift_start(z, problem.p, width)).ravel()])
 
     def point(self, w: Array) -> Array:
-        """X (n,) of (z, s)."""
+        """Decision variables (n,) of (z, s)."""
         return np.asarray(self.offset + self.scale * w[: self.variables])
 
     def bounds(self, problem: GaitProblem) -> dict[str, Array]:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import ExactValues, exact_model, row_violations
+from nlp_gait.backends.exact import ExactValues, exact_model
 from nlp_gait.problem import Constraint, GaitProblem, load
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import corner, row, toy
+from tests.backends.toys import corner, row, row_violations, toy
 
 
 def evaluate(problem: GaitProblem, x: tuple[float, ...]) -> ExactValues:

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
 from nlp_gait.problem import Constraint
 from nlp_gait.problem.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import Mathematics, corner, row, toy
+from tests.backends.toys import Mathematics, corner, row, row_violations, toy
 
 Result = tuple[MX, tuple[Constraint, ...]]
 

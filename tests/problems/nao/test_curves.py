@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.symbolic.splines import finer
+from tests.backends.toys import row_violations
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 NAMES = ("nao-ssp", "nao-dsp")

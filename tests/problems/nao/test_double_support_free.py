@@ -9,12 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.closed_chain import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
+from tests.backends.toys import row_violations
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.

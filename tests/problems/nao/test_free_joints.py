@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.robots import load_robot
+from tests.backends.toys import row_violations
 from tests.pinocchio_oracle import floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
