@@ -23,7 +23,7 @@ from nlp_gait.errors import GaitError
 
 R = TypeVar("R")
 
-# What the system says where output cannot grow.
+# Errors of the system where a file cannot grow.
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 
@@ -38,7 +38,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
             for name, group in groups.items():
                 given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
             result = function(**given)
-            sys.stdout.flush()  # what cannot be written is said here, not by the interpreter at its end
+            sys.stdout.flush()  # a failure to write is reported here, not by the interpreter at its end
             return result
         except (GaitError, SearchError) as error:
             fail(str(error))
@@ -73,5 +73,5 @@ def _options(group: Any) -> Iterator[inspect.Parameter]:
 
 
 def _close_output() -> None:
-    """What is left in the buffers goes nowhere, so that the interpreter does not fail on it at its end."""
+    """Drop what is left in the buffers, so that the interpreter does not fail on it at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -36,7 +36,7 @@ class PlainConsole(Console):
 
 
 def harmless(text: str) -> str:
-    """Text whose control characters, and what is no character at all, stand as escapes."""
+    """Text with escapes in place of control characters and of what is not a character at all."""
     shown = (sign if sign in "\n\t" or _is_shown(sign) else repr(sign)[1:-1] for sign in text)
     return "".join(shown)
 
@@ -66,7 +66,7 @@ def fail(message: str) -> NoReturn:
 
 
 def print_json(data: Any) -> None:
-    """One JSON object on stdout; what is not finite is null, for not every reader takes NaN."""
+    """One JSON object on stdout; what is not finite is null, because not every reader accepts NaN."""
     sys.stdout.write(json.dumps(without_nan(data), indent=1, allow_nan=False) + "\n")
 
 
@@ -81,7 +81,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 def print_rows(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> None:
-    """Table on stdout with a row for each item: under each heading, what its column says of the item."""
+    """Table on stdout with a row for each item: under each heading, what it says of the item."""
     print_table(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
 
 

@@ -14,11 +14,11 @@ R = TypeVar("R")
 
 
 def until_interrupted(work: Callable[[], R], nothing: str = "nothing was written") -> tuple[R, str]:
-    """For work of which Ctrl-C leaves a part: what was found, and a sentence on where it was stopped, "" if it was not.
+    """What some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
 
     Args:
         work: raises ``Interrupted`` with the part that was found.
-        nothing: what to say where nothing was found; the command ends there.
+        nothing: what to add to the sentence if nothing was found; the command ends with it.
     """
     try:
         return work(), ""

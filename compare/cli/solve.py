@@ -71,7 +71,7 @@ def solve(
         print_json(solution.to_json())
     else:
         _print(solution)
-    if target is not None:  # after printing, lest a full disk take the result with it
+    if target is not None:  # after printing, so that a full disk does not take the result with it
         write_json(target, without_nan(solution.to_json()))
     if stopped:
         where = "printed" if target is None else f"in {target}"

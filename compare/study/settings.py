@@ -13,8 +13,8 @@ from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, read_text
 
-SCHEMA = 1  # of study files, which need not state it
-LARGEST_FILE = 2**17  # bytes; a study has some hundred
+SCHEMA = 1  # of study files; they may leave it out
+LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
 MOST_RUNS = 100_000
 
 

@@ -1,19 +1,25 @@
-"""How the commands that answer a question hand it out."""
+"""How the commands that ask a question hand out its answer."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.cli.common import print_result, print_table, stdout
+from compare.cli.common import end_interrupted, print_result, print_table, stdout
 from nlp_gait.errors import OutputError
 
 if TYPE_CHECKING:
     from compare.questions.answer import Answer
 
 
-def hand_out(answer: Answer, folder: Path, as_json: bool) -> None:
+def hand_out(answer: Answer, folder: Path, as_json: bool, stopped: str = "") -> None:
     """Write an answer and print it, as one JSON object or in tables and sentences.
+
+    Args:
+        answer: what was found.
+        folder: where the files go.
+        as_json: print one JSON object.
+        stopped: sentence on where the work was interrupted, if it was; the command ends with it.
 
     Raises:
         OutputError: a file cannot be written; the answer is printed all the same.
@@ -27,6 +33,8 @@ def hand_out(answer: Answer, folder: Path, as_json: bool) -> None:
     print_result(as_json, answer.data, written, lambda: _print(answer))
     if unwritten is not None:
         raise unwritten
+    if stopped:
+        end_interrupted(f"{stopped}; what was found is in {folder}")
 
 
 def _print(answer: Answer) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,7 +9,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import resumable
-from compare.cli.options import RESULTS, AsJson, Seed, names_in
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, Seed, names_in
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -27,7 +26,7 @@ def motions(
     starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    out: Annotated[Path, typer.Option(help="Folder for results, table and pictures; continued from there.")] = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, progress_bar
+from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AsJson, NaoPhase, Seed, TableFolder
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, NaoPhase, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -20,7 +20,7 @@ def motors(
     starts: Annotated[int, typer.Option(min=1, help="Random starts for each variant.")] = 10,
     seed: Seed = 0,
     problem: NaoPhase,
-    out: TableFolder = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat of each motor.
@@ -34,9 +34,7 @@ def motors(
     spec = problem.spec()
     with progress_bar("variants", len(VARIANTS)) as advance:
         found, stopped = until_interrupted(lambda: motor_variants(spec, starts=starts, seed=seed, progress=advance))
-    hand_out(motors_answer(found, spec.load()), folder, as_json)
-    if stopped:
-        end_interrupted(f"{stopped}; what was found is in {folder}")
+    hand_out(motors_answer(found, spec.load()), folder, as_json, stopped)
     failed = [variant for variant in found if not variant.success]
     if failed:
         fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))

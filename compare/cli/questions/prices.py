@@ -9,11 +9,9 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import whole
-from compare.cli.options import RESULTS, AsJson, NamedProblem, Seed, TableFolder
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, NamedProblem, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
-
-SHOWN = 12  # rows of the robot's table; all are in the CSV and in --json
 
 
 @command
@@ -23,7 +21,7 @@ def prices(
     seed: Seed = 0,
     checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are checked by solving again.")] = 3,
     problem: NamedProblem,
-    out: TableFolder = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Say what each limit costs the optimum, and which error of masses, lengths or soles would change it most.

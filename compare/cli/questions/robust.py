@@ -9,7 +9,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
-from compare.cli.options import RESULTS, AsJson, NaoPhase, Seed, TableFolder
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, NaoPhase, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -30,7 +30,7 @@ def robust(
     samples: Annotated[int, typer.Option(min=0, help="Random corners on which each result is checked.")] = 20,
     simulate: Annotated[bool, typer.Option(help="Play both gaits in MuJoCo on the worst robots (extra sim).")] = True,
     problem: NaoPhase,
-    out: TableFolder = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
@@ -61,6 +61,4 @@ def robust(
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
             end_interrupted(f"{stopped}; nothing was written")
-    hand_out(robust_answer(problem.name, found, runs), folder, as_json)
-    if stopped:
-        end_interrupted(f"{stopped}; what was found is in {folder}")
+    hand_out(robust_answer(problem.name, found, runs), folder, as_json, stopped)

@@ -9,7 +9,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AsJson, Evaluations, NamedProblem, Seed, TableFolder
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, Evaluations, NamedProblem, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -23,7 +23,7 @@ def sweep(
     evaluations: Evaluations = 10_000,
     seed: Seed = 0,
     problem: NamedProblem,
-    out: TableFolder = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, progress_bar
+from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AsJson, ProblemOptions, Seed
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, ProblemOptions, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -30,7 +29,7 @@ def walk(
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     problem: ProblemOptions,
-    out: Annotated[Path, typer.Option(help="Folder for the table, the gaits and the pictures.")] = RESULTS,
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
@@ -46,7 +45,7 @@ def walk(
     from nlp_gait.simulation.engine import mujoco
 
     if steps:
-        mujoco()  # said now if it is missing, not after the work
+        mujoco()  # if it is missing, say so before the work
     folder, axis = writable_folder(out), parse_axis(over)
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
@@ -61,8 +60,6 @@ def walk(
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
-    hand_out(walk_answer(spec, gaits), folder, as_json)
-    if stopped:
-        end_interrupted(f"{stopped}; what was found is in {folder}")
+    hand_out(walk_answer(spec, gaits), folder, as_json, stopped)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import metaheuristics
+from compare.analysis.units import with_unit
 from compare.questions.certainty import branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
@@ -73,10 +74,11 @@ class Certainty:
             return "nothing: branch and bound is for smooth problems of at most four variables"
         if not math.isfinite(c.bound):
             return f"nothing: the time limit came before a finite bound, after {c.boxes:,} boxes"
-        unit = "" if self.problem.objective.unit == "1" else f" {self.problem.objective.unit}"
+        unit = self.problem.objective.unit
+        bound, best = (with_unit(value, unit, ".6g") for value in (c.bound, c.objective))
         word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
         return (
-            f"{word} {c.bound:.6g}{unit}, {100 * c.gap:.3g} % from the best known {c.objective:.6g}{unit}; "
+            f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
             + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
             + "; intervals rounded outward, libm's functions taken to be within four units in the last place"
         )
