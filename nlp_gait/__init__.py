@@ -1,6 +1,7 @@
 """Biped gait problems, written once as symbolic CasADi models.
 
-``load`` makes a problem, ``solve`` gives it to IPOPT, ``compile_objective`` gives its exact functions to search algorithms.
+``load`` makes a problem; ``solve`` gives it to IPOPT, or to another NLP ``solver``; ``compile_objective`` gives its exact
+functions to search algorithms.
 """
 
 from importlib import import_module
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
+    from nlp_gait.backends.solvers.registry import solver
     from nlp_gait.problem.solution import Solution
 
 # Imported when first used: a search needs no NLP solver, and a solve no kernel.
@@ -22,6 +24,7 @@ _LATER = {
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
     "Solution": "nlp_gait.problem.solution",
     "solve": "nlp_gait.backends.solve",
+    "solver": "nlp_gait.backends.solvers.registry",
 }
 
 __all__ = [
@@ -34,6 +37,7 @@ __all__ = [
     "load",
     "problem_names",
     "solve",
+    "solver",
 ]
 
 

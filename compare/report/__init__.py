@@ -1,5 +1,5 @@
 """Report of a study, from its records only: ``report.html`` and ``report.md``."""
 
-from compare.report.writing import rebuild_report, write_report
+from compare.report.study_report import rebuild_report, write_report
 
 __all__ = ["rebuild_report", "write_report"]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.statistics.run_length import Weighting
-from compare.report.document import Section, table
+from compare.report.document import Section, text_table
 from compare.study.manifest import Manifest, Session
 
 
@@ -15,7 +15,7 @@ def method_section(comparisons: Sequence[Comparison], manifest: Manifest, weight
     """Everything that somebody needs to repeat the study or to doubt it."""
     return Section(
         title="How these numbers came about",
-        sections=(
+        parts=(
             _counting(comparisons, weighting),
             _solver_settings(comparisons),
             *(_session(number, session) for number, session in enumerate(manifest.sessions, start=1)),
@@ -28,7 +28,7 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
     rows = [(problem, *(f"{w:g}" for w in weighting.of_kind(n).values())) for problem, n in sizes.items()]
     return Section(
         title="Counting",
-        text=(
+        parts=(
             "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1, a "
             "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints on their own: what finite differences"
             " would cost, so gradient methods are never flattered. A gradient run is taken to reach its targets at its end. A "
@@ -36,8 +36,8 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
             "compiling.",
             "Search algorithms of equal seed begin from the same points; run k has the study's seed plus k. Parameters of all "
             "algorithms are their sources' defaults; none was tuned on these problems.",
+            text_table(("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"), rows),
         ),
-        tables=(table(("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"), rows),),
     )
 
 
@@ -58,7 +58,7 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
             )
         )
     return Section(
-        title="Settings and seeds", tables=(table(("problem", "solver", "seeds", "settings"), rows, prose=True),)
+        title="Settings and seeds", parts=(text_table(("problem", "solver", "seeds", "settings"), rows, prose=True),)
     )
 
 
@@ -71,7 +71,7 @@ def _session(number: int, session: Session) -> Section:
         ("compiled objective", session.kernel),
         ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
     ]
-    return Section(title=f"Session {number}", tables=(table(("what", "value"), rows, prose=True),))
+    return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
 
 
 def _plain(settings: object) -> str:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from compare.analysis.comparison import Comparison
 from compare.analysis.natural_steps import BY_UNIT
 from compare.analysis.published import published_rows
 from compare.analysis.significance import compare_pairs
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
+from compare.analysis.units import heading
 from compare.drawing.convergence import convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
-from compare.report.document import Figure, Section, Table, table
+from compare.report.document import Figure, Section, text_table
 from compare.study.record import RunRecord
 from nlp_gait.problem.solution import ActiveConstraint
 
@@ -23,7 +22,6 @@ def problem_section(comparison: Comparison) -> Section:
     """Tables, figures and lists on one problem."""
     summaries = summarise(comparison)
     objective = comparison.objective
-    unit = "" if objective.unit == "1" else f" [{objective.unit}]"
     stem = file_stem(comparison.problem)
     figures = (
         Figure(
@@ -38,25 +36,22 @@ def problem_section(comparison: Comparison) -> Section:
         ),
         Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),
     )
+    where_needed = (
+        _tests(comparison),
+        _binding(comparison),
+        _published(comparison),
+        _failures(comparison),
+        _between(comparison),
+    )
     return Section(
-        title=f"{comparison.problem}: {objective.name}{unit}, to {objective.sense}",
-        text=(
+        title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
+        parts=(
             "Claims are the solvers' own. Everything else is the judge's: the exact functions at the reported point, on the "
             "problem's own samples. Gaps are measured from the best feasible value known here; evaluations are equivalent ones.",
-        ),
-        tables=(table(HEADER, [cells(s, comparison) for s in summaries], "Solvers, best median first"),),
-        figures=figures,
-        sections=tuple(
-            section
-            for section in (
-                _costs(comparison, summaries),
-                _tests(comparison),
-                _binding(comparison),
-                _published(comparison),
-                _failures(comparison),
-                _between(comparison),
-            )
-            if section is not None
+            text_table(HEADER, [cells(s, comparison) for s in summaries], "Solvers, best median first"),
+            *figures,
+            _costs(comparison, summaries),
+            *(section for section in where_needed if section is not None),
         ),
     )
 
@@ -69,7 +64,7 @@ def file_stem(label: str) -> str:
 def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
     targets = [f"{100 * target:g} %" for target in TARGETS]
     unit = comparison.objective.unit
-    runtime = table(
+    runtime = text_table(
         ("solver", *(f"to {t}" for t in targets), *(f"seconds to {t}" for t in targets)),
         [
             (s.algorithm, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
@@ -77,7 +72,7 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
         ],
         "Expected running time to targets above the best known: all runs' cost until then, divided by the successes",
     )
-    times = table(
+    times = text_table(
         ("solver", "feasible between samples", "95 % interval of the median", "build", "compile", "solve, median"),
         [
             (
@@ -93,12 +88,12 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
         f"Uncertainty of the median [{unit}] over the feasible runs (bootstrap), and where the time goes; build and compile are "
         "the longest, paid once by each process",
     )
-    calls = table(
+    calls = text_table(
         ("solver", "f", "g", "gradient", "Jacobian", "Hessian", "failed"),
         [(solver.name, *_mean_calls(solver.records)) for solver in comparison.solvers],
         "Calls in a run, mean",
     )
-    return Section(title="What it costs", tables=(runtime, times, calls))
+    return Section(title="What it costs", parts=(runtime, times, calls))
 
 
 def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
@@ -126,12 +121,12 @@ def _tests(comparison: Comparison) -> Section | None:
     ]
     return Section(
         title="Are the differences real?",
-        text=(
+        parts=(
             "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over "
             "runs with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no "
             "difference; above 0.71: large).",
+            text_table(("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"), rows),
         ),
-        tables=(table(("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"), rows),),
     )
 
 
@@ -159,11 +154,11 @@ def _binding(comparison: Comparison) -> Section | None:
     note = f" {left_out} cheaper ones are left out." if left_out else ""
     return Section(
         title="What binds at the optimum",
-        text=(
+        parts=(
             f"At the best optimum of {record.algorithm} (run {record.run}). The price is the change of the optimal "
             f"{comparison.objective.name} for each unit by which the bound is raised; the dearest come first.{note}",
+            text_table(("constraint", "side", "at", "price of raising it", "for a step"), rows),
         ),
-        tables=(table(("constraint", "side", "at", "price of raising it", "for a step"), rows),),
     )
 
 
@@ -180,7 +175,7 @@ def _published(comparison: Comparison) -> Section | None:
     if found is None:
         return None
     header, rows, note = found
-    return Section(title="The paper's values next to ours", text=(note,), tables=(table(header, rows),))
+    return Section(title="The paper's values next to ours", parts=(note, text_table(header, rows)))
 
 
 def _failures(comparison: Comparison) -> Section | None:
@@ -188,8 +183,8 @@ def _failures(comparison: Comparison) -> Section | None:
     if not failed:
         return None
     rows = [(r.algorithm, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
-    made = table(("solver", "run", "seed", "why it ended", "violated, worst first"), rows)
-    return Section(title="Runs that ended infeasible or failed", tables=(_as_prose(made),))
+    made = text_table(("solver", "run", "seed", "why it ended", "violated, worst first"), rows, prose=True)
+    return Section(title="Runs that ended infeasible or failed", parts=(made,))
 
 
 def _between(comparison: Comparison) -> Section | None:
@@ -200,12 +195,8 @@ def _between(comparison: Comparison) -> Section | None:
     ]
     if not rows:
         return None
-    made = table(("solver", "run", "violated between the samples, worst first"), rows)
-    return Section(title="Feasible on their own samples, violated between them", tables=(_as_prose(made),))
-
-
-def _as_prose(made: Table) -> Table:
-    return replace(made, prose=True)
+    made = text_table(("solver", "run", "violated between the samples, worst first"), rows, prose=True)
+    return Section(title="Feasible on their own samples, violated between them", parts=(made,))
 
 
 def _p(value: float) -> str:

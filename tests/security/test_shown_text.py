@@ -15,7 +15,9 @@ from rich.console import Console
 from compare.cli import common
 from compare.cli.common import PlainConsole, harmless
 from compare.drawing.figures import inline_svg, new_figure, style, svg_text
-from compare.report.writing import document_of, html, markdown_page
+from compare.report.document import Figure, leaves
+from compare.report.study_report import document_of
+from compare.report.writing import html, markdown_page
 from compare.study.manifest import Manifest, Session
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
@@ -75,7 +77,7 @@ def hostile_report() -> tuple[Page, str]:
     )
     document = document_of(records, Manifest(settings=settings, sessions=(session,)))
     page = Page()
-    page.feed(html(document, ["<svg ></svg>"] * sum(len(section.figures) for section in document.sections)))
+    page.feed(html(document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in leaves(document.parts))))
     return page, markdown_page(document)
 
 

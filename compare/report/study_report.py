@@ -1,0 +1,57 @@
+"""Report of a study from its records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
+from compare.analysis.statistics.run_length import Weighting
+from compare.analysis.verdict import verdict
+from compare.drawing.distributions import expected_costs, profile_figure
+from compare.report.document import Document, Figure, Section
+from compare.report.method_section import method_section
+from compare.report.problem_section import problem_section
+from compare.report.writing import write_document
+from compare.study.manifest import Manifest, read_manifest
+from compare.study.record import RunRecord
+from compare.study.study import read_records
+
+
+def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING) -> list[Path]:
+    """Write the report of a folder of records anew; returns the paths of its files.
+
+    Raises:
+        InputError: no records there, or a damaged one.
+        OutputError: the files cannot be written.
+    """
+    return write_report(folder, read_records(folder), read_manifest(folder), weighting)
+
+
+def write_report(
+    folder: Path, records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING
+) -> list[Path]:
+    """Write ``report.html``, ``report.md`` and the figures as PNG and SVG; returns the paths of all files."""
+    return write_document(folder, document_of(records, manifest, weighting))
+
+
+def document_of(records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING) -> Document:
+    """Document of a study's records."""
+    comparisons = compare_problems(records, weighting)
+    sections = [problem_section(comparison) for comparison in comparisons]
+    if len(comparisons) > 1 and expected_costs(comparisons):
+        sections.append(_over_problems(comparisons))
+    return Document(
+        title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
+        verdict=verdict(comparisons),
+        parts=(*sections, method_section(comparisons, manifest, weighting)),
+    )
+
+
+def _over_problems(comparisons: Sequence[Comparison]) -> Section:
+    figure = Figure(
+        name="performance-profile",
+        caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected evaluations.",
+        drawing=profile_figure(comparisons),
+    )
+    return Section(title="Over all problems", parts=(figure,))

@@ -1,0 +1,51 @@
+"""Documents from a text in Markdown with places for numbers, tables and figures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from compare.report.document import Document, Figure, Part, Prose, Section, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+HEADING = re.compile(r"(#+) (.+)")
+TABLE = re.compile(r"\{(\w+)\}")
+FIGURE = re.compile(r"!\[(.*)\]\((.+)\.png\)", re.DOTALL)
+
+
+def document_from(
+    text: str, *, values: Mapping[str, Any], tables: Mapping[str, Table], figures: Mapping[str, Drawing]
+) -> Document:
+    """Document of a text.
+
+    Blocks of the text are parted by empty lines: the title after ``#``, headings after ``##`` and ``###``; a table's name in
+    braces; ``![what it shows](name.png)`` for the drawing of that name; anything else is a paragraph, a list or a table in
+    Markdown, in which ``{name:.3f}`` is a value as ``str.format`` writes it.
+
+    Raises:
+        KeyError: a value or drawing that the text names is not there.
+    """
+    title, *blocks = re.split(r"\n{2,}", text.strip())
+    open_sections: list[tuple[str, list[Part]]] = [(title.removeprefix("# "), [])]
+
+    def close(level: int) -> None:
+        while len(open_sections) > level:
+            name, parts = open_sections.pop()
+            open_sections[-1][1].append(Section(title=name, parts=parts))
+
+    for block in blocks:
+        parts = open_sections[-1][1]
+        if heading := HEADING.fullmatch(block):
+            close(len(heading[1]) - 1)
+            open_sections.append((heading[2].format_map(values), []))
+        elif (place := TABLE.fullmatch(block)) and place[1] in tables:
+            parts.append(tables[place[1]])
+        elif figure := FIGURE.fullmatch(block):
+            parts.append(Figure(name=figure[2], caption=figure[1].format_map(values), drawing=figures[figure[2]]))
+        else:
+            parts.append(Prose(block.format_map(values)))
+    close(1)
+    return Document(title=open_sections[0][0], parts=open_sections[0][1])

@@ -1,0 +1,87 @@
+"""Documents: what stands where on the page, in Markdown and in the files beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from compare.drawing.figures import new_figure
+from compare.report.document import Document, Figure, Prose, Section, Table
+from compare.report.template import document_from
+from compare.report.writing import write_document, write_parts
+
+TEXT = """
+# A title
+
+Found {count} *gaits* {low:.2f}.
+
+{powers}
+
+## A heading of {count}
+
+| a | b |
+|---|---|
+| 1 | 2 |
+
+### Below it
+
+![Nothing, {low:.1f} times.](empty.png)
+
+## The end
+
+- one
+- two
+"""
+POWERS = Table(
+    columns={"solver": "", "power [W]": ".2f", "feasible": ""},
+    rows=[["ga|<b>", 1 / 3, True], ["pso", None, False]],
+    name="powers",
+)
+
+
+def made() -> Document:
+    return document_from(
+        TEXT, values={"count": 3, "low": 0.125}, tables={"powers": POWERS}, figures={"empty": new_figure(1.0, 1.0)}
+    )
+
+
+def test_a_text_with_places_becomes_a_document() -> None:
+    document = made()
+    assert document.title == "A title"
+    first, table, heading, end = document.parts
+    assert first == Prose("Found 3 *gaits* 0.12.") and table is POWERS
+    assert isinstance(heading, Section) and heading.title == "A heading of 3"
+    below = heading.parts[1]
+    assert isinstance(below, Section) and isinstance(below.parts[0], Figure)
+    assert (below.parts[0].name, below.parts[0].caption) == ("empty", "Nothing, 0.1 times.")
+    assert isinstance(end, Section) and end.parts == [Prose("- one\n- two")]
+
+
+def test_a_value_that_is_not_there_is_an_error() -> None:
+    with pytest.raises(KeyError, match="power"):
+        document_from("# Title\n\n{power:.2f}", values={}, tables={}, figures={})
+
+
+def test_pages_are_rounded_for_people_and_files_are_not(tmp_path: Path) -> None:
+    files = write_document(tmp_path, made(), page="walk")
+    assert [path.name for path in files] == ["walk.html", "walk.md", "powers.csv", "empty.png", "empty.svg"]
+    page, markdown = (path.read_text(encoding="utf-8") for path in files[:2])
+    assert "| ga\\|&lt;b&gt; | 0.33 | yes | \n" in markdown and "| pso | - | no |" in markdown
+    assert "## A heading of 3\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n### Below it\n\n![empty](empty.png)" in markdown
+    assert f'<td data-key="{1 / 3}">0.33</td>' in page and '<td data-key="inf">-</td>' in page
+    assert "<em>gaits</em>" in page and "<li>two</li>" in page and "<td>2</td>" in page
+    assert page.count("<svg") == 1 and '<div class="verdict">' not in page
+    assert files[2].read_text() == f"solver,power [W],feasible\nga|<b>,{1 / 3!r},true\npso,,false\n"
+
+
+def test_tables_and_figures_can_be_written_alone(tmp_path: Path) -> None:
+    unnamed = Table(columns={"a": ""}, rows=[[1]])
+    written = write_parts(tmp_path, ["a paragraph", unnamed, Section(title="inner", parts=[POWERS])])
+    assert written == list(tmp_path.iterdir()) == [tmp_path / "powers.csv"]
+
+
+def test_markup_in_the_programs_own_text_is_no_html(tmp_path: Path) -> None:
+    write_document(tmp_path, Document(title="<b>", parts=[Prose("**strong** <script>x</script>")]))
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<strong>strong</strong> &lt;script&gt;x" in page and "<b>" not in page
