@@ -113,9 +113,9 @@ class Outcome:
         violation: exact total violation at x.
         iterations: over all stages, where the solver counts them.
         evaluations: over all stages.
+        time_s: wall time of the run itself [s].
         build_s: time to build the symbolic NLP, whenever that was [s].
         compile_s: time to make the solver, with derivatives and their compilation, whenever that was [s].
-        time_s: wall time of the run itself [s].
         functions: ``"compiled"`` or ``"interpreted"``.
         linear_solver: that was really used, where the solver says it.
         guess: warm start with multipliers, where the solver has one.
@@ -133,9 +133,9 @@ class Outcome:
     violation: float
     iterations: int
     evaluations: Evaluations
-    build_s: float
-    compile_s: float
     time_s: float
+    build_s: float = 0.0
+    compile_s: float = 0.0
     functions: str = "interpreted"
     linear_solver: str = ""
     guess: Guess | None = None

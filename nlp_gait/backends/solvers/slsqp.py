@@ -88,7 +88,6 @@ class Slsqp(Solver):
             violation=violation,
             iterations=iterations,
             evaluations=Evaluations(f=functions.calls),
-            build_s=0.0,
             compile_s=functions.started - started,
             time_s=time_s,
             functions=functions.backend,

@@ -106,8 +106,6 @@ def end(claimed: bool, cost: float, violation: float) -> Outcome:
         violation=violation,
         iterations=0,
         evaluations=Evaluations(),
-        build_s=0.0,
-        compile_s=0.0,
         time_s=0.0,
     )
 

@@ -43,8 +43,6 @@ class Corners(Solver):
             status="tried",
             iterations=1,
             evaluations=Evaluations(f=1),
-            build_s=0.0,
-            compile_s=0.0,
             time_s=0.0,
         )
 
