@@ -15,6 +15,7 @@ from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, without_nan, write_json
 from nlp_gait.problem import Objective
+from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
 
 SCHEMA = 2
@@ -157,19 +158,10 @@ class RunRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Problem:
-    """What a definition says of the problem."""
-
-    name: str
-    options: Mapping[str, str | int | float | bool]
-    parameters: Mapping[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Definition:
     """Shape of a definition, see ``Task.definition``."""
 
-    problem: _Problem
+    problem: StoredProblem
     objective: Objective
     algorithm: str | Mapping[str, Any]
     settings: Mapping[str, Any]
@@ -192,7 +184,7 @@ def read_record(path: Path) -> RunRecord:
         remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
         raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
     try:
-        return _checked(decoded(RunRecord, {key: value for key, value in raw.items() if key != "schema"}))
+        return _checked(decoded(RunRecord, raw, unread=("schema",)))
     except ValueError as error:
         raise InputError(f"record {str(path)!r} is damaged: {error}; delete it to have it made anew") from error
 

@@ -13,7 +13,7 @@ import metaheuristics
 import nlp_gait
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.solvers import nlpsol
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decoded, refusing
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.registry import check_options
@@ -169,19 +169,16 @@ def check_task(task: Task) -> None:
     if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
         raise unknown("algorithm", task.algorithm, solver_names())
     if task.algorithm == IPOPT:
-        _checked_names(task.settings, nlp_gait.IpoptSettings, IPOPT)
-        try:
+        with refusing(f"settings of {IPOPT}", InputError):
             decoded(nlp_gait.IpoptSettings, task.settings)
-        except ValueError as error:
-            raise InputError(f"setting of {IPOPT}: {error}") from error
+    elif task.algorithm in GRADIENT_SOLVERS and task.settings:
+        raise InputError(f"{task.algorithm} has no settings, got {next(iter(task.settings))!r}")
     elif task.algorithm in nlpsol.OPTIONS:
-        _checked_names(task.settings, None, str(task.algorithm))
         nlpsol.check_time_limit(str(task.algorithm), task.stop.time_limit_s)
         reason = nlpsol.probe(str(task.algorithm))
         if reason is not None:
             raise InputError(f"NLP solver {task.algorithm!r} does not run in this installation: {reason}")
     elif task.algorithm == SLSQP:
-        _checked_names(task.settings, None, SLSQP)
         if task.stop.evaluations <= len(problem.names):
             raise InputError(f"slsqp needs at least {len(problem.names) + 1} evaluations for one gradient")
     else:
@@ -196,15 +193,3 @@ def check_task(task: Task) -> None:
 def plain_settings(settings: Any) -> dict[str, Any]:
     """Settings with their class name, as plain data."""
     return {"kind": type(settings).__name__, **asdict(settings)}
-
-
-def _checked_names(settings: Mapping[str, Any], known: Any, solver: str) -> Mapping[str, Any]:
-    names = tuple(known.__dataclass_fields__) if known is not None else ()
-    for name in settings:
-        if name not in names:
-            raise (
-                unknown(f"setting of {solver}", name, names)
-                if names
-                else InputError(f"{solver} has no settings, got {name!r}")
-            )
-    return settings

@@ -278,8 +278,8 @@ def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
     [
         ({"LKneePitch": "left_knee"}, r"unknown joint in joint_names of .*robot\.json' 'left_knee'"),
         ({"RKneePitch": "LKneePitch"}, "joint_names gives 'RKneePitch' to 'LKneePitch', but that name is taken"),
-        (["LKneePitch"], r"'joint_names' must be an object, got \['LKneePitch'\]"),
-        ({"LKneePitch": 3}, r"robot\.json': joint_names: 'LKneePitch' must be a text, got 3"),
+        (["LKneePitch"], r"joint_names must be an object, got \['LKneePitch'\]"),
+        ({"LKneePitch": 3}, r"robot\.json': joint_names\.LKneePitch must be a text, got 3"),
     ],
 )
 def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object, message: str) -> None:

@@ -18,7 +18,7 @@ from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
 from nlp_gait.problems.stairs.learned_path import learned
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -119,8 +119,8 @@ class ClosedLoop:
     def _equations(self, state: State, parts: Mapping[str, Any]) -> Equations:
         """Of the acceleration within one quantum."""
         q, v = state
-        found = points(load_biped().rods, q, SX(2, 1))
-        motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, q)
+        found = points(toe_foot_biped().rods, q, SX(2, 1))
+        motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, q)
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
@@ -142,7 +142,7 @@ class ClosedLoop:
         state, inputs, parts = self._symbols()
         following = State(SX.sym("q_next", N), SX.sym("v_next", N))
         slope = SX.sym("slope")
-        rods = load_biped().rods
+        rods = toe_foot_biped().rods
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
         acted = following if self.scheme == "implicit" else state
         torque = controller_torque(parts["control"], parts["desired"], acted, G)
@@ -157,7 +157,7 @@ class ClosedLoop:
             weight += rod.mass * (a[1] + GRAVITY)
             pull += rod.mass * a[0]
             moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
-        least = LEAST_LOAD * load_biped().mass_kg * GRAVITY
+        least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
         zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",
@@ -184,7 +184,9 @@ def _desired(ops: Nonsmooth) -> ca.Function:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = plan_of(values)
-    step = posture(load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops)
+    step = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
+    )
     given = ca.vertcat(values, size, margin)
     pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
     time = SX.sym("time")

@@ -16,7 +16,7 @@ from nlp_gait.problem.blocks import Layout, labels
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, Loads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, KNEE_LIMITS, KNEES, SETBACK, knee_angles, stair_of
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -87,13 +87,13 @@ class IdealModel:
     def _interval(self) -> ca.Function:
         q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
         toe, sole = SX.sym("toe", 2), SX.sym("sole", 2)
-        found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
+        found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
         return ca.Function("loads", [q, qd, qdd, toe, sole], ca.cse(list(found)))
 
     @cached_property
     def _instant(self) -> ca.Function:
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = points(load_biped().rods, link_angles(q), SX(2, 1))
+        found = points(toe_foot_biped().rods, link_angles(q), SX(2, 1))
         swing = [found[name] for name in "TSA"]
         stair = Stair(size[0], size[1])
         heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in swing]
@@ -122,7 +122,7 @@ class IdealModel:
         q = x["angle"]
         places = Places(*self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1)))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(load_biped().foot_m, 0) - size, 1, lift)
+        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(places.ankle[:, 0] + size, places.ankle[:, n] - size)
         advance = places.hip[:, n] - places.hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
@@ -170,7 +170,7 @@ class IdealModel:
                 scale=0.01,
                 value=pressure.T,
                 lower=margin,
-                upper=load_biped().foot_m - margin,
+                upper=toe_foot_biped().foot_m - margin,
             ),
         )
 

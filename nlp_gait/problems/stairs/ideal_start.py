@@ -12,7 +12,7 @@ from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.formulas.profile import Stair
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, PAPER_TIMES
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -57,5 +57,7 @@ def _angles() -> ca.Function:
         toe_angle=SX(np.pi / 6),
         catch_angle=SX(0.01),
     )
-    found = posture(load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact())
+    found = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
+    )
     return ca.Function("angles", [size, s], [found.q.position])

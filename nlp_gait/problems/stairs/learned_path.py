@@ -8,7 +8,7 @@ from casadi import DM, MX, SX
 from nlp_gait.problems.stairs.formulas.leg_network import leg_rates, leg_vector, trained_path
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.network import NetworkSettings
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 
 # Gradient steps, as printed, at a rate with which every pose of the three planned steps converges within 40 of them; the
 # printed 5,000 would take a minute for each rollout, as all of them are counted.
@@ -25,7 +25,7 @@ def learned(desired: MX) -> MX:
     columns = desired.shape[1]
     rows = ca.vertsplit(desired)
     for thigh, shank in LEGS:
-        lengths = load_biped().link(thigh).length_m, load_biped().link(shank).length_m
+        lengths = toe_foot_biped().link(thigh).length_m, toe_foot_biped().link(shank).length_m
         at = [LINKS.index(thigh), LINKS.index(shank)]
         at += [len(LINKS) + i for i in at]
         q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)

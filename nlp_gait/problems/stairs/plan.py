@@ -28,7 +28,7 @@ from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs.plan_rows import clearance_rows, ground_rows, phase_rows, posture_rows
 from nlp_gait.problems.stairs.plan_samples import PlannedStep, Samples
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
 from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, joint_signals
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -153,7 +153,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
             "peak_jerk_rad_s3": exact.largest(jerk),
             "peak_acceleration_rad_s2": exact.largest(ca.vec(_joints(samples.qdd))),
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
-            "zmp_margin_min_m": ca.mmin(exact.min(pressure, load_biped().foot_m - pressure)),
+            "zmp_margin_min_m": ca.mmin(exact.min(pressure, toe_foot_biped().foot_m - pressure)),
         },
     )
 

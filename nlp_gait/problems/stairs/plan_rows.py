@@ -10,7 +10,7 @@ from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import MOVING
 from nlp_gait.problems.stairs.plan_samples import PlannedStep, Samples
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import ANGLE_LIMITS, KNEE_LIMITS, KNEES, knee_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -92,7 +92,7 @@ def ground_rows(point: Point, samples: Samples) -> tuple[Constraint, ...]:
             scale=0.01,
             value=samples.stance_pressure.T,
             lower=margin,
-            upper=load_biped().foot_m - margin,
+            upper=toe_foot_biped().foot_m - margin,
         ),
     )
 

@@ -17,7 +17,7 @@ from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import Posture, posture
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -119,7 +119,7 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
     s = inputs[0]
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     toe = SX.sym("toe", 2)
-    found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
     dynamics = ca.Function("loads", [q, qd, qdd, toe], list(found))
 
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
@@ -147,7 +147,7 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
 def clearance_function(ops: Nonsmooth) -> ca.Function:
     """Heights (3,) of toe, sole and ankle above the stair, from the inputs of ``sample_function`` but the last."""
     inputs, _, stair, step = _planned(ops)
-    found = points(load_biped().rods, link_angles(step.q.position), SX(2, 1))
+    found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
@@ -157,5 +157,5 @@ def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = plan_of(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = posture(load_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
+    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
     return [s, passing, values, size, margin], plan, stair, step

@@ -10,7 +10,7 @@ from nlp_gait.problem import Assembly, Constraint, Point
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, N, Rollout
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
@@ -56,7 +56,7 @@ def _beyond(point: Point, zmp: MX) -> tuple[MX, MX]:
 
     It reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
     """
-    foot = load_biped().foot_m
+    foot = toe_foot_biped().foot_m
     times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)
     rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
     return rear - zmp.T, zmp.T - foot

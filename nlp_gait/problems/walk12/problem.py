@@ -25,7 +25,7 @@ from nlp_gait.problem import (
 )
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp, legs, reaches, zero_moment_point
-from nlp_gait.problems.walk12.robot import PointMassBiped, load_biped
+from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
 from nlp_gait.problems.walk12.skeleton import skeleton
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -87,7 +87,7 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     """
     if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
-    robot = load_biped()
+    robot = point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)
