@@ -7,9 +7,10 @@ from time import perf_counter
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import FEASIBILITY, mark_failed
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array, BatchObjective
+from metaheuristics.interface import BatchObjective
 from metaheuristics.result import History
 
 Observer = Callable[[Array, Array, Array], object]

@@ -8,15 +8,12 @@ learns from them (`tell`), so an adapter to another package is a small class wit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from metaheuristics.constraint_handling import Rule
-
-Array: TypeAlias = NDArray[np.float64]
+from metaheuristics.array import Array
+from metaheuristics.constraint_handling import Rule
 
 
 class BatchObjective(Protocol):

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array
 from metaheuristics.preparation import checked_bounds, checked_seed, child, starting_points
 from metaheuristics.settings import bad_setting, check_count
 

@@ -8,8 +8,9 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Array, BatchObjective
+from metaheuristics.interface import Algorithm, BatchObjective
 
 
 def checked_bounds(objective: BatchObjective) -> tuple[Array, Array]:

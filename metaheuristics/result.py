@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling
-from metaheuristics.interface import Algorithm, Array
+from metaheuristics.interface import Algorithm
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

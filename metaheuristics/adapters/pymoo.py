@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array, Start
+from metaheuristics.interface import Start
 from metaheuristics.settings import bad_setting, check_count
 
 MODULES: Mapping[str, str] = {

@@ -10,7 +10,7 @@ import numpy as np
 from compare.questions.pareto.criteria import Criterion
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.problem import GaitProblem
 

@@ -8,9 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.algorithms.points import Points
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
-from metaheuristics.points import Points
+from metaheuristics.interface import Start
 from metaheuristics.settings import check_count, check_number
 
 

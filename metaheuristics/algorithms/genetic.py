@@ -8,10 +8,18 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.algorithms.genetic_operators import (
+    Crossover,
+    Flip,
+    Mutation,
+    Polynomial,
+    SimulatedBinary,
+    SinglePoint,
+)
+from metaheuristics.algorithms.points import Points
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.genetic_operators import Crossover, Flip, Mutation, Polynomial, SimulatedBinary, SinglePoint
-from metaheuristics.interface import Array, Start
-from metaheuristics.points import Points
+from metaheuristics.interface import Start
 from metaheuristics.settings import bad_setting, check_count
 
 
@@ -54,7 +62,7 @@ class GeneticAlgorithm:
             raise bad_setting(self, "survival", "'plus' or 'generational'")
         for name in ("crossover", "mutation"):
             if not callable(getattr(self, name)):
-                raise bad_setting(self, name, "an operator of metaheuristics.genetic_operators or alike")
+                raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic_operators or alike")
 
     @classmethod
     def goswami2008(cls) -> GeneticAlgorithm:

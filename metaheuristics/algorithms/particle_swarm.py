@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
+from metaheuristics.interface import Start
 from metaheuristics.settings import check_count, check_number
 
 
