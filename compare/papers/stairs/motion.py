@@ -11,9 +11,9 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.gait import Foot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
+from nlp_gait.problems.stairs.formulas.gait import ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
 from nlp_gait.problems.stairs.formulas.profile import Stair
-from nlp_gait.problems.stairs.governing import GOVERNING, plan_of
+from nlp_gait.problems.stairs.governing import GOVERNING, stair_plan
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY
 
@@ -82,9 +82,9 @@ def _motion(plan: Mapping[str, float], tread: float, rise: float, times: Array) 
 @cache
 def _function() -> ca.Function:
     s, given = SX.sym("s", 4), SX.sym("given", len(GOVERNING) + 2)
-    plan, stair = plan_of(given[:-2]), Stair(given[-2], given[-1])
+    plan, stair = stair_plan(given[:-2]), Stair(given[-2], given[-1])
     robot = toe_foot_biped()
-    foot = Foot(robot.sole_m, robot.toe_m)
+    foot = ToeFoot(robot.sole_m, robot.toe_m)
     landed = landed_angles(plan, s)
     outputs = [
         hip(plan, stair, GRAVITY, s),

@@ -18,8 +18,7 @@ from nlp_gait import IpoptSettings, compile_objective, load, solve
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.stairs.closed_loop import InverseKinematics
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.learned_path import LEGS
-from nlp_gait.problems.stairs.network import NetworkSettings, network_angles
+from nlp_gait.problems.stairs.network import LEGS, NetworkSettings, network_angles
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import PAPER_TIMES
 from nlp_gait.problems.stairs.track import PLAN

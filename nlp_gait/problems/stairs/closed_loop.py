@@ -16,15 +16,15 @@ from nlp_gait.problems.stairs.formulas.loads import LEAST_LOAD, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
 from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
-from nlp_gait.problems.stairs.learned_path import learned
+from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.problems.stairs.network import learned
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
     Controller,
-    State,
+    QuantisedState,
     after,
     controller_torque,
     explicit_quantum,
@@ -116,7 +116,7 @@ class ClosedLoop:
             "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
         )
 
-    def _equations(self, state: State, parts: Mapping[str, Any]) -> Equations:
+    def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Of the acceleration within one quantum."""
         q, v = state
         found = points(toe_foot_biped().rods, q, SX(2, 1))
@@ -140,7 +140,7 @@ class ClosedLoop:
     def _outcome(self) -> ca.Function:
         """(state, next state, given, tuned, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
-        following = State(SX.sym("q_next", N), SX.sym("v_next", N))
+        following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         slope = SX.sym("slope")
         rods = toe_foot_biped().rods
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
@@ -166,8 +166,8 @@ class ClosedLoop:
             {"is_diff_in": [True, True, False, True, False]},
         )
 
-    def _symbols(self) -> tuple[State, list[SX], dict[str, Any]]:
-        """State, the inputs given and tuned, and what they hold by name, with controller and desired state."""
+    def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
+        """QuantisedState, the inputs given and tuned, and what they hold by name, with controller and desired state."""
         given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
         ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
         parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
@@ -175,15 +175,15 @@ class ClosedLoop:
         each = N // self.gains
         aim = parts.pop("aim")
         parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), parts.pop("gravity_share"))
-        parts["desired"] = State(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
-        return State(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
+        parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
+        return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
 def _desired(ops: Nonsmooth) -> ca.Function:
     """(time, governing parameters with stair and reach margin) to the desired angles and rates (18,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
-    plan = plan_of(values)
+    plan = stair_plan(values)
     step = posture(
         toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
     )

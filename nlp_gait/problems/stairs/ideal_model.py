@@ -13,11 +13,11 @@ from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Assembly, Constraint, Point
 from nlp_gait.problem.blocks import Layout, labels
-from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, Loads, link_angles, loads
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, StanceLoads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import GRAVITY, KNEE_LIMITS, KNEES, SETBACK, knee_angles, stair_of
+from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, stair_of, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
@@ -63,8 +63,12 @@ class IdealModel:
             constraints=(
                 *self._motion(x, step),
                 *self._feet(x, point),
-                *self._ground(x, stance, pressure, point),
-                _limits("knee", knee_angles(x["angle"]), tuple(KNEES), range(self.intervals + 1), KNEE_LIMITS),
+                grip("friction_toe", x["toe_force"], point["friction"]),
+                grip("friction_sole", x["sole_force"], point["friction"]),
+                grip("friction_stance", stance, point["stance_friction"]),
+                stance_load(point, stance),
+                stance_zmp(point, pressure),
+                knee_limits("knee", x["angle"]),
             ),
             indexes={
                 "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
@@ -73,15 +77,15 @@ class IdealModel:
             },
         )
 
-    def loads_at(self, values: Mapping[str, Array]) -> Loads[Array]:
+    def loads_at(self, values: Mapping[str, Array]) -> StanceLoads[Array]:
         """Torques, stance force and its centre of pressure in every interval, from numbers: columns are intervals."""
         symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
-        return Loads(*(np.array(ca.evalf(part)) for part in symbolic))
+        return StanceLoads(*(np.array(ca.evalf(part)) for part in symbolic))
 
-    def _loads(self, x: Mapping[str, MX]) -> Loads[MX]:
+    def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
         n = self.intervals
         toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
-        return Loads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
+        return StanceLoads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
     @cached_property
     def _interval(self) -> ca.Function:
@@ -147,33 +151,6 @@ class IdealModel:
             above("clearance_in_swing", places.heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
         )
 
-    def _ground(self, x: Mapping[str, MX], stance: MX, pressure: MX, point: Point) -> tuple[Constraint, ...]:
-        """Friction, load and centre of pressure."""
-        intervals = range(self.intervals)
-        margin = point["zmp_margin_m"]
-        return (
-            _friction("friction_toe", x["toe_force"], point["friction"]),
-            _friction("friction_sole", x["sole_force"], point["friction"]),
-            _friction("friction_stance", stance, point["stance_friction"]),
-            Constraint(
-                name="stance_load",
-                labels=labels(("z",), intervals),
-                unit="N",
-                scale=100.0,
-                value=stance[1, :].T,
-                lower=point["least_stance_force_N"],
-            ),
-            Constraint(
-                name="stance_zmp",
-                labels=labels(("x",), intervals),
-                unit="m",
-                scale=0.01,
-                value=pressure.T,
-                lower=margin,
-                upper=toe_foot_biped().foot_m - margin,
-            ),
-        )
-
 
 def _equal(
     name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
@@ -181,29 +158,4 @@ def _equal(
     """Rows value == 0."""
     return Constraint(
         name=name, labels=labels(rows, columns), unit=unit, scale=scale, value=ca.vec(value), lower=MX(0), upper=MX(0)
-    )
-
-
-def _limits(name: str, value: MX, rows: tuple[str, ...], columns: range, limits: tuple[float, float]) -> Constraint:
-    return Constraint(
-        name=name,
-        labels=labels(rows, columns),
-        unit="rad",
-        scale=0.1,
-        value=ca.vec(value),
-        lower=MX(limits[0]),
-        upper=MX(limits[1]),
-    )
-
-
-def _friction(name: str, force: MX, coefficient: MX) -> Constraint:
-    """|F_x| <= mu F_z as two rows."""
-    grip = coefficient * force[1, :]
-    return Constraint(
-        name=name,
-        labels=labels(("forward", "backward"), range(force.shape[1])),
-        unit="N",
-        scale=100.0,
-        value=ca.vec(ca.vertcat(grip - force[0, :], grip + force[0, :])),
-        lower=MX(0),
     )

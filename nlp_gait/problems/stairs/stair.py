@@ -1,13 +1,15 @@
-"""What the stair problems share: the stair as two parameters, gravity, limits of the links."""
+"""What the stair problems share: the stair as two parameters, gravity, limits of the links, rows of knees and stance foot."""
 
 from __future__ import annotations
 
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem import Array, Columns, Parameter, Point, Variable, in_space
+from nlp_gait.problem import Array, Columns, Constraint, Parameter, Point, Variable, in_space
+from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.profile import Stair
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 
 GRAVITY = 9.81  # [m/s^2]
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
@@ -56,6 +58,9 @@ STAIR_PARAMETERS = (
         name="rise_run_ratio", unit="1", default=CASES[2][1], description="rise over run", minimum=0.01, maximum=5.0
     ),
 )
+LEAST_STANCE_FORCE = Parameter(
+    name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
+)
 
 
 def within(point: Point, variable: Variable) -> MX:
@@ -79,6 +84,59 @@ def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
     return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
-def knee_angles(q: MX) -> MX:
-    """(2, m) angles of the knees in the order of KNEES from link angles (7, m); positive when bent."""
-    return ca.vertcat(*(q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values()))
+def knee_limits(name: str, q: MX) -> Constraint:
+    """Knees bent within their limits.
+
+    Args:
+        name: of the rows.
+        q: (7, m) link angles [rad].
+    """
+    knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
+    return Constraint(
+        name=name,
+        labels=labels(tuple(KNEES), range(q.shape[1])),
+        unit="rad",
+        scale=0.1,
+        value=ca.vec(ca.vertcat(*knees)),
+        lower=MX(KNEE_LIMITS[0]),
+        upper=MX(KNEE_LIMITS[1]),
+    )
+
+
+def grip(name: str, force: MX, friction: MX) -> Constraint:
+    """|F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
+    limit = friction * force[1, :]
+    return Constraint(
+        name=name,
+        labels=labels(("forward", "backward"), range(force.shape[1])),
+        unit="N",
+        scale=100.0,
+        value=ca.vec(ca.vertcat(limit - force[0, :], limit + force[0, :])),
+        lower=MX(0),
+    )
+
+
+def stance_load(point: Point, force: MX) -> Constraint:
+    """The ground carries the stance foot with a force (2, m) [N] at least as large as the parameter says."""
+    return Constraint(
+        name="stance_load",
+        labels=labels(("z",), range(force.shape[1])),
+        unit="N",
+        scale=100.0,
+        value=force[1, :].T,
+        lower=point["least_stance_force_N"],
+    )
+
+
+def stance_zmp(point: Point, pressure: MX) -> Constraint:
+    """The centre of pressure (1, m) [m] lies within the stance foot, by the margin that the parameter says."""
+    margin = point["zmp_margin_m"]
+    return Constraint(
+        name="stance_zmp",
+        labels=labels(("x",), range(pressure.shape[1])),
+        unit="m",
+        scale=0.01,
+        value=pressure.T,
+        lower=margin,
+        upper=toe_foot_biped().foot_m - margin,
+    )

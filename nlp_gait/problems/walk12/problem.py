@@ -85,7 +85,7 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     Raises:
         InputError: an option that is not allowed.
     """
-    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 2 or intervals % 2:
+    if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
     robot = point_mass_biped()
 

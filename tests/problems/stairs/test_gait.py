@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import Foot, StairPlan, ankle, ankle_on_toe, hip, in_time, landed_angles
+from nlp_gait.problems.stairs.formulas.gait import StairPlan, ToeFoot, ankle, ankle_on_toe, hip, in_time, landed_angles
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import posture
@@ -32,7 +32,7 @@ PLAN = dict(
     toe_angle=np.pi / 6,
     catch_angle=0.01,
 )
-FOOT = Foot(0.12, 0.05)
+FOOT = ToeFoot(0.12, 0.05)
 KNOTS = [[1, 0, 0, 0], [1, 1, 0, 0], [1, 1, 1, 0]]
 
 

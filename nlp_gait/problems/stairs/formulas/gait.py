@@ -68,7 +68,7 @@ class StairPlan(NamedTuple):
         return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
 
 
-class Foot(NamedTuple):
+class ToeFoot(NamedTuple):
     """Lengths of a foot: ankle to sole joint, sole joint to tip of the toe [m]."""
 
     sole: float
@@ -91,7 +91,7 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
-def ankle_on_toe(foot: Foot, sole: SX, toe: SX) -> SX:
+def ankle_on_toe(foot: ToeFoot, sole: SX, toe: SX) -> SX:
     """(2,) ankle from where it is with the foot flat [m], while the tip of the toe stands still.
 
     Source:
@@ -119,7 +119,7 @@ def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return foot_angles(plan, back)
 
 
-def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
+def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
     Source:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import Foot, StairPlan, ankle, foot_angles, hip, in_time
+from nlp_gait.problems.stairs.formulas.gait import StairPlan, ToeFoot, ankle, foot_angles, hip, in_time
 from nlp_gait.problems.stairs.formulas.planar_biped import Rod
 from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
@@ -55,7 +55,7 @@ def posture(
         ops: interpretation of acos.
     """
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
-    swing_foot = Foot(rods["AS"].length, rods["ST"].length)
+    swing_foot = ToeFoot(rods["AS"].length, rods["ST"].length)
     at_hip = in_time(hip(plan, stair, gravity, s) - stance, s, rates)
     at_ankle = in_time(ankle(plan, stair, swing_foot, s) - stance, s, rates)
     swing, swing_reach = _leg(rods, at_hip, at_ankle, margin, ops)
