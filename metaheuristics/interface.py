@@ -8,12 +8,14 @@ learns from them (`tell`), so an adapter to another package is a small class wit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
+
+Settings = TypeVar("Settings")
 
 
 class BatchObjective(Protocol):
@@ -94,6 +96,24 @@ class Search(Protocol):
         Returns:
             Reasons in words; empty to go on.
         """
+
+
+class PopulationSearch(Generic[Settings]):
+    """Base of searches that hold the points to ask for, the starting points first; `tell` is theirs."""
+
+    def __init__(self, settings: Settings, start: Start) -> None:
+        """Hold the starting points."""
+        self._settings = settings
+        self._start = start
+        self._X = start.initial
+
+    def ask(self) -> Array:
+        """Return the points held, (P, n)."""
+        return self._X
+
+    def stop(self) -> tuple[str, ...]:
+        """Return no reason: the search goes on until the budget ends."""
+        return ()
 
 
 class Algorithm(Protocol):

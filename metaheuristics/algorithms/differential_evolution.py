@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Start
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import bad_setting, check_count, check_number
 
 # Mutants (P, n) of the members x (P, n), the best member (n,), others drawn for each member r (5, P, n), and the weight F.
@@ -95,19 +95,13 @@ def crossed(
     return np.where(taken, mutants, members)
 
 
-class DifferentialEvolutionSearch:
+class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
     """A run of `DifferentialEvolution`; see `Search`."""
 
     def __init__(self, settings: DifferentialEvolution, start: Start) -> None:
         """Ask for the starting points first, as trials without members."""
-        self._settings = settings
-        self._start = start
-        self._X = start.initial
+        super().__init__(settings, start)
         self._members: Points | None = None
-
-    def ask(self) -> Array:
-        """Return the trials, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Select, and make the next trials; see `Search.tell`."""
@@ -123,10 +117,6 @@ class DifferentialEvolutionSearch:
         # Best first, and trials keep the places of their members.
         self._members = trials.best(len(trials.f), rule)
         self._X = self._trials(self._members.X)
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason; a collapsed population goes on until the budget ends."""
-        return ()
 
     def _trials(self, X: Array) -> Array:
         """Trials (P, n) for members (P, n) that are sorted best first."""

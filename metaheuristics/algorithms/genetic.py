@@ -19,7 +19,7 @@ from metaheuristics.algorithms.genetic_operators import (
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Start
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import bad_setting, check_count
 
 
@@ -105,19 +105,13 @@ def tournaments(places: int, population: int, size: int, rng: np.random.Generato
     return winners
 
 
-class GeneticSearch:
+class GeneticSearch(PopulationSearch[GeneticAlgorithm]):
     """A run of `GeneticAlgorithm`; see `Search`."""
 
     def __init__(self, settings: GeneticAlgorithm, start: Start) -> None:
         """Ask for the starting points first, as children without parents."""
-        self._settings = settings
-        self._start = start
-        self._X = start.initial
+        super().__init__(settings, start)
         self._parents = Points.none(start.initial.shape[1])
-
-    def ask(self) -> Array:
-        """Return the children, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Choose the survivors and mate them; see `Search.tell`."""
@@ -130,10 +124,6 @@ class GeneticSearch:
             rest = children.best(settings.population - len(elites.f), rule)
             self._parents = elites.join(rest).best(settings.population, rule)
         self._X = self._mate()
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason: mutation never ends."""
-        return ()
 
     def _mate(self) -> Array:
         """Make as many children as there are parents."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from math import inf
 
 import casadi as ca
 from casadi import MX, SX
 
 from nlp_gait.problem import Parameter, Point, Variable
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
-from nlp_gait.problems.stairs.stair import within
+from nlp_gait.problems.stairs.stair import parameters, within
 
 # Name, unit, description; bounds; minimum and maximum, beyond which no plan makes sense and numbers may overflow.
 _TABLE = (
@@ -28,32 +29,11 @@ GOVERNING_VARIABLES = tuple(
     Variable(name=name, unit=unit, lower=lower, upper=upper, description=text, minimum=minimum, maximum=maximum)
     for name, unit, text, (lower, upper), (minimum, maximum) in _TABLE
 )
-GIVEN_PARAMETERS = (  # Table III
-    Parameter(name="t3_s", unit="s", default=3.5, description="t3, end of the step", minimum=0.5),
-    Parameter(
-        name="sole_angle_rad",
-        unit="rad",
-        default=math.pi / 6,
-        description="theta_a, largest angle of the rear sole",
-        minimum=0.0,
-        maximum=1.2,
-    ),
-    Parameter(
-        name="toe_angle_rad",
-        unit="rad",
-        default=math.pi / 6,
-        description="theta_b, angle of the rear toe as it lifts",
-        minimum=0.0,
-        maximum=1.2,
-    ),
-    Parameter(
-        name="catch_angle_rad",
-        unit="rad",
-        default=0.01,
-        description="Delta theta_c0, half of what the bridge covers on the cycloid",
-        minimum=1e-4,
-        maximum=0.5,
-    ),
+GIVEN_PARAMETERS = parameters(  # Table III
+    ("t3_s", "s", 3.5, "t3, end of the step", 0.5, inf),
+    ("sole_angle_rad", "rad", math.pi / 6, "theta_a, largest angle of the rear sole", 0.0, 1.2),
+    ("toe_angle_rad", "rad", math.pi / 6, "theta_b, angle of the rear toe as it lifts", 0.0, 1.2),
+    ("catch_angle_rad", "rad", 0.01, "Delta theta_c0, half of what the bridge covers on the cycloid", 1e-4, 0.5),
 )
 REACH_MARGIN = Parameter(
     name="reach_margin",

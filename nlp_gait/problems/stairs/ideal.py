@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from math import inf
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Parameter, Signals, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker
 from nlp_gait.problem.blocks import Block, Layout
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
@@ -27,6 +28,7 @@ from nlp_gait.problems.stairs.stair import (
     PAPER_TIMES,
     STAIR_PARAMETERS,
     joint_signals,
+    parameters,
 )
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -43,39 +45,15 @@ REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stre
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
-    Parameter(name="step_time_s", unit="s", default=3.5, description="t3, time of the step", minimum=0.1),
-    Parameter(
-        name="torque_weight", unit="1/(N m)^2/s", default=0.01, description="cost of squared torque", minimum=0.0
-    ),
-    Parameter(
-        name="acceleration_weight",
-        unit="s^3/rad^2",
-        default=1e-3,
-        description="cost of squared link acceleration",
-        minimum=0.0,
-    ),
-    Parameter(name="friction", unit="1", default=0.6, description="mu below the rear foot", minimum=0.0),
-    Parameter(
-        name="stance_friction",
-        unit="1",
-        default=10.0,
-        description="mu below the stance foot; the default does not bind",
-        minimum=0.0,
-    ),
-    LEAST_STANCE_FORCE,
-    Parameter(
-        name="zmp_margin_m",
-        unit="m",
-        default=0.0,
-        description="least distance of the stance foot's ZMP from its ends",
-        minimum=0.0,
-        maximum=0.08,
-    ),
-    Parameter(
-        name="clearance_m",
-        unit="m",
-        default=-0.002,
-        description="least height of foot points above the smoothed stair",
+    *parameters(
+        ("step_time_s", "s", 3.5, "t3, time of the step", 0.1, inf),
+        ("torque_weight", "1/(N m)^2/s", 0.01, "cost of squared torque", 0.0, inf),
+        ("acceleration_weight", "s^3/rad^2", 1e-3, "cost of squared link acceleration", 0.0, inf),
+        ("friction", "1", 0.6, "mu below the rear foot", 0.0, inf),
+        ("stance_friction", "1", 10.0, "mu below the stance foot; the default does not bind", 0.0, inf),
+        LEAST_STANCE_FORCE,
+        ("zmp_margin_m", "m", 0.0, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
+        ("clearance_m", "m", -0.002, "least height of foot points above the smoothed stair", -inf, inf),
     ),
 )
 

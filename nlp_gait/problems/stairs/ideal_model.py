@@ -12,12 +12,12 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Assembly, Constraint, Point
-from nlp_gait.problem.blocks import Layout, labels
+from nlp_gait.problem.blocks import Layout
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, StanceLoads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, stair_of, stance_load, stance_zmp
+from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, rows, stair_of, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
@@ -131,15 +131,8 @@ class IdealModel:
         advance = places.hip[:, n] - places.hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
-        def above(name: str, heights: MX, rows: tuple[str, ...], instants: range) -> Constraint:
-            return Constraint(
-                name=name,
-                labels=labels(rows, instants),
-                unit="m",
-                scale=0.01,
-                value=ca.vec(heights),
-                lower=point["clearance_m"],
-            )
+        def above(name: str, heights: MX, points: tuple[str, ...], instants: range) -> Constraint:
+            return rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
 
         return (
             _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
@@ -153,9 +146,7 @@ class IdealModel:
 
 
 def _equal(
-    name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
+    name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
 ) -> Constraint:
     """Rows value == 0."""
-    return Constraint(
-        name=name, labels=labels(rows, columns), unit=unit, scale=scale, value=ca.vec(value), lower=MX(0), upper=MX(0)
-    )
+    return rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)

@@ -100,7 +100,7 @@ def network_angles(
     settings = settings or NetworkSettings()
     training = _training(settings.hidden, thigh, shank)
     weights = settings.first_weights
-    step = _Adam(settings.rate) if settings.rule == "adam" else _Gradient(settings.rate)
+    step = _Adam(settings.rate) if settings.rule == "adam" else lambda gradient: settings.rate * gradient
     rows = []
     for target in hip_to_ankle:
         started = time.perf_counter()
@@ -143,16 +143,6 @@ def _training(nodes: int, thigh: float, shank: float) -> ca.Function:
     weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
     angles, error = network_error(weights, target, thigh, shank)
     return ca.Function("training", [weights, target], ca.cse([angles, error, ca.gradient(error, weights)]))
-
-
-class _Gradient:
-    """Plain gradient step."""
-
-    def __init__(self, rate: float) -> None:
-        self._rate = rate
-
-    def __call__(self, gradient: Array) -> Array:
-        return self._rate * gradient
 
 
 class _Adam:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Literal
 
 import casadi as ca
@@ -18,13 +19,11 @@ from nlp_gait.problem import (
     Grid,
     NumericPoint,
     Objective,
-    Parameter,
     Point,
     Signals,
     Variable,
     maker,
 )
-from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
@@ -39,6 +38,8 @@ from nlp_gait.problems.stairs.stair import (
     grip,
     joint_signals,
     knee_limits,
+    parameters,
+    rows,
     stance_load,
     stance_zmp,
 )
@@ -72,33 +73,21 @@ PARAMETERS = (
     *STAIR_PARAMETERS,
     *GIVEN_PARAMETERS,
     REACH_MARGIN,
-    Parameter(
-        name="zmp_margin_m",
-        unit="m",
-        default=0.01,
-        description="least distance of the stance foot's ZMP from its ends",
-        minimum=0.0,
-        maximum=0.08,
-    ),
-    LEAST_STANCE_FORCE,
-    Parameter(name="friction", unit="1", default=0.6, description="mu below both feet", minimum=0.0),
-    Parameter(
-        name="clearance_m", unit="m", default=0.002, description="least height of the swing foot above the stair"
-    ),
-    Parameter(
-        name="acceleration_limit_rad_s2",
-        unit="rad/s^2",
-        default=80.0,
-        description="largest acceleration of a link",
-        minimum=0.0,
-    ),
-    Parameter(name="least_phase_s", unit="s", default=0.1, description="least duration of each phase", minimum=0.0),
-    Parameter(
-        name="quantum_s",
-        unit="s",
-        default=0.01,
-        description="time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
-        minimum=1e-4,
+    *parameters(
+        ("zmp_margin_m", "m", 0.01, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
+        LEAST_STANCE_FORCE,
+        ("friction", "1", 0.6, "mu below both feet", 0.0, inf),
+        ("clearance_m", "m", 0.002, "least height of the swing foot above the stair", -inf, inf),
+        ("acceleration_limit_rad_s2", "rad/s^2", 80.0, "largest acceleration of a link", 0.0, inf),
+        ("least_phase_s", "s", 0.1, "least duration of each phase", 0.0, inf),
+        (
+            "quantum_s",
+            "s",
+            0.01,
+            "time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
+            1e-4,
+            inf,
+        ),
     ),
 )
 
@@ -175,51 +164,20 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
 def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
     """Reach, link angles, knees and accelerations at every sample."""
     m = samples.q.shape[1]
-    instants = range(m)
     lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
+    most = point["acceleration_limit_rad_s2"]
     return (
-        Constraint(
-            name="reach",
-            labels=labels(("swing", "stance"), instants),
-            unit="1",
-            scale=0.1,
-            value=ca.vec(samples.reach),
-            upper=1 - point["reach_margin"],
-        ),
-        Constraint(
-            name="link_angle",
-            labels=labels(MOVING, instants),
-            unit="rad",
-            scale=0.1,
-            value=ca.vec(samples.q),
-            lower=lower,
-            upper=upper,
-        ),
+        rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
+        rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
         knee_limits("knee_angle", samples.q),
-        Constraint(
-            name="link_acceleration",
-            labels=labels(MOVING, instants),
-            unit="rad/s^2",
-            scale=10.0,
-            value=ca.vec(samples.qdd),
-            lower=-point["acceleration_limit_rad_s2"],
-            upper=point["acceleration_limit_rad_s2"],
-        ),
+        rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
     )
 
 
 def _clearance(point: Point, step: PlannedStep, ops: Nonsmooth) -> Constraint:
     """Toe, sole and ankle of the swing foot above the stair while it is in the air."""
-    heights = step.clearances(point, ops)
-    reserve = SAMPLING_RESERVE / step.per_phase**2
-    return Constraint(
-        name="clearance",
-        labels=labels(("toe", "sole", "ankle"), range(heights.shape[1])),
-        unit="m",
-        scale=0.01,
-        value=ca.vec(heights),
-        lower=point["clearance_m"] + reserve,
-    )
+    least = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
+    return rows("clearance", step.clearances(point, ops), ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
 def _phase_durations(point: Point) -> Constraint:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import inf
+
 import casadi as ca
 from casadi import MX
 
@@ -45,22 +48,21 @@ COLUMNS = {
     "ankle": in_space("m", "xz"),
 }
 
-STAIR_PARAMETERS = (
-    Parameter(
-        name="stair_length_m",
-        unit="m",
-        default=CASES[2][0],
-        description="length of a double step: two treads (Table IV)",
-        minimum=0.05,
-        maximum=2.0,
-    ),
-    Parameter(
-        name="rise_run_ratio", unit="1", default=CASES[2][1], description="rise over run", minimum=0.01, maximum=5.0
-    ),
+
+def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
+    """Parameters from a table of name, unit, default, description, minimum and maximum."""
+    return tuple(
+        Parameter(name=name, unit=unit, default=default, description=text, minimum=minimum, maximum=maximum)
+        for name, unit, default, text, minimum, maximum in table
+    )
+
+
+STAIR_PARAMETERS = parameters(
+    ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
+    ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
 )
-LEAST_STANCE_FORCE = Parameter(
-    name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
-)
+# Row of a table of parameters.
+LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stance foot", 0.0, inf)
 
 
 def within(point: Point, variable: Variable) -> MX:
@@ -84,59 +86,60 @@ def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
     return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
-def knee_limits(name: str, q: MX) -> Constraint:
-    """Knees bent within their limits.
+def rows(
+    name: str,
+    value: MX,
+    of: Sequence[str],
+    unit: str,
+    scale: float,
+    *,
+    lower: MX | float | None = None,
+    upper: MX | float | None = None,
+    columns: Sequence[int] = (),
+) -> Constraint:
+    """Rows of a table (r, m), each of whose r quantities is bounded at each of m instants.
 
     Args:
         name: of the rows.
-        q: (7, m) link angles [rad].
+        value: (r, m) [unit].
+        of: (r,) names of the quantities.
+        unit: of the values.
+        scale: of a violation, see ``Constraint``.
+        lower: bound, for all or for each.
+        upper: likewise.
+        columns: (m,) numbers of the instants; from zero if empty.
     """
-    knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
     return Constraint(
         name=name,
-        labels=labels(tuple(KNEES), range(q.shape[1])),
-        unit="rad",
-        scale=0.1,
-        value=ca.vec(ca.vertcat(*knees)),
-        lower=MX(KNEE_LIMITS[0]),
-        upper=MX(KNEE_LIMITS[1]),
+        labels=labels(of, columns or range(value.shape[1])),
+        unit=unit,
+        scale=scale,
+        value=ca.vec(value),
+        lower=None if lower is None else MX(lower),
+        upper=None if upper is None else MX(upper),
     )
+
+
+def knee_limits(name: str, q: MX) -> Constraint:
+    """Knees bent within their limits; q (7, m) are link angles [rad]."""
+    knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
+    return rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
 
 
 def grip(name: str, force: MX, friction: MX) -> Constraint:
     """|F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
     limit = friction * force[1, :]
-    return Constraint(
-        name=name,
-        labels=labels(("forward", "backward"), range(force.shape[1])),
-        unit="N",
-        scale=100.0,
-        value=ca.vec(ca.vertcat(limit - force[0, :], limit + force[0, :])),
-        lower=MX(0),
-    )
+    both = ca.vertcat(limit - force[0, :], limit + force[0, :])
+    return rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
 
 
 def stance_load(point: Point, force: MX) -> Constraint:
     """The ground carries the stance foot with a force (2, m) [N] at least as large as the parameter says."""
-    return Constraint(
-        name="stance_load",
-        labels=labels(("z",), range(force.shape[1])),
-        unit="N",
-        scale=100.0,
-        value=force[1, :].T,
-        lower=point["least_stance_force_N"],
-    )
+    return rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
 
 
 def stance_zmp(point: Point, pressure: MX) -> Constraint:
     """The centre of pressure (1, m) [m] lies within the stance foot, by the margin that the parameter says."""
     margin = point["zmp_margin_m"]
-    return Constraint(
-        name="stance_zmp",
-        labels=labels(("x",), range(pressure.shape[1])),
-        unit="m",
-        scale=0.01,
-        value=pressure.T,
-        lower=margin,
-        upper=toe_foot_biped().foot_m - margin,
-    )
+    front = toe_foot_biped().foot_m - margin
+    return rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Literal
 
 import casadi as ca
@@ -14,7 +15,6 @@ from nlp_gait.problem import (
     Array,
     Assembly,
     Columns,
-    Constraint,
     GaitProblem,
     NumericPoint,
     Objective,
@@ -24,13 +24,12 @@ from nlp_gait.problem import (
     Variable,
     maker,
 )
-from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
-from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, within
+from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, parameters, rows, within
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
@@ -70,37 +69,15 @@ PARAMETERS = (
     ),
     *GIVEN_PARAMETERS,
     REACH_MARGIN,
-    Parameter(
-        name="tracking_tolerance_rad",
-        unit="rad",
-        default=0.1,
-        description="largest error of a link angle at any time",
-        minimum=0.0,
+    *parameters(
+        ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
+        ("zmp_weight", "1/m", 100.0, "cost of the mean distance of the ZMP from the supporting polygon", 0.0, inf),
+        ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
+        ("disturbance_Nm", "N m", 1 / 70, "amplitude of the disturbance sin(2 t) on every link", -inf, inf),
+        ("ground_stiffness_N_m", "N/m", 5e4, "k_s of a contact", 0.0, inf),
+        ("ground_damping_N_s_m", "N s/m", 500.0, "k_d of a contact", 0.0, inf),
+        ("friction", "1", 0.6, "mu of a contact", 0.0, inf),
     ),
-    Parameter(
-        name="zmp_weight",
-        unit="1/m",
-        default=100.0,
-        description="cost of the mean distance of the ZMP from the supporting polygon",
-        minimum=0.0,
-    ),
-    Parameter(
-        name="gravity_compensation",
-        unit="1",
-        default=1.0,
-        description="share of gravity that the controller compensates; 0 as printed",
-        minimum=0.0,
-        maximum=1.0,
-    ),
-    Parameter(
-        name="disturbance_Nm",
-        unit="N m",
-        default=1 / 70,
-        description="amplitude of the disturbance sin(2 t) on every link",
-    ),
-    Parameter(name="ground_stiffness_N_m", unit="N/m", default=5e4, description="k_s of a contact", minimum=0.0),
-    Parameter(name="ground_damping_N_s_m", unit="N s/m", default=500.0, description="k_d of a contact", minimum=0.0),
-    Parameter(name="friction", unit="1", default=0.6, description="mu of a contact", minimum=0.0),
 )
 
 
@@ -201,14 +178,15 @@ def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
     return Assembly(
         objective=tracking + effort + point["zmp_weight"] * outside,
         constraints=(
-            Constraint(
-                name="tracking",
-                labels=labels(LINKS, range(1, quanta + 1)),
-                unit="rad",
-                scale=0.1,
-                value=ca.vec(errors[:N, :]),
+            rows(
+                "tracking",
+                errors[:N, :],
+                LINKS,
+                "rad",
+                0.1,
                 lower=-tolerance,
                 upper=tolerance,
+                columns=range(1, quanta + 1),
             ),
         ),
         indexes={
