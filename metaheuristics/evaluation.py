@@ -105,7 +105,7 @@ def _checked_answer(answer: object, count: int) -> tuple[Array, Array]:
     try:
         f, violation = np.asarray(answer[0], dtype=np.float64), np.asarray(answer[1], dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise SearchError(f"{wanted}; it returned something else than real numbers: {error}") from error
+        raise SearchError(f"{wanted}; it returned something other than real numbers: {error}") from error
     if f.shape != (count,) or violation.shape != (count,):
         raise SearchError(f"{wanted}; got shapes {f.shape} and {violation.shape}: give one number per row of X")
     negative = violation < 0.0

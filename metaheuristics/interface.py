@@ -18,11 +18,8 @@ from metaheuristics.constraint_handling import Rule
 Settings = TypeVar("Settings")
 
 
-class BatchObjective(Protocol):
-    """An objective to be minimised within bounds, called on many points at once.
-
-    Attributes are read once, before the first call.
-    """
+class Bounded(Protocol):
+    """Variables with bounds, which are read once, before the first call."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -35,6 +32,10 @@ class BatchObjective(Protocol):
     @property
     def upper(self) -> Array:
         """(n,) upper bounds, finite and >= lower; equal bounds fix a variable."""
+
+
+class BatchObjective(Bounded, Protocol):
+    """An objective to be minimised within bounds, called on many points at once."""
 
     def __call__(self, X: Array, /) -> tuple[Array, Array]:
         """Evaluate points.

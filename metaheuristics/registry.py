@@ -34,7 +34,7 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
 ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
     {"cma": CmaEs} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
 )
-"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` brings."""
+"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` installs."""
 
 PACKAGES: Mapping[str, str] = MappingProxyType({"cma": "cma", "pymoo": "pymoo"})
 

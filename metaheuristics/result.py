@@ -82,8 +82,8 @@ class Result:
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a run, with what was found until then.
 
-    It propagates as any KeyboardInterrupt does, so that it ends a whole study and not only the run in progress; who
-    wants the partial result catches it and reads `result`.
+    It propagates as any KeyboardInterrupt does, so that it ends a whole study and not only the run in progress. To get
+    the partial result, catch it and read `result`.
     """
 
     def __init__(self, result: Result) -> None:

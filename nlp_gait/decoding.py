@@ -1,6 +1,6 @@
-"""Dataclasses from the plain data that files hold: every key, and nothing but the type that the dataclass states.
+"""Dataclasses from the plain data of files: no key missing or unknown, every value of the type that the dataclass states.
 
-A number that was not finite stands as null in a file: where the dataclass has a ``float``, null is NaN.
+A number that is not finite is written as null: where the dataclass has a ``float``, null becomes NaN.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def decoded(
     """Instance of a dataclass.
 
     Args:
-        cls: its fields may be texts, numbers, truth values, tuples, mappings by text, dataclasses, literals, and unions.
+        cls: its fields may be texts, numbers, booleans, tuples, mappings from text, dataclasses, literals, and unions.
         raw: as JSON gives it.
         where: place in the file, for messages.
         given: fields that do not stand in the file.

@@ -118,8 +118,8 @@ class RunRecord:
         status: why it ended, in words.
         success: the solver itself claims a feasible result.
         x: by variable name; empty if the run failed before it had a point.
-        objective: as claimed, in the problem's sense; None if there is none.
-        violation: as claimed; None if there is none.
+        objective: as claimed, in the problem's sense; None without a claim.
+        violation: as claimed; None without a claim.
         verdict: of the judge.
         evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
         failed_evaluations: calls that gave NaN or infinity.
@@ -194,10 +194,10 @@ def _checked(record: RunRecord) -> RunRecord:
     objective = decoded(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
-            raise ValueError(f"{text!r} is no name or unit of an objective")
+            raise ValueError(f"{text!r} is not a name or unit of an objective")
     for title in (record.problem, record.algorithm):
         if not LABEL.fullmatch(title):  # names of files are made from it
-            raise ValueError(f"{title!r} is no label of a problem or solver")
+            raise ValueError(f"{title!r} is not a label of a problem or solver")
     history, times, verdict = record.history, record.time_s, record.verdict
     if not len(history.evaluations) == len(history.objective) == len(times.history):
         raise ValueError("the columns of the history differ in length")

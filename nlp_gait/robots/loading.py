@@ -82,7 +82,7 @@ def robot_names() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
 
-    Behind an ``@`` may stand changes of masses, leg lengths and soles, see ``robots/perturbation.py``.
+    Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``.
 
     Raises:
         UnknownNameError: no such robot.
@@ -160,7 +160,7 @@ def _renamed(joints: Mapping[str, _Record], names: Mapping[str, str], source: st
 
 def _resolved(base: str, source: str) -> str:
     """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
-    # Normalised, so that two files that extend each other by roundabout paths are found out.
+    # Normalised, so that two files that extend each other by roundabout paths are recognised.
     return os.path.normpath(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
 
 

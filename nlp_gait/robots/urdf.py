@@ -1,6 +1,6 @@
-"""Robots from URDF files, as the same record that a JSON robot file holds; the soles, of which a URDF is silent, come from there.
+"""Robots from URDF files, in the form of a JSON robot file; a URDF says nothing about soles, which come from the latter.
 
-The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses what is incomplete and names link or joint.
+The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses incomplete links and joints by name.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
 
     Raises:
         MissingExtraError: the parser is not installed.
-        RobotDataError: the file cannot be read, is no URDF, or no tree.
+        RobotDataError: the file cannot be read, is not a URDF, or its links do not form a tree.
     """
     model = _parsed(path)
     joints = {joint.child: joint for joint in model.joints}
@@ -85,23 +85,23 @@ def _parsed(path: str) -> Any:
         return import_module("urdf_parser_py.urdf").URDF.from_xml_string(etree.tostring(root))
     except Exception as error:  # the parser raises its own, KeyError, ValueError and AssertionError
         said = " ".join(str(error).split()) or type(error).__name__
-        raise RobotDataError(f"robot file {path!r} is no URDF of a robot: {said}") from error
+        raise RobotDataError(f"robot file {path!r} is not a URDF of a robot: {said}") from error
     finally:
         parser.on_error = tolerant
 
 
 def _refuse(message: str) -> None:
-    """In place of the parser's own answer to unknown tags and attributes, and to tags that stand twice: a line on stderr."""
+    """Replaces the parser's own answer to unknown tags and attributes and to repeated tags: a line on stderr."""
     raise RobotDataError(message)
 
 
 def _zero_pose(model: Any, joints: dict[str, Any], path: str) -> dict[str, Array]:
-    """(4, 4) pose of each link's frame in the root's at zero angles, parents first; refuses what is no tree."""
+    """(4, 4) pose of each link's frame in the root's at zero angles, parents first; refuses links that do not form a tree."""
     names = [link.name for link in model.links]
     for kind, found in (("link", names), ("joint", [joint.name for joint in model.joints])):
         twice = sorted({name for name in found if found.count(name) > 1})
         if twice:
-            raise RobotDataError(f"robot file {path!r}: {kind} {twice[0]!r} is there twice")
+            raise RobotDataError(f"robot file {path!r}: {kind} {twice[0]!r} appears twice")
     for joint in model.joints:
         for end in (joint.parent, joint.child):
             if end not in names:

@@ -38,8 +38,8 @@ EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
 CONTACTS = ("T", "S", "A", "S'", "T'")
 N = len(LINKS)
-# What a quantum is given beside the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
-# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated by it.
+# What a quantum is given besides the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated with respect to it.
 GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
 TORSO = LINKS.index("UH")
 

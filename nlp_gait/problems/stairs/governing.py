@@ -8,9 +8,9 @@ from math import inf
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem import Parameter, Point, Variable
+from nlp_gait.problem import Parameter, Point, Variable, parameters
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
-from nlp_gait.problems.stairs.stair import parameters, within
+from nlp_gait.problems.stairs.stair import within
 
 # Name, unit, description; bounds; minimum and maximum, beyond which no plan makes sense and numbers may overflow.
 _TABLE = (

@@ -11,7 +11,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker, parameters
 from nlp_gait.problem.blocks import Block, Layout
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
@@ -28,7 +28,6 @@ from nlp_gait.problems.stairs.stair import (
     PAPER_TIMES,
     STAIR_PARAMETERS,
     joint_signals,
-    parameters,
 )
 from nlp_gait.symbolic.nonsmooth import Exact
 

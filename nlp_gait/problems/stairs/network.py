@@ -45,7 +45,7 @@ class NetworkSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot train."""
+        """Refuse settings with which nothing can be trained."""
         if self.rule not in get_args(Rule):
             raise InputError(f"rule must be one of {', '.join(get_args(Rule))}, got {self.rule!r}")
         if self.hidden < 1 or self.iterations < 1:

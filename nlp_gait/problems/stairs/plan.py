@@ -23,6 +23,7 @@ from nlp_gait.problem import (
     Signals,
     Variable,
     maker,
+    parameters,
 )
 from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
@@ -38,7 +39,6 @@ from nlp_gait.problems.stairs.stair import (
     grip,
     joint_signals,
     knee_limits,
-    parameters,
     rows,
     stance_load,
     stance_zmp,

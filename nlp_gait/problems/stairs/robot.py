@@ -31,7 +31,7 @@ class PlanarLink:
     mass_kg: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no rod."""
+        """Length and mass are positive."""
         check_numbers(f"link {self.name!r}", self, positive=("length_m", "mass_kg"))
 
 
@@ -101,6 +101,6 @@ def toe_foot_biped(path: str = "") -> ToeFootBiped:
     """Robot from a JSON file with the fields of ``ToeFootBiped``; by default that of the paper.
 
     Raises:
-        RobotDataError: the file cannot be read, or describes no such robot.
+        RobotDataError: the file cannot be read, or does not describe such a robot.
     """
     return read_decoded(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

@@ -8,7 +8,7 @@ from math import inf
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem import Array, Columns, Constraint, Parameter, Point, Variable, in_space
+from nlp_gait.problem import Array, Columns, Constraint, Point, Variable, in_space, parameters
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.profile import Stair
@@ -49,14 +49,6 @@ COLUMNS = {
 }
 
 
-def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
-    """Parameters from a table of name, unit, default, description, minimum and maximum."""
-    return tuple(
-        Parameter(name=name, unit=unit, default=default, description=text, minimum=minimum, maximum=maximum)
-        for name, unit, default, text, minimum, maximum in table
-    )
-
-
 STAIR_PARAMETERS = parameters(
     ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
     ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
@@ -66,7 +58,7 @@ LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stan
 
 
 def within(point: Point, variable: Variable) -> MX:
-    """Value of a variable for the mathematics: beyond its minimum and maximum, where no bound lies, that of the nearer one."""
+    """Value of a variable for the mathematics, kept within its minimum and maximum, beyond which no bound may be set."""
     return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
 
 

@@ -23,13 +23,14 @@ from nlp_gait.problem import (
     Signals,
     Variable,
     maker,
+    parameters,
 )
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
-from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, parameters, rows, within
+from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, rows, within
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]

@@ -58,7 +58,7 @@ class PointMassBiped:
     foot_width_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no robot: every mass and every length must be positive."""
+        """Every mass and every length is positive."""
         numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
         check_numbers(f"robot {self.name!r}", self, positive=numbers)
 

@@ -22,7 +22,7 @@ _NEWTON_STEPS = 6
 _LEAST_CYCLOID_ARGUMENT = 1e-15
 # Keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2].
 _LEAST_ROOT_SQUARED = 1e-6
-# Time passes t3 only in plans whose knots are out of order; by more than this it does not drive the hip further [s].
+# Time exceeds t3 only in plans whose knots are out of order; more than this beyond t3, the hip no longer advances [s].
 _LATEST = 1.0
 
 

@@ -59,7 +59,7 @@ def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear:
     Args:
         rods: of the robot.
         gravity: [m/s^2].
-        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for they are differentiated by.
+        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for derivatives are taken with respect to them.
         qd: (7,) rates [rad/s]; symbols.
         qdd: (7,) [rad/s^2].
         rear: forces of the ground (2,) [N] by the point of the rear foot on which they act.
