@@ -76,12 +76,12 @@ def read_decoded(cls: Callable[..., T], path: Path, what: str, *, error: type[Ga
 
 
 @contextmanager
-def refusing(owner: str, error: type[GaitError]) -> Iterator[None]:
-    """Raises a ValueError of this module as another error that says whose data it is about."""
+def refusing(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
+    """Raises a ValueError of this module as another error, which says whose data it is about and what to do."""
     try:
         yield
     except ValueError as reason:
-        raise error(f"{owner}: {reason}") from reason
+        raise error(f"{owner}: {reason}{remedy and f'; {remedy}'}") from reason
 
 
 @cache

@@ -11,7 +11,7 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decoded, refusing
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, without_nan, write_json
 from nlp_gait.problem import Objective
@@ -19,6 +19,7 @@ from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
 
 SCHEMA = 2
+REMEDY = "delete it to have it made anew"
 CALLS = frozenset(field.name for field in fields(Evaluations))
 
 
@@ -177,16 +178,14 @@ def read_record(path: Path) -> RunRecord:
     Raises:
         InputError: the file is damaged or of another schema.
     """
-    raw = read_json(path, "record", remedy="delete it to have it made anew")
+    raw = read_json(path, "record", remedy=REMEDY)
     found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
     if type(found) is not int or found != SCHEMA:
         newer = type(found) is int and found > SCHEMA
         remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
         raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
-    try:
+    with refusing(f"record {str(path)!r} is damaged", InputError, REMEDY):
         return _checked(decoded(RunRecord, raw, unread=("schema",)))
-    except ValueError as error:
-        raise InputError(f"record {str(path)!r} is damaged: {error}; delete it to have it made anew") from error
 
 
 def _checked(record: RunRecord) -> RunRecord:

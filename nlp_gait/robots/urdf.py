@@ -17,6 +17,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.fields import LARGEST_NUMBER
+from nlp_gait.robots.tree import inertia_moments, point_inertia
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -150,7 +151,7 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
-        tensor = tensor - _of_point(inertial.mass, pose[:3, 3] - frame[:3, 3])
+        tensor = tensor - point_inertia(inertial.mass, pose[:3, 3] - frame[:3, 3])
     return inertial.mass, pose[:3, 3], tensor
 
 
@@ -158,9 +159,8 @@ def _link(parts: list[tuple[float, Array, Array]], origin: Array) -> dict[str, A
     """Record of links that move as one, whose joint is at ``origin`` (3,)."""
     mass = sum(part[0] for part in parts)
     com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass if mass > 0.0 else origin
-    tensor = sum((about + _of_point(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
-    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()
-    return {"mass_kg": mass, "com_m": (com - origin).tolist(), "inertia_com_kgm2": [ixx, iyy, izz, ixy, ixz, iyz]}
+    tensor = sum((about + point_inertia(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
+    return {"mass_kg": mass, "com_m": (com - origin).tolist(), "inertia_com_kgm2": list(inertia_moments(tensor))}
 
 
 def _joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
@@ -211,9 +211,3 @@ def _turn(axis: int, angle: float) -> Array:
     rotation[[i, j], [i, j]] = math.cos(angle)
     rotation[i, j], rotation[j, i] = -math.sin(angle), math.sin(angle)
     return rotation
-
-
-def _of_point(mass: float, offset: Array) -> Array:
-    """(3, 3) tensor of a point mass about a point at a distance ``offset`` (3,)."""
-    tensor: Array = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return tensor

@@ -8,7 +8,7 @@ from math import inf
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem import Parameter, Point, Variable, parameters
+from nlp_gait.problem import Point, Variable, parameters
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.stair import within
 
@@ -35,14 +35,8 @@ GIVEN_PARAMETERS = parameters(  # Table III
     ("toe_angle_rad", "rad", math.pi / 6, "theta_b, angle of the rear toe as it lifts", 0.0, 1.2),
     ("catch_angle_rad", "rad", 0.01, "Delta theta_c0, half of what the bridge covers on the cycloid", 1e-4, 0.5),
 )
-REACH_MARGIN = Parameter(
-    name="reach_margin",
-    unit="1",
-    default=0.005,
-    description="knees keep 1 - cos(knee) above this: 0.1 rad",
-    minimum=1e-6,
-    maximum=0.5,
-)
+# Row of a table of parameters.
+REACH_MARGIN = ("reach_margin", "1", 0.005, "knees keep 1 - cos(knee) above this: 0.1 rad", 1e-6, 0.5)
 # In the order of StairPlan's fields.
 GOVERNING = (*(variable.name for variable in GOVERNING_VARIABLES), *(parameter.name for parameter in GIVEN_PARAMETERS))
 

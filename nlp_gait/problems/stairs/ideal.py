@@ -121,7 +121,11 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
 
 def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
     """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
-    links = len(MOVING)
+
+    def of_links(
+        quantity: str, unit: str, columns: int, limits: tuple[tuple[float, float], ...], description: str
+    ) -> Block:
+        return Block(quantity=quantity, unit=unit, rows=MOVING, columns=columns, limits=limits, description=description)
 
     def force(point: str, columns: int) -> Block:
         return Block(
@@ -133,32 +137,14 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
             description=f"force of the ground on the rear {point} along",
         )
 
+    angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
+    rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
+    accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
     return Layout(
         blocks=(
-            Block(
-                quantity="angle",
-                unit="rad",
-                rows=MOVING,
-                columns=intervals + 1,
-                limits=tuple(ANGLE_LIMITS[link] for link in MOVING),
-                description="absolute angle of link",
-            ),
-            Block(
-                quantity="rate",
-                unit="rad/s",
-                rows=MOVING,
-                columns=intervals + 1,
-                limits=((-RATE_LIMIT, RATE_LIMIT),) * links,
-                description="rate of link",
-            ),
-            Block(
-                quantity="acceleration",
-                unit="rad/s^2",
-                rows=MOVING,
-                columns=intervals,
-                limits=((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * links,
-                description="acceleration of link",
-            ),
+            of_links("angle", "rad", intervals + 1, angles, "absolute angle of link"),
+            of_links("rate", "rad/s", intervals + 1, rates, "rate of link"),
+            of_links("acceleration", "rad/s^2", intervals, accelerations, "acceleration of link"),
             force("toe", toe_off),
             force("sole", sole_off),
         )

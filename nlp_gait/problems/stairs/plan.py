@@ -72,8 +72,8 @@ SAMPLING_RESERVE = 0.1
 PARAMETERS = (
     *STAIR_PARAMETERS,
     *GIVEN_PARAMETERS,
-    REACH_MARGIN,
     *parameters(
+        REACH_MARGIN,
         ("zmp_margin_m", "m", 0.01, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
         LEAST_STANCE_FORCE,
         ("friction", "1", 0.6, "mu below both feet", 0.0, inf),

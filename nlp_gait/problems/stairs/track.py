@@ -18,7 +18,6 @@ from nlp_gait.problem import (
     GaitProblem,
     NumericPoint,
     Objective,
-    Parameter,
     Point,
     Signals,
     Variable,
@@ -56,21 +55,16 @@ LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
-    *(
-        Parameter(
-            name=v.name,
-            unit=v.unit,
-            default=PLAN[v.name],
-            description=v.description,
-            minimum=v.minimum,
-            maximum=v.maximum,
+    *parameters(
+        *(
+            (v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum)
+            for v in GOVERNING_VARIABLES
+            if v.name != TORSO_PITCH
         )
-        for v in GOVERNING_VARIABLES
-        if v.name != TORSO_PITCH
     ),
     *GIVEN_PARAMETERS,
-    REACH_MARGIN,
     *parameters(
+        REACH_MARGIN,
         ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
         ("zmp_weight", "1/m", 100.0, "cost of the mean distance of the ZMP from the supporting polygon", 0.0, inf),
         ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
