@@ -11,8 +11,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.gait import ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
-from nlp_gait.problems.stairs.formulas.profile import Stair
+from nlp_gait.problems.stairs.formulas.gait import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
 from nlp_gait.problems.stairs.governing import GOVERNING, stair_plan
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY

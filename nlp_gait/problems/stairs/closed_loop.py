@@ -12,10 +12,10 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Point
+from nlp_gait.problems.stairs.formulas.gait import Stair, stair_height
 from nlp_gait.problems.stairs.formulas.loads import LEAST_LOAD, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
 from nlp_gait.problems.stairs.network import learned
 from nlp_gait.problems.stairs.robot import toe_foot_biped

@@ -13,10 +13,9 @@ from casadi import SX
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker, parameters
 from nlp_gait.problem.blocks import Block, Layout
-from nlp_gait.problems.stairs.formulas.gait import StairPlan
+from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.problems.stairs.ideal_model import IdealModel
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton

@@ -13,9 +13,9 @@ from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Assembly, Constraint, Point
 from nlp_gait.problem.blocks import Layout
+from nlp_gait.problems.stairs.formulas.gait import Stair, stair_height
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, StanceLoads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, rows, stair_of, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

@@ -11,11 +11,10 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Point
-from nlp_gait.problems.stairs.formulas.gait import PHASES, StairPlan
+from nlp_gait.problems.stairs.formulas.gait import PHASES, Stair, StairPlan, stair_height
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import Posture, posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of

@@ -10,8 +10,8 @@ from casadi import MX
 
 from nlp_gait.problem import Array, Columns, Constraint, Point, Variable, in_space, parameters
 from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.stairs.formulas.gait import Stair
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
-from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 
 GRAVITY = 9.81  # [m/s^2]

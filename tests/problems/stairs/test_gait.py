@@ -7,11 +7,20 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import StairPlan, ToeFoot, ankle, ankle_on_toe, hip, in_time, landed_angles
+from nlp_gait.problems.stairs.formulas.gait import (
+    Stair,
+    StairPlan,
+    ToeFoot,
+    ankle,
+    ankle_on_toe,
+    hip,
+    in_time,
+    landed_angles,
+    stair_height,
+)
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import CASES, GRAVITY
 from nlp_gait.symbolic.nonsmooth import Exact

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import StairPlan, ToeFoot, ankle, foot_angles, hip, in_time
+from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan, ToeFoot, ankle, foot_angles, hip, in_time
 from nlp_gait.problems.stairs.formulas.planar_biped import Rod
-from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
@@ -20,7 +19,7 @@ class Posture(NamedTuple):
     """Planned motion of the whole robot at one instant, origin at the stance ankle.
 
     Attributes:
-        q: (7,) absolute link angles in the order of ``stair_loads.MOVING`` [rad], with rates and accelerations.
+        q: (7,) absolute link angles in the order of ``loads.MOVING`` [rad], with rates and accelerations.
         reach: (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach.
         hip: (2,) [m].
         ankle: (2,) of the swing leg [m].
