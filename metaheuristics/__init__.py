@@ -6,15 +6,15 @@ Independent of any problem and of CasADi: an objective is anything that follows 
     result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
 """
 
-from metaheuristics.ant_colony import AntColony
-from metaheuristics.ant_colony_grid import AntColonyGrid
+from metaheuristics.algorithms.ant_colony import AntColony
+from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
+from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.genetic_operators import Flip, Polynomial, SimulatedBinary, SinglePoint
+from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty
 from metaheuristics.errors import SearchError
-from metaheuristics.genetic import GeneticAlgorithm
-from metaheuristics.genetic_operators import Flip, Polynomial, SimulatedBinary, SinglePoint
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
-from metaheuristics.particle_swarm import ParticleSwarm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling
 from metaheuristics.result import History, Interrupted, Result

@@ -16,7 +16,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from metaheuristics.settings import check_number
 
 

@@ -7,9 +7,10 @@ from time import perf_counter
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import FEASIBILITY, mark_failed
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array, BatchObjective
+from metaheuristics.interface import BatchObjective
 from metaheuristics.result import History
 
 Observer = Callable[[Array, Array, Array], object]
@@ -104,7 +105,7 @@ def _checked_answer(answer: object, count: int) -> tuple[Array, Array]:
     try:
         f, violation = np.asarray(answer[0], dtype=np.float64), np.asarray(answer[1], dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise SearchError(f"{wanted}; it returned something else than real numbers: {error}") from error
+        raise SearchError(f"{wanted}; it returned something other than real numbers: {error}") from error
     if f.shape != (count,) or violation.shape != (count,):
         raise SearchError(f"{wanted}; got shapes {f.shape} and {violation.shape}: give one number per row of X")
     negative = violation < 0.0

@@ -8,22 +8,18 @@ learns from them (`tell`), so an adapter to another package is a small class wit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from metaheuristics.constraint_handling import Rule
+from metaheuristics.array import Array
+from metaheuristics.constraint_handling import Rule
 
-Array: TypeAlias = NDArray[np.float64]
+Settings = TypeVar("Settings")
 
 
-class BatchObjective(Protocol):
-    """An objective to be minimised within bounds, called on many points at once.
-
-    Attributes are read once, before the first call.
-    """
+class Bounded(Protocol):
+    """Variables with bounds, which are read once, before the first call."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -36,6 +32,10 @@ class BatchObjective(Protocol):
     @property
     def upper(self) -> Array:
         """(n,) upper bounds, finite and >= lower; equal bounds fix a variable."""
+
+
+class BatchObjective(Bounded, Protocol):
+    """An objective to be minimised within bounds, called on many points at once."""
 
     def __call__(self, X: Array, /) -> tuple[Array, Array]:
         """Evaluate points.
@@ -97,6 +97,24 @@ class Search(Protocol):
         Returns:
             Reasons in words; empty to go on.
         """
+
+
+class PopulationSearch(Generic[Settings]):
+    """Base of searches that hold the points to ask for, the starting points first; `tell` is theirs."""
+
+    def __init__(self, settings: Settings, start: Start) -> None:
+        """Hold the starting points."""
+        self._settings = settings
+        self._start = start
+        self._X = start.initial
+
+    def ask(self) -> Array:
+        """Return the points held, (P, n)."""
+        return self._X
+
+    def stop(self) -> tuple[str, ...]:
+        """Return no reason: the search goes on until the budget ends."""
+        return ()
 
 
 class Algorithm(Protocol):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling, Deb
 from metaheuristics.evaluation import Evaluator, Observer
-from metaheuristics.interface import Algorithm, Array, BatchObjective, Start
+from metaheuristics.interface import Algorithm, BatchObjective, Start
 from metaheuristics.preparation import check_limits, checked_bounds, checked_seed, child, entropy, starting_points
 from metaheuristics.result import Interrupted, Result
 

@@ -11,28 +11,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array
+from metaheuristics.interface import Bounded
 from metaheuristics.preparation import checked_bounds, checked_seed, child, starting_points
 from metaheuristics.settings import bad_setting, check_count
 
 MODULES: Mapping[str, str] = MappingProxyType({"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"})
 
 
-class ManyObjectives(Protocol):
-    """Objectives to be minimised within bounds, called on many points at once; see ``BatchObjective``."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The n names of the variables."""
-
-    @property
-    def lower(self) -> Array:
-        """(n,) lower bounds, finite."""
-
-    @property
-    def upper(self) -> Array:
-        """(n,) upper bounds, finite and >= lower."""
+class ManyObjectives(Bounded, Protocol):
+    """Objectives to be minimised within bounds, called on many points at once."""
 
     @property
     def count(self) -> int:

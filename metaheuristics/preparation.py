@@ -8,11 +8,12 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Array, BatchObjective
+from metaheuristics.interface import Algorithm, Bounded
 
 
-def checked_bounds(objective: BatchObjective) -> tuple[Array, Array]:
+def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
     """Copy the bounds.
 
     Args:

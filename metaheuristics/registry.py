@@ -12,28 +12,31 @@ from typing import TypeVar
 
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
-from metaheuristics.adapters.scipy_de import DifferentialEvolution
-from metaheuristics.ant_colony import AntColony
-from metaheuristics.ant_colony_grid import AntColonyGrid
+from metaheuristics.algorithms.ant_colony import AntColony
+from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
+from metaheuristics.algorithms.differential_evolution import DifferentialEvolution
+from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
-from metaheuristics.genetic import GeneticAlgorithm
 from metaheuristics.interface import Algorithm
-from metaheuristics.particle_swarm import ParticleSwarm
 
 T = TypeVar("T")
 
 ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
-    {factory.name: factory for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid)}
+    {
+        factory.name: factory
+        for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid, DifferentialEvolution)
+    }
 )
 """This package's own algorithms."""
 
 ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
-    {"cma": CmaEs, "de": DifferentialEvolution} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
+    {"cma": CmaEs} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
 )
-"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` brings."""
+"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` installs."""
 
-PACKAGES: Mapping[str, str] = MappingProxyType({"cma": "cma", "de": "scipy", "pymoo": "pymoo"})
+PACKAGES: Mapping[str, str] = MappingProxyType({"cma": "cma", "pymoo": "pymoo"})
 
 HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
     {"deb": Deb, "penalty": StaticPenalty, "epsilon": EpsilonLevel}

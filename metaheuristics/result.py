@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling
-from metaheuristics.interface import Algorithm, Array
+from metaheuristics.interface import Algorithm
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
@@ -81,8 +82,8 @@ class Result:
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a run, with what was found until then.
 
-    It propagates as any KeyboardInterrupt does, so that it ends a whole study and not only the run in progress; who
-    wants the partial result catches it and reads `result`.
+    It propagates as any KeyboardInterrupt does, so that it ends a whole study and not only the run in progress. To get
+    the partial result, catch it and read `result`.
     """
 
     def __init__(self, result: Result) -> None:

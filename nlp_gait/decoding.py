@@ -1,46 +1,87 @@
-"""Dataclasses from the plain data that files hold: every key, and nothing but the type that the dataclass states.
+"""Dataclasses from the plain data of files: no key missing or unknown, every value of the type that the dataclass states.
 
-A number that was not finite stands as null in a file: where the dataclass has a ``float``, null is NaN.
+A number that is not finite is written as null: where the dataclass has a ``float``, null becomes NaN.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from nlp_gait.errors import GaitError, unknown
+from nlp_gait.files import read_json
 
 T = TypeVar("T")
 
 WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 
-def decoded(cls: Callable[..., T], raw: Any, where: str = "") -> T:
+def decoded(
+    cls: Callable[..., T],
+    raw: Any,
+    where: str = "",
+    *,
+    given: Mapping[str, Any] | None = None,
+    unread: Collection[str] = (),
+) -> T:
     """Instance of a dataclass.
 
     Args:
-        cls: its fields may be texts, numbers, truth values, tuples, mappings by text, dataclasses, literals, and unions.
+        cls: its fields may be texts, numbers, booleans, tuples, mappings from text, dataclasses, literals, and unions.
         raw: as JSON gives it.
         where: place in the file, for messages.
+        given: fields that do not stand in the file.
+        unread: keys that may stand beside the fields.
 
     Raises:
         ValueError: with the place: a key is missing or unknown, or a value has another type.
     """
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where or 'it'} must be an object, got {_shown(raw)}")
-    values = {}
-    for name, (kind, needed) in _fields(cls).items():
+    values = dict(given or {})
+    known = {name: field for name, field in _fields(cls).items() if name not in values}
+    for name, (kind, needed) in known.items():
         place = f"{where}.{name}" if where else name
         if name in raw:
-            values[name] = _value(kind, raw[name], place)
+            values[name] = decoded_value(kind, raw[name], place)
         elif needed:
             raise ValueError(f"{place} is missing")
-    unknown = [key for key in raw if key not in values]
-    if unknown:
-        raise ValueError(f"{where or 'it'} has an unknown key {unknown[0]!r}")
+    for key in raw:
+        if key not in known and key not in unread:
+            raise ValueError(str(unknown(f"key of {where}" if where else "key", key, known)))
     return cls(**values)
+
+
+def read_decoded(cls: Callable[..., T], path: Path, what: str, *, error: type[GaitError]) -> T:
+    """Instance of a dataclass from a JSON file.
+
+    Args:
+        cls: of the instance, see ``decoded``.
+        path: of the file.
+        what: kind of file, for messages.
+        error: class to raise.
+
+    Raises:
+        GaitError: of that class: the file cannot be read, or does not hold such a dataclass.
+    """
+    raw = read_json(path, what, error=error)
+    with refusing(f"{what} {str(path)!r}", error):
+        return decoded(cls, raw)
+
+
+@contextmanager
+def refusing(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
+    """Raises a ValueError of this module as another error, which says whose data it is about and what to do."""
+    try:
+        yield
+    except ValueError as reason:
+        raise error(f"{owner}: {reason}{remedy and f'; {remedy}'}") from reason
 
 
 @cache
@@ -50,7 +91,8 @@ def _fields(cls: Any) -> dict[str, tuple[Any, bool]]:
     return {f.name: (hints[f.name], f.default is MISSING and f.default_factory is MISSING) for f in fields(cls)}
 
 
-def _value(kind: Any, raw: Any, where: str) -> Any:
+def decoded_value(kind: Any, raw: Any, where: str) -> Any:
+    """Value of a field's type; arguments and errors as ``decoded``."""
     if kind is Any:
         return raw
     if kind is float:
@@ -61,42 +103,51 @@ def _value(kind: Any, raw: Any, where: str) -> Any:
         return decoded(kind, raw, where)
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Literal:
-        if raw not in parts:
+        if not any(raw == part and type(raw) is type(part) for part in parts):
             raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {_shown(raw)}")
         return raw
     if origin is tuple:
-        return tuple(_value(parts[0], item, f"{where}[{i}]") for i, item in enumerate(_list(raw, where)))
+        return _tuple(parts, raw, where)
     if origin in (Union, UnionType):
         return _of_union(parts, raw, where)
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where} must be an object, got {_shown(raw)}")
-    return {key: _value(parts[1], value, f"{where}.{key}") for key, value in raw.items()}
+    keys, values = parts
+    return {
+        decoded_value(keys, key, f"a key of {where}"): decoded_value(values, value, f"{where}.{key}")
+        for key, value in raw.items()
+    }
+
+
+def _tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
+    """A list whose items are all alike, ``tuple[X, ...]``, or as many as there are types, ``tuple[X, Y]``."""
+    any_length = parts[-1] is ...
+    if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
+        count = "" if any_length else f" of {len(parts)} values"
+        raise ValueError(f"{where} must be a list{count}, got {_shown(raw)}")
+    kinds = parts[:1] * len(raw) if any_length else parts
+    return tuple(
+        decoded_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
+    )
 
 
 def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
-    if raw is None and NoneType in parts:
-        return None
-    exact = [part for part in parts if part is type(raw)]
-    if exact:
+    if type(raw) in parts:
         return raw
     others = [part for part in parts if part is not NoneType]
+    if all(part in WORDS for part in parts) and not (float in parts and type(raw) in (int, NoneType)):
+        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {_shown(raw)}")
     for part in others[:-1]:
         try:
-            return _value(part, raw, where)
+            return decoded_value(part, raw, where)
         except ValueError:
             continue
-    return _value(others[-1], raw, where)
+    return decoded_value(others[-1], raw, where)
 
 
 def _checked(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:
     if not isinstance(raw, kinds) or (isinstance(raw, bool) and bool not in kinds):
         raise ValueError(f"{where} must be {wanted}, got {_shown(raw)}")
-    return raw
-
-
-def _list(raw: Any, where: str) -> list[Any]:
-    if not isinstance(raw, list):
-        raise ValueError(f"{where} must be a list, got {_shown(raw)}")
     return raw
 
 

@@ -1,8 +1,8 @@
 """Files of data: read strictly, written whole or not at all.
 
-Reading takes regular files of valid UTF-8 only, and JSON with no key twice, no number beyond 64 bits or not finite, and no text
-that cannot be written again. Writing goes to a new file beside the old one, which takes its name in one step: a link of that
-name is replaced, never followed.
+Only regular files of valid UTF-8 are read. JSON must not repeat a key, nor hold a number that is beyond 64 bits or not finite,
+nor text that cannot be written again. A file is written under another name and renamed in one step: a link of its name is
+replaced, never followed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ DEEPEST = 32  # levels of objects and lists; the package's own files have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
-# Writing one file takes far less; an older temporary file is nobody's.
+# Writing one file takes far less; an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
 
 
@@ -46,7 +46,7 @@ def read_bytes(
         remedy: what to do about it, appended to the message.
 
     Raises:
-        GaitError: of that class: it cannot be read, is no regular file, or too long.
+        GaitError: of that class: it cannot be read, is not a regular file, or is too long.
     """
     with _refusing(path, what, "cannot be read", error, remedy):
         # Opening a pipe would wait for its writer.
@@ -54,7 +54,7 @@ def read_bytes(
         with open(descriptor, "rb") as file:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
-                raise ValueError("it is a folder" if stat.S_ISDIR(status.st_mode) else "it is no regular file")
+                raise ValueError("it is a folder" if stat.S_ISDIR(status.st_mode) else "it is not a regular file")
             content = file.read(at_most + 1)
         if len(content) > at_most:
             raise ValueError(f"it has more than {at_most} bytes")
@@ -74,7 +74,7 @@ def read_text(
 
 
 def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:
-    """Content of a JSON file, see ``check_plain``; a key that stands twice in an object is refused too.
+    """Content of a JSON file, see ``check_plain``; an object that repeats a key is refused too.
 
     Args:
         path: of the file.
@@ -93,7 +93,7 @@ def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, rem
 
 
 def check_plain(data: Any) -> None:
-    """Refuse what is not plain data: texts, finite numbers, truth values, null, lists, objects.
+    """Refuse what is not plain data: texts, finite numbers, true and false, null, lists, objects.
 
     Raises:
         ValueError: with the place of what is not allowed.
@@ -149,7 +149,7 @@ def new_file(path: Path) -> Iterator[Path]:
     temporary = None
     try:
         if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
-            raise OSError("it is a folder" if path.is_dir() else "it is no regular file")
+            raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
         unused = path.parent / f".{secrets.token_hex(8)}.tmp"
         # With O_EXCL it cannot be a file or a link that somebody has put there.
         os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
@@ -190,7 +190,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) != len(pairs):
         keys = [key for key, _ in pairs]
         twin = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {twin[:SHOWN]!r} stands there twice")
+        raise ValueError(f"the key {twin[:SHOWN]!r} appears twice")
     return found
 
 

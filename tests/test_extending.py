@@ -22,7 +22,8 @@ from compare.judge import evaluate
 from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import registry as algorithms
-from metaheuristics.interface import Array, Start
+from metaheuristics.array import Array
+from metaheuristics.interface import Start
 from nlp_gait.problem import (
     Assembly,
     Constraint,

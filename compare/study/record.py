@@ -11,13 +11,15 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decoded, refusing
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, without_nan, write_json
 from nlp_gait.problem import Objective
+from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
 
 SCHEMA = 2
+REMEDY = "delete it to have it made anew"
 CALLS = frozenset(field.name for field in fields(Evaluations))
 
 
@@ -117,8 +119,8 @@ class RunRecord:
         status: why it ended, in words.
         success: the solver itself claims a feasible result.
         x: by variable name; empty if the run failed before it had a point.
-        objective: as claimed, in the problem's sense; None if there is none.
-        violation: as claimed; None if there is none.
+        objective: as claimed, in the problem's sense; None without a claim.
+        violation: as claimed; None without a claim.
         verdict: of the judge.
         evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
         failed_evaluations: calls that gave NaN or infinity.
@@ -157,19 +159,10 @@ class RunRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Problem:
-    """What a definition says of the problem."""
-
-    name: str
-    options: Mapping[str, str | int | float | bool]
-    parameters: Mapping[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Definition:
     """Shape of a definition, see ``Task.definition``."""
 
-    problem: _Problem
+    problem: StoredProblem
     objective: Objective
     algorithm: str | Mapping[str, Any]
     settings: Mapping[str, Any]
@@ -185,16 +178,14 @@ def read_record(path: Path) -> RunRecord:
     Raises:
         InputError: the file is damaged or of another schema.
     """
-    raw = read_json(path, "record", remedy="delete it to have it made anew")
+    raw = read_json(path, "record", remedy=REMEDY)
     found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
     if type(found) is not int or found != SCHEMA:
         newer = type(found) is int and found > SCHEMA
         remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
         raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
-    try:
-        return _checked(decoded(RunRecord, {key: value for key, value in raw.items() if key != "schema"}))
-    except ValueError as error:
-        raise InputError(f"record {str(path)!r} is damaged: {error}; delete it to have it made anew") from error
+    with refusing(f"record {str(path)!r} is damaged", InputError, REMEDY):
+        return _checked(decoded(RunRecord, raw, unread=("schema",)))
 
 
 def _checked(record: RunRecord) -> RunRecord:
@@ -202,10 +193,10 @@ def _checked(record: RunRecord) -> RunRecord:
     objective = decoded(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
-            raise ValueError(f"{text!r} is no name or unit of an objective")
+            raise ValueError(f"{text!r} is not a name or unit of an objective")
     for title in (record.problem, record.algorithm):
         if not LABEL.fullmatch(title):  # names of files are made from it
-            raise ValueError(f"{title!r} is no label of a problem or solver")
+            raise ValueError(f"{title!r} is not a label of a problem or solver")
     history, times, verdict = record.history, record.time_s, record.verdict
     if not len(history.evaluations) == len(history.objective) == len(times.history):
         raise ValueError("the columns of the history differ in length")

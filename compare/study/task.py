@@ -1,4 +1,4 @@
-"""What to run, as plain data that crosses process borders and stands in files."""
+"""What to run, as plain data that can be passed to other processes and written to files."""
 
 from __future__ import annotations
 
@@ -176,12 +176,12 @@ class Task:
 
 
 def check_task(task: Task) -> None:
-    """Raise now what would fail later: unknown problem, option, parameter, algorithm or setting; a bad label or limit."""
+    """Refuse now what would fail later: unknown problem, option, parameter, algorithm or setting; a bad label or limit."""
     problem = task.problem.load()
     for title in (task.problem.title, task.title):
         if not LABEL.fullmatch(title):
             raise InputError(
-                f"a label has 1 to 64 letters, digits and . _ + : -, and begins with one of the former; got {title!r}"
+                f"a label has 1 to 64 letters, digits and . _ + : -, and begins with a letter or digit; got {title!r}"
             )
     if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
         raise unknown("algorithm", task.algorithm, solver_names())

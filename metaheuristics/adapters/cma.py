@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import check_count, check_number
 
 
@@ -48,7 +49,7 @@ class CmaEs:
         return CmaEsSearch(self, start)
 
 
-class CmaEsSearch:
+class CmaEsSearch(PopulationSearch[CmaEs]):
     """A run of `CmaEs`; see `Search`.
 
     pycma works in the unit cube of the free variables. It does not take fewer than two, so there are idle ones if need be.
@@ -56,17 +57,11 @@ class CmaEsSearch:
 
     def __init__(self, settings: CmaEs, start: Start) -> None:
         """Ask for the starting points first."""
-        self._settings = settings
-        self._start = start
+        super().__init__(settings, start)
         self._free = np.flatnonzero(start.upper > start.lower)
         self._size = float(settings.population)
-        self._X = start.initial
         self._strategy: Any = None
         self._asked: list[Array] = []
-
-    def ask(self) -> Array:
-        """Return the generation, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Adapt the distribution and sample it; see `Search.tell`."""
@@ -82,10 +77,6 @@ class CmaEsSearch:
                 self._strategy = self._begin(self._start.rng.random(max(2, self._free.size)))
         self._asked = self._strategy.ask()
         self._X = self._points(np.array(self._asked))
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason: it restarts for ever."""
-        return ()
 
     def _begin(self, centre: Array) -> Any:
         from cma import CMAEvolutionStrategy

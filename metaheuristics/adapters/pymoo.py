@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Array, Start
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import bad_setting, check_count
 
 MODULES: Mapping[str, str] = {
@@ -68,7 +69,7 @@ class Pymoo:
         return PymooSearch(self, start)
 
 
-class PymooSearch:
+class PymooSearch(PopulationSearch[Pymoo]):
     """A run of `Pymoo` on the free variables; see `Search`."""
 
     def __init__(self, settings: Pymoo, start: Start) -> None:
@@ -76,9 +77,8 @@ class PymooSearch:
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
 
-        self._start = start
+        super().__init__(settings, start)
         self._free = np.flatnonzero(start.upper > start.lower)
-        self._X = start.initial
         self._algorithm: Any = None
         if self._free.size:
             lower, upper = start.lower[self._free], start.upper[self._free]
@@ -91,10 +91,6 @@ class PymooSearch:
                 raise SearchError(f"{settings.name} does not take these settings: {error}") from error
             self._algorithm.setup(problem, termination=NoTermination(), seed=int(start.rng.integers(2**31)))
             self._infills = self._algorithm.ask()
-
-    def ask(self) -> Array:
-        """Return pymoo's offspring, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Let pymoo select and vary; see `Search.tell`."""

@@ -9,6 +9,7 @@ from nlp_gait.problem.assembly import (
     Parameter,
     Point,
     Variable,
+    parameters,
 )
 from nlp_gait.problem.gait_problem import GaitProblem, Grid
 from nlp_gait.problem.playback import Playback
@@ -38,6 +39,7 @@ __all__ = [
     "load",
     "load_result",
     "maker",
+    "parameters",
     "problem_names",
     "sampled",
 ]

@@ -38,6 +38,14 @@ class Parameter:
     maximum: float = math.inf
 
 
+def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
+    """Parameters from a table of name, unit, default, description, minimum and maximum."""
+    return tuple(
+        Parameter(name=name, unit=unit, default=default, description=text, minimum=minimum, maximum=maximum)
+        for name, unit, default, text, minimum, maximum in table
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
     """Name, unit and sense of what is optimised."""

@@ -3,55 +3,59 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from nlp_gait.errors import GaitError, InputError, unknown
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import read_json
-from nlp_gait.problem.gait_problem import GaitProblem, is_number
+from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.problem.registry import load
 from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 
-SCHEMA = 1  # of a result; one without it is taken as the first
-RECORD_SCHEMA = 2  # of a study's record, which is told by its ``definition``
-BY_HAND = ("schema", "problem", "options", "parameters", "x")
-# What `solve`, `evaluate` and `export --format json` write.
-RESULT_KEYS = frozenset(
-    (
-        *BY_HAND,
-        *(field.name for field in fields(Solution)),
-        *("robot", "indexes", "constraints", "feasible", "dense", "dense_violations", "dense_intervals", "signals"),
-    )
+SCHEMA = 1  # of a result; one that does not say so is taken as the first
+# What `solve`, `evaluate` and `export --format json` write beside what is read here.
+BESIDE_RESULT = (
+    *(part.name for part in fields(Solution)),
+    *("indexes", "constraints", "feasible", "dense", "dense_violations", "dense_intervals", "signals"),
 )
-RECORD_KEYS = frozenset(
-    (
-        *(
-            "schema",
-            "problem",
-            "algorithm",
-            "run",
-            "seed",
-            "definition",
-            "settings",
-            "status",
-            "success",
-            "x",
-            "objective",
-        ),
-        *(
-            "violation",
-            "verdict",
-            "evaluations",
-            "failed_evaluations",
-            "iterations",
-            "active_constraints",
-            "history",
-            "time_s",
-        ),
-    )
+# The same for the fields of a study's record; tests compare them with ``compare.study.record.RunRecord``.
+BESIDE_RECORD = (
+    *("problem", "algorithm", "run", "seed", "settings", "status", "success", "objective", "violation", "verdict"),
+    *("evaluations", "failed_evaluations", "iterations", "active_constraints", "history", "time_s"),
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredProblem:
+    """A problem as a study's record holds it."""
+
+    name: str
+    options: Mapping[str, str | int | float | bool]
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _RecordFile:
+    """What is read of a study's record."""
+
+    schema: Literal[2]
+    definition: Mapping[str, Any]
+    x: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ResultFile:
+    """What is read of a result; more is not needed in one that is written by hand."""
+
+    schema: Literal[1] = 1
+    problem: str
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    robot: str | None = None
+    x: Mapping[str, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,51 +79,31 @@ def load_result(path: Path) -> Result:
     """
     raw = read_json(path, "result")
     try:
-        return _result(raw)
+        return _of_record(raw) if isinstance(raw, dict) and "definition" in raw else _of_result(raw)
+    except ValueError as error:
+        raise InputError(
+            f"result {str(path)!r}: {error}; `nlp-gait solve ... --out FILE` writes a valid one"
+        ) from error
     except GaitError as error:
         raise InputError(f"result {str(path)!r}: {error}") from error
 
 
-def _result(raw: Any) -> Result:
-    if not isinstance(raw, dict):
-        raise InputError(
-            f"must be a JSON object, got {type(raw).__name__}; write one with `nlp-gait solve ... --out FILE`"
-        )
-    is_record = "definition" in raw
-    schema, found = (RECORD_SCHEMA if is_record else SCHEMA), raw.get("schema", SCHEMA)
-    if type(found) is not int or found != schema:
-        raise InputError(f"'schema' must be {schema}, got {found!r}; another version of nlp-gait may read it")
-    for key in raw:
-        if key not in (RECORD_KEYS if is_record else RESULT_KEYS):
-            raise unknown("key", key, BY_HAND)
-    problem = _problem(
-        _object(_object(raw["definition"], "definition").get("problem"), "problem") if is_record else raw
-    )
-    values = _object(raw.get("x"), "x")
-    missing = [variable for variable in problem.names if variable not in values]
-    if missing:
-        raise InputError(f"'x' lacks {', '.join(missing)}")
-    for key, value in values.items():
-        problem.variable_index(key)
-        if not is_number(value):
-            raise InputError(f"'x': {key} must be a number, got {value!r}")
-    return Result(problem=problem, x=problem.check_x([values[key] for key in problem.names]))
+def _of_record(raw: Mapping[str, Any]) -> Result:
+    record = decoded(_RecordFile, raw, unread=BESIDE_RECORD)
+    problem = decoded(StoredProblem, record.definition.get("problem"), "definition.problem")
+    return _result(problem.name, problem.options, problem.parameters, record.x)
 
 
-def _problem(raw: Mapping[str, Any]) -> GaitProblem:
-    """Problem of an object with ``problem`` or, in a record, ``name``, and ``options`` and ``parameters``."""
-    name = raw.get("problem", raw.get("name"))
-    if not isinstance(name, str):
-        raise InputError(f"'problem' must be the name of a problem, got {name!r}; see `nlp-gait list`")
-    options, parameters = (_object(raw.get(key, {}), key) for key in ("options", "parameters"))
+def _of_result(raw: Any) -> Result:
+    file = decoded(_ResultFile, raw, unread=BESIDE_RESULT)
+    result = _result(file.problem, file.options, file.parameters, file.x)
+    if file.robot not in (None, result.problem.options.get("robot")):
+        raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
+    return result
+
+
+def _result(
+    name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
+) -> Result:
     problem = load(name, **options).with_values(**parameters)
-    robot = raw.get("robot", problem.options.get("robot"))
-    if robot != problem.options.get("robot"):
-        raise InputError(f"'robot' is {robot!r}, but the option of that name decides: write it into 'options'")
-    return problem
-
-
-def _object(value: Any, key: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{key!r} must be an object of values by name, got {value!r}")
-    return value
+    return Result(problem=problem, x=problem.check_x(x))

@@ -9,7 +9,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import inertia_matrix
+from nlp_gait.robots.tree import inertia_matrix, inertia_moments, point_inertia
 
 # A tensor about the joint gives ratios below 1 (see ``joint_distance_ratio``); printed digits may lift one by some percent.
 GREATEST_JOINT_RATIO = 1.05
@@ -60,7 +60,5 @@ def shifted_to_com(link: Link) -> Link:
     Raises:
         RobotDataError: no rigid body has such a tensor about its joint.
     """
-    com = np.array(link.com_m)
-    about_com = inertia_matrix(link) - link.mass_kg * (com @ com * np.eye(3) - np.outer(com, com))
-    ixx, ixy, ixz, _, iyy, iyz, _, _, izz = about_com.flatten().tolist()
-    return replace(link, inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
+    about_com = inertia_matrix(link) - point_inertia(link.mass_kg, np.array(link.com_m))
+    return replace(link, inertia_com_kgm2=inertia_moments(about_com))

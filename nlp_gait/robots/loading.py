@@ -2,30 +2,75 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
-from nlp_gait.errors import RobotDataError, kind_name, unknown
-from nlp_gait.files import read_json
-from nlp_gait.robots.fields import LARGEST_NUMBER, check_keys
+from nlp_gait.decoding import decoded, decoded_value, read_decoded, refusing
+from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.perturbation import perturbed, split_name
-from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot
+from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector
 from nlp_gait.robots.tree import reversed_joint
 from nlp_gait.robots.urdf import urdf_record
 
-SCHEMA = 1
 LONGEST_CHAIN = 8  # of robots that extend each other
 
 T = TypeVar("T")
+Side = Literal["left", "right"]
+About = Literal["com", "joint"] | None
 
 _DATA = resources.files("nlp_gait.robots") / "data"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotFile:
+    """Content of a robot file. Links, joints and feet are decoded later, once it is known which of them are replaced."""
+
+    schema: Literal[1]
+    name: str | None = None
+    extends: str | None = None
+    description: str | None = None
+    conventions: Any = None
+    sources: Mapping[str, str] = field(default_factory=dict)
+    inertia_about: About = None
+    joint_names: Mapping[str, str] = field(default_factory=dict)
+    root: str | None = None
+    links: Mapping[str, Any] = field(default_factory=dict)
+    joints: Mapping[str, Any] = field(default_factory=dict)
+    feet: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse names that cannot be printed."""
+        if self.name is not None:
+            check_name(self.name, "robot")
+        for group in ("links", "joints", "joint_names"):
+            for name in getattr(self, group):
+                check_name(name, group)
+        for side in self.feet:
+            decoded_value(Side, side, "a key of feet")
+
+
+class _Record(NamedTuple):
+    """A link, joint or foot as a file describes it.
+
+    Attributes:
+        raw: its fields.
+        file: the file.
+        about: point to which the file says that its inertia tensors refer, if it says so.
+        reversed: the joint's angle is counted the other way round.
+    """
+
+    raw: Any
+    file: str
+    about: About = None
+    reversed: bool = False
 
 
 def robot_names() -> tuple[str, ...]:
@@ -37,7 +82,7 @@ def robot_names() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
 
-    Behind an ``@`` may stand changes of masses, leg lengths and soles, see ``robots/perturbation.py``.
+    Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``.
 
     Raises:
         UnknownNameError: no such robot.
@@ -45,7 +90,8 @@ def load_robot(name_or_path: str) -> Robot:
         MissingExtraError: a URDF cannot be read without its extra.
     """
     source, changes = split_name(name_or_path)
-    return perturbed(_robot(_merged(_beside_urdf(source) if source.endswith(".urdf") else source)), changes)
+    path = _beside_urdf(source) if source.endswith(".urdf") else source
+    return perturbed(_robot(_merged(path), path), changes)
 
 
 def _beside_urdf(path: str) -> str:
@@ -54,48 +100,53 @@ def _beside_urdf(path: str) -> str:
     if not os.path.isfile(partner):
         raise RobotDataError(
             f"robot file {path!r}: a URDF says nothing about soles; write {str(partner)!r} with "
-            f'{{"schema": {SCHEMA}, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'
+            f'{{"schema": 1, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'
         )
-    if _resolved(_read(str(partner)).get("extends"), str(partner)) != os.path.normpath(path):
+    base = _read(str(partner)).extends
+    if base is None or _resolved(base, str(partner)) != os.path.normpath(path):
         raise RobotDataError(
             f"robot file {str(partner)!r}: 'extends' must be {Path(path).name!r}, beside which it lies"
         )
     return str(partner)
 
 
-def _merged(source: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Record of a robot with what it extends."""
-    raw = _read(source)
-    about = raw.get("inertia_about")
-    if about not in (None, "com", "joint"):
-        raise RobotDataError(f"robot {source!r}: 'inertia_about' must be 'com' or 'joint', got {about!r}")
-    if isinstance(raw.get("links"), dict):
-        raw["links"] = _stamped(raw["links"], inertia_about=about)
-    if "extends" not in raw:
-        return raw
-    base_source = _resolved(raw["extends"], source)
-    if base_source is None or base_source in seen or len(seen) >= LONGEST_CHAIN:
-        raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {raw['extends']!r}")
+def _merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
+    """Content of a robot file with what it extends; links, joints and feet are ``_Record``."""
+    own = _read(source)
+    file = _with_records(own, source)
+    if own.extends is None:
+        return file
+    base_source = _resolved(own.extends, source)
+    if base_source in seen or len(seen) >= LONGEST_CHAIN:
+        raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {own.extends!r}")
     if base_source.endswith(".urdf"):
-        base = urdf_record(base_source, about_joint=about == "joint")
-        base["links"] = _stamped(base["links"], inertia_about=about and "com")
+        about = own.inertia_about
+        with refusing(f"robot file {base_source!r}", RobotDataError):
+            raw = urdf_record(base_source, about_joint=about == "joint")
+            base = _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), base_source)
     else:
         base = _merged(base_source, (*seen, source))
-    base["joints"] = _renamed(_group(base, "joints", base_source), _group(raw, "joint_names", source), source)
-    merged = {**base, **raw}
-    for group in ("links", "joints", "feet", "sources"):
-        merged[group] = {**_group(base, group, base_source), **_group(raw, group, source)}
-    return merged
+    return replace(
+        base,
+        **{key: getattr(file, key) for key in ("name", "description", "root") if getattr(file, key) is not None},
+        sources={**base.sources, **file.sources},
+        links={**base.links, **file.links},
+        joints={**_renamed(base.joints, file.joint_names, source), **file.joints},
+        feet={**base.feet, **file.feet},
+    )
 
 
-def _stamped(records: Mapping[str, Any], **stamp: object) -> dict[str, Any]:
-    """Records with one more field; what is no record is left for the check to come."""
-    return {name: {**record, **stamp} if isinstance(record, dict) else record for name, record in records.items()}
+def _with_records(file: RobotFile, source: str) -> RobotFile:
+    records = {
+        group: {name: _Record(raw, source, file.inertia_about) for name, raw in getattr(file, group).items()}
+        for group in ("links", "joints", "feet")
+    }
+    return replace(file, **records)  # type: ignore[arg-type]
 
 
-def _renamed(joints: Mapping[str, Any], names: Mapping[str, Any], source: str) -> dict[str, Any]:
+def _renamed(joints: Mapping[str, _Record], names: Mapping[str, str], source: str) -> dict[str, _Record]:
     """Joints under new names, given as new to old; a minus sign before the old one reverses the joint's sense."""
-    old = {new: _get(names, new, str, f"robot {source!r}: joint_names").removeprefix("-") for new in names}
+    old = {new: name.removeprefix("-") for new, name in names.items()}
     for name in old.values():
         if name not in joints:
             raise unknown(f"joint in joint_names of {source!r}", name, joints)
@@ -103,142 +154,64 @@ def _renamed(joints: Mapping[str, Any], names: Mapping[str, Any], source: str) -
     for new, name in old.items():
         if new in renamed:
             raise RobotDataError(f"robot {source!r}: joint_names gives {new!r} to {name!r}, but that name is taken")
-        renamed |= _stamped({new: joints[name]}, reversed=names[new].startswith("-"))
+        renamed[new] = joints[name]._replace(reversed=names[new].startswith("-"))
     return renamed
 
 
-def _resolved(base: Any, source: str) -> str | None:
+def _resolved(base: str, source: str) -> str:
     """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
-    if not isinstance(base, str):
-        return None
-    # Normalised, so that two files that extend each other by roundabout paths are found out.
+    # Normalised, so that two files that extend each other by roundabout paths are recognised.
     return os.path.normpath(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
 
 
-def _read(name_or_path: str) -> dict[str, Any]:
-    if name_or_path.endswith(".json"):
-        raw = read_json(Path(name_or_path), "robot file", error=RobotDataError)
-    elif name_or_path in robot_names():
-        raw = json.loads((_DATA / f"{name_or_path}.json").read_text(encoding="utf-8"))
-    else:
+def _read(name_or_path: str) -> RobotFile:
+    if not name_or_path.endswith(".json") and name_or_path not in robot_names():
         raise unknown("robot", name_or_path, robot_names())
-    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-    if type(found) is not int or found != SCHEMA:
-        raise RobotDataError(f"robot file {name_or_path!r}: 'schema' must be {SCHEMA}, got {found!r}")
-    check_keys(raw, name_or_path)
-    return raw
+    path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
+    return read_decoded(RobotFile, path, "robot file", error=RobotDataError)
 
 
-def _robot(raw: Mapping[str, Any]) -> Robot:
-    name = _get(raw, "name", str, "robot")
-    owner = f"robot {name!r}"
-    links = {key: _link(key, value) for key, value in _records(raw, "links", owner)}
-    check_inertias(name, [links[key] for key, value in _records(raw, "links", owner) if not value.get("inertia_about")])
-    joints = {key: _joint(key, value) for key, value in _records(raw, "joints", owner)}
-    feet = {key: _foot(key, value) for key, value in _records(raw, "feet", owner)}
+def _robot(file: RobotFile, source: str) -> Robot:
+    if file.name is None or file.root is None:
+        missing = "name" if file.name is None else "root"
+        raise RobotDataError(f"robot file {source!r}: {missing!r} is missing")
+    links = _made(_link, file.links)
+    check_inertias(file.name, [links[name] for name, record in file.links.items() if record.about is None])
     return Robot(
-        name=name,
-        description=_get({"description": "", **raw}, "description", str, owner),
-        sources={
-            key: _get({key: value}, key, str, f"{owner}: sources")
-            for key, value in _group(raw, "sources", name).items()
-        },
-        root=_get(raw, "root", str, owner),
+        name=file.name,
+        description=file.description or "",
+        sources=file.sources,
+        root=file.root,
         links=links,
-        joints=joints,
-        feet=feet,
+        joints=_made(_joint, file.joints),
+        feet=_made(_foot, file.feet),
     )
 
 
-def _link(name: str, raw: Mapping[str, Any]) -> Link:
-    owner = f"link {name!r}"
-    link = Link(
-        name=name,
-        mass_kg=_number(raw, "mass_kg", owner),
-        com_m=_numbers(raw, "com_m", 3, owner),  # type: ignore[arg-type]
-        inertia_com_kgm2=_numbers(raw, "inertia_com_kgm2", 6, owner),  # type: ignore[arg-type]
-    )
-    return shifted_to_com(link) if raw.get("inertia_about") == "joint" else link
+def _made(make: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:
+    made = {}
+    for name, record in records.items():
+        with refusing(f"robot file {record.file!r}", RobotDataError):
+            made[name] = make(name, record)
+    return made
 
 
-def _joint(name: str, raw: Mapping[str, Any]) -> Joint:
-    owner = f"joint {name!r}"
-    axis = _numbers(raw, "axis", 3, owner)
+def _link(name: str, record: _Record) -> Link:
+    link = decoded(Link, record.raw, f"links.{name}", given={"name": name})
+    return shifted_to_com(link) if record.about == "joint" else link
+
+
+def _joint(name: str, record: _Record) -> Joint:
+    where = f"joints.{name}"
+    raw = decoded_value(Mapping[str, Any], record.raw, where)
+    axis = decoded_value(Vector, raw.get("axis"), f"{where}.axis")
     length = math.hypot(*axis)
     if not 0.99 < length < 1.01:  # published axes are rounded (0.7071); a larger error is a mistake
-        raise RobotDataError(f"{owner}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
-    limits = _numbers(raw, "limits_rad", 2, owner)
-    planning = _numbers(raw, "planning_limits_rad", 2, owner) if "planning_limits_rad" in raw else limits
-    motor = raw.get("motor")
-    joint = Joint(
-        name=name,
-        parent=_get(raw, "parent", str, owner),
-        child=_get(raw, "child", str, owner),
-        origin_m=_numbers(raw, "origin_m", 3, owner),  # type: ignore[arg-type]
-        axis=tuple(a / length for a in axis),  # type: ignore[arg-type]
-        limits_rad=limits,  # type: ignore[arg-type]
-        planning_limits_rad=planning,  # type: ignore[arg-type]
-        velocity_limit_rad_s=_number(raw, "velocity_limit_rad_s", owner),
-        torque_limit_Nm=_number(raw, "torque_limit_Nm", owner),
-        motor=None if motor is None else _motor(motor, owner),
-    )
-    return reversed_joint(joint) if raw.get("reversed") else joint
+        raise RobotDataError(f"joint {name!r}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
+    completed = {"planning_limits_rad": raw.get("limits_rad"), **raw, "axis": [a / length for a in axis]}
+    joint = decoded(Joint, completed, where, given={"name": name})
+    return reversed_joint(joint) if record.reversed else joint
 
 
-def _motor(raw: Any, owner: str) -> Motor:
-    if not isinstance(raw, dict):
-        raise RobotDataError(f"{owner}: 'motor' must be an object, got {raw!r}")
-    ratings = ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm")
-    return Motor(make=_get(raw, "make", str, owner), **{key: _number(raw, key, owner) for key in ratings})
-
-
-def _foot(side: str, raw: Mapping[str, Any]) -> Foot:
-    owner = f"foot {side!r}"
-    extents = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
-    polygon = raw.get("sole_polygon_m", [])
-    if not isinstance(polygon, list):
-        raise RobotDataError(f"{owner}: sole_polygon_m must be a list of [x, y], got {polygon!r}")
-    corners = tuple(_numbers({"corner": c}, "corner", 2, f"{owner}: sole_polygon_m") for c in polygon)
-    return Foot(
-        link=_get(raw, "link", str, owner),
-        sole_polygon_m=corners,  # type: ignore[arg-type]
-        **{key: _number(raw, key, owner) for key in extents},
-    )
-
-
-def _records(raw: Mapping[str, Any], group: str, owner: str) -> list[tuple[str, Mapping[str, Any]]]:
-    records = raw.get(group)
-    if not isinstance(records, dict) or not all(isinstance(r, dict) for r in records.values()):
-        raise RobotDataError(f"{owner}: {group!r} must be an object of records by name, got {type(records).__name__}")
-    return list(records.items())
-
-
-def _group(raw: Mapping[str, Any], group: str, robot: str) -> dict[str, Any]:
-    """Entries of a group that need not be there."""
-    entries = raw.get(group, {})
-    if not isinstance(entries, dict):
-        raise RobotDataError(f"robot {robot!r}: {group!r} must be an object, got {entries!r}")
-    return entries
-
-
-def _get(raw: Mapping[str, Any], key: str, kind: type[T], owner: str) -> T:
-    value = raw.get(key)
-    if not isinstance(value, kind):
-        raise RobotDataError(f"{owner}: {key!r} must be {kind_name(kind)}, got {value!r}")
-    return value
-
-
-def _number(raw: Mapping[str, Any], key: str, owner: str) -> float:
-    value = raw.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise RobotDataError(f"{owner}: {key!r} must be a finite number, got {value!r}")
-    if abs(value) > LARGEST_NUMBER:
-        raise RobotDataError(f"{owner}: {key!r} must be within {LARGEST_NUMBER:g}, got {value!r}")
-    return float(value)
-
-
-def _numbers(raw: Mapping[str, Any], key: str, count: int, owner: str) -> tuple[float, ...]:
-    value = raw.get(key)
-    if not isinstance(value, list) or len(value) != count:
-        raise RobotDataError(f"{owner}: {key!r} must be a list of {count} numbers, got {value!r}")
-    return tuple(_number({key: item}, key, owner) for item in value)
+def _foot(side: str, record: _Record) -> Foot:
+    return decoded(Foot, record.raw, f"feet.{side}")

@@ -1,4 +1,4 @@
-"""Left and right of a robot: which joint is the image of which, and whether both turn alike in mirrored motions."""
+"""Left and right of a robot: which joint is the image of which, and whether both turn the same way in mirrored motions."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ def partner(name: str) -> str:
 
 
 def mirror_sign(robot: Robot, joint: str) -> float:
-    """+1 where a joint and its partner turn alike in motions that are mirrored left to right, -1 where against each other.
+    """+1 if a joint and its partner turn the same way in motions mirrored left to right, -1 if in opposite ways.
 
     A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z).
 
     Raises:
-        UnknownNameError: the robot has no such joint or not its partner.
+        UnknownNameError: the robot lacks the joint or its partner.
     """
     (x, y, z), other = robot.joint(joint).axis, robot.joint(partner(joint)).axis
     return 1.0 if -x * other[0] + y * other[1] - z * other[2] > 0.0 else -1.0

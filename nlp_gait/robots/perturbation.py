@@ -1,6 +1,6 @@
 """A robot with other masses, leg lengths or soles: for sensitivities, worst cases, and what-if questions.
 
-As text behind a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it goes wherever a robot's name goes:
+Written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it can stand wherever a robot's name can:
 
     mass            factor on the masses and inertias of all links
     LINK.mass       the same for one link, for example ``LThigh.mass``
@@ -61,7 +61,7 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
     """A robot's name, and its changes if the text has some.
 
     Raises:
-        InputError: what stands behind the mark is no list of changes.
+        InputError: the text after the mark is not a list of changes.
     """
     name, mark, listed = text.rpartition(MARK)
     if not mark or listed.endswith((".json", ".urdf")):  # a mark may be part of a file's path
@@ -73,7 +73,7 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
             changes[key.strip()] = float(value)
         except ValueError:
             raise InputError(
-                f"robot {text!r}: behind {MARK} it takes NAME=NUMBER, separated by commas, got {item!r}; for example "
+                f"robot {text!r}: after {MARK} it needs NAME=NUMBER, separated by commas, got {item!r}; for example "
                 f"nao-v5{MARK}mass=1.05,thigh_m=0.001"
             ) from None
     return name, changes

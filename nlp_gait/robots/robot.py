@@ -8,18 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.robots.fields import check_numbers
 
 Vector = tuple[float, float, float]
 
 # Published tensors carry six digits: a rod's triangle equality may be missed by that much.
 TRIANGLE_TOLERANCE = 1e-6
-
-
-def _finite(owner: str, **values: object) -> None:
-    for name, value in values.items():
-        numbers = value if isinstance(value, tuple) else (value,)
-        if not all(isinstance(n, (int, float)) and math.isfinite(n) for n in numbers):
-            raise RobotDataError(f"{owner}: {name} must be finite numbers, got {value!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,9 +35,7 @@ class Link:
     def __post_init__(self) -> None:
         """Refuse what no rigid body can have."""
         owner = f"link {self.name!r}"
-        _finite(owner, mass_kg=self.mass_kg, com_m=self.com_m, inertia_com_kgm2=self.inertia_com_kgm2)
-        if not self.mass_kg > 0.0:
-            raise RobotDataError(f"{owner}: mass_kg must be > 0, got {self.mass_kg}")
+        check_numbers(owner, self, positive=("mass_kg",))
         low, middle, high = _principal_moments(self.inertia_com_kgm2)
         slack = TRIANGLE_TOLERANCE * high
         if low < -slack or low + middle < high - slack:
@@ -74,9 +66,8 @@ class Motor:
 
     def __post_init__(self) -> None:
         """All ratings are positive."""
-        for name in ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"):
-            if not getattr(self, name) > 0.0:
-                raise RobotDataError(f"motor {self.make!r}: {name} must be > 0, got {getattr(self, name)}")
+        ratings = ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm")
+        check_numbers(f"motor {self.make!r}", self, positive=ratings)
 
     @property
     def stall_torque_Nm(self) -> float:
@@ -134,16 +125,12 @@ class Joint:
     def __post_init__(self) -> None:
         """Unit axis, ordered limits."""
         owner = f"joint {self.name!r}"
-        _finite(owner, origin_m=self.origin_m, axis=self.axis, limits_rad=self.limits_rad)
-        _finite(owner, planning_limits_rad=self.planning_limits_rad)
+        check_numbers(owner, self, positive=("velocity_limit_rad_s", "torque_limit_Nm"))
         if abs(math.hypot(*self.axis) - 1.0) > 1e-9:
             raise RobotDataError(f"{owner}: axis must be a unit vector, got {self.axis}")
         for name, (low, high) in (("limits_rad", self.limits_rad), ("planning_limits_rad", self.planning_limits_rad)):
             if not low < high:
                 raise RobotDataError(f"{owner}: {name} must be ordered (lower < upper), got [{low}, {high}]")
-        for name in ("velocity_limit_rad_s", "torque_limit_Nm"):
-            if not getattr(self, name) > 0.0:
-                raise RobotDataError(f"{owner}: {name} must be > 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,10 +154,8 @@ class Foot:
 
     def __post_init__(self) -> None:
         """A sole has an extent on all four sides."""
-        for name in ("ankle_height_m", "front_m", "back_m", "left_m", "right_m"):
-            value = getattr(self, name)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise RobotDataError(f"foot {self.link!r}: {name} must be > 0, got {value}")
+        extents = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
+        check_numbers(f"foot {self.link!r}", self, positive=extents)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

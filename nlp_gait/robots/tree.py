@@ -109,17 +109,27 @@ def inertia_matrix(link: Link) -> np.ndarray:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
+def inertia_moments(matrix: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """(ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as ``Link`` has them."""
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
+    return ixx, iyy, izz, ixy, ixz, iyz
+
+
+def point_inertia(mass: float, offset: np.ndarray) -> np.ndarray:
+    """(3, 3) tensor of a point mass [kg] about a point at a distance ``offset`` (3,) [m]."""
+    tensor: np.ndarray = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return tensor
+
+
 def _welded(parent: Link, child: Link, origin: Vector) -> Link:
     mass = parent.mass_kg + child.mass_kg
     coms = [np.array(parent.com_m), np.array(child.com_m) + np.array(origin)]
     com = (parent.mass_kg * coms[0] + child.mass_kg * coms[1]) / mass
     inertia = np.zeros((3, 3))
     for link, c in zip((parent, child), coms, strict=True):
-        r = c - com
-        inertia += inertia_matrix(link) + link.mass_kg * (r @ r * np.eye(3) - np.outer(r, r))
+        inertia += inertia_matrix(link) + point_inertia(link.mass_kg, c - com)
     x, y, z = com.tolist()
-    ixx, ixy, ixz, _, iyy, iyz, _, _, izz = inertia.flatten().tolist()
-    return Link(name=parent.name, mass_kg=mass, com_m=(x, y, z), inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
+    return Link(name=parent.name, mass_kg=mass, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(inertia))
 
 
 def _minus(a: Vector, b: Vector) -> Vector:

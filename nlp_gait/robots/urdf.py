@@ -1,6 +1,6 @@
-"""Robots from URDF files, as the same record that a JSON robot file holds; the soles, of which a URDF is silent, come from there.
+"""Robots from URDF files, in the form of a JSON robot file; a URDF says nothing about soles, which come from the latter.
 
-The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses what is incomplete and names link or joint.
+The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses incomplete links and joints by name.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.fields import LARGEST_NUMBER
+from nlp_gait.robots.tree import inertia_moments, point_inertia
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -37,7 +38,7 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
 
     Raises:
         MissingExtraError: the parser is not installed.
-        RobotDataError: the file cannot be read, is no URDF, or no tree.
+        RobotDataError: the file cannot be read, is not a URDF, or its links do not form a tree.
     """
     model = _parsed(path)
     joints = {joint.child: joint for joint in model.joints}
@@ -85,23 +86,23 @@ def _parsed(path: str) -> Any:
         return import_module("urdf_parser_py.urdf").URDF.from_xml_string(etree.tostring(root))
     except Exception as error:  # the parser raises its own, KeyError, ValueError and AssertionError
         said = " ".join(str(error).split()) or type(error).__name__
-        raise RobotDataError(f"robot file {path!r} is no URDF of a robot: {said}") from error
+        raise RobotDataError(f"robot file {path!r} is not a URDF of a robot: {said}") from error
     finally:
         parser.on_error = tolerant
 
 
 def _refuse(message: str) -> None:
-    """In place of the parser's own answer to unknown tags and attributes, and to tags that stand twice: a line on stderr."""
+    """Replaces the parser's own answer to unknown tags and attributes and to repeated tags: a line on stderr."""
     raise RobotDataError(message)
 
 
 def _zero_pose(model: Any, joints: dict[str, Any], path: str) -> dict[str, Array]:
-    """(4, 4) pose of each link's frame in the root's at zero angles, parents first; refuses what is no tree."""
+    """(4, 4) pose of each link's frame in the root's at zero angles, parents first; refuses links that do not form a tree."""
     names = [link.name for link in model.links]
     for kind, found in (("link", names), ("joint", [joint.name for joint in model.joints])):
         twice = sorted({name for name in found if found.count(name) > 1})
         if twice:
-            raise RobotDataError(f"robot file {path!r}: {kind} {twice[0]!r} is there twice")
+            raise RobotDataError(f"robot file {path!r}: {kind} {twice[0]!r} appears twice")
     for joint in model.joints:
         for end in (joint.parent, joint.child):
             if end not in names:
@@ -150,7 +151,7 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
-        tensor = tensor - _of_point(inertial.mass, pose[:3, 3] - frame[:3, 3])
+        tensor = tensor - point_inertia(inertial.mass, pose[:3, 3] - frame[:3, 3])
     return inertial.mass, pose[:3, 3], tensor
 
 
@@ -158,9 +159,8 @@ def _link(parts: list[tuple[float, Array, Array]], origin: Array) -> dict[str, A
     """Record of links that move as one, whose joint is at ``origin`` (3,)."""
     mass = sum(part[0] for part in parts)
     com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass if mass > 0.0 else origin
-    tensor = sum((about + _of_point(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
-    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()
-    return {"mass_kg": mass, "com_m": (com - origin).tolist(), "inertia_com_kgm2": [ixx, iyy, izz, ixy, ixz, iyz]}
+    tensor = sum((about + point_inertia(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
+    return {"mass_kg": mass, "com_m": (com - origin).tolist(), "inertia_com_kgm2": list(inertia_moments(tensor))}
 
 
 def _joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
@@ -211,9 +211,3 @@ def _turn(axis: int, angle: float) -> Array:
     rotation[[i, j], [i, j]] = math.cos(angle)
     rotation[i, j], rotation[j, i] = -math.sin(angle), math.sin(angle)
     return rotation
-
-
-def _of_point(mass: float, offset: Array) -> Array:
-    """(3, 3) tensor of a point mass about a point at a distance ``offset`` (3,)."""
-    tensor: Array = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return tensor

@@ -14,7 +14,7 @@ from nlp_gait.symbolic.trajectories import Motion, stack
 LEAST_LEG_LENGTH = 1e-4
 
 
-class Leg(NamedTuple):
+class LegAngles(NamedTuple):
     """Angles of a leg whose pelvis is upright and whose sole is flat.
 
     Attributes:
@@ -31,7 +31,7 @@ def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:
     return (distance_squared - thigh**2 - tibia**2) / (2 * thigh * tibia)
 
 
-def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> Leg:
+def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> LegAngles:
     """Angles, velocities and accelerations of a leg, defined for every finite input.
 
     Args:
@@ -85,4 +85,4 @@ def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops
         Motion(-(pitch + knee), -(pitchd + kneed), -(pitchdd + kneedd)),
         Motion(-roll, -rolld, -rolldd),
     )
-    return Leg(joints, cosine)
+    return LegAngles(joints, cosine)

@@ -28,7 +28,7 @@ class Angle(NamedTuple):
 
 
 class Nonsmooth(Protocol):
-    """What a problem may use beside smooth functions."""
+    """What a problem may use besides smooth functions."""
 
     def acos(self, argument: SX, margin: SX) -> Angle:
         """acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""

@@ -30,20 +30,20 @@ class Controller(NamedTuple):
     gravity_share: SX
 
 
-class State(NamedTuple):
+class QuantisedState(NamedTuple):
     """Coordinates and rates, (n,) each."""
 
     q: SX
     v: SX
 
 
-def after(state: State, acceleration: SX, quantum: float) -> State:
-    """State one quantum of time later (eqs. 44, 45)."""
+def after(state: QuantisedState, acceleration: SX, quantum: float) -> QuantisedState:
+    """QuantisedState one quantum of time later (eqs. 44, 45)."""
     q, v = state
-    return State(q + v * quantum + acceleration * quantum**2 / 2, v + acceleration * quantum)
+    return QuantisedState(q + v * quantum + acceleration * quantum**2 / 2, v + acceleration * quantum)
 
 
-def controller_torque(control: Controller, desired: State, state: State, gravity: SX) -> SX:
+def controller_torque(control: Controller, desired: QuantisedState, state: QuantisedState, gravity: SX) -> SX:
     """(n,) generalised torque (eqs. 50-52), with the share of gravity that is compensated."""
     errors = control.proportional * (desired.q - state.q) + control.derivative * (desired.v - state.v)
     return errors + control.gravity_share * gravity
@@ -51,9 +51,9 @@ def controller_torque(control: Controller, desired: State, state: State, gravity
 
 def implicit_quantum(
     motion: EquationsOfMotion,
-    state: State,
+    state: QuantisedState,
     control: Controller,
-    desired: State,
+    desired: QuantisedState,
     contacts: Sequence[Contact],
     ground: Ground,
     disturbance: SX,
@@ -88,9 +88,9 @@ def implicit_quantum(
 
 def explicit_quantum(
     motion: EquationsOfMotion,
-    state: State,
+    state: QuantisedState,
     control: Controller,
-    desired: State,
+    desired: QuantisedState,
     contacts: Sequence[Contact],
     ground: Ground,
     disturbance: SX,

@@ -73,15 +73,15 @@ def finer(coefficients: Array, spans: int) -> Array:
     if m == 0:
         return np.zeros((coefficient_count(spans), *coefficients.shape[1:]))
     phases = np.linspace(0.0, 1.0, 4 * (spans + DEGREE))
-    return fitted(table(m - 1, phases).T @ coefficients, spans, phases)
+    return fitted(basis_table(m - 1, phases).T @ coefficients, spans, phases)
 
 
 def fitted(values: Array, spans: int, phases: Array) -> Array:
     """(m, k) coefficients of the splines that are nearest to values (n, k) at phases (n,), in the sense of least squares."""
-    return np.asarray(np.linalg.lstsq(table(spans, phases).T, values, rcond=None)[0], dtype=float)
+    return np.asarray(np.linalg.lstsq(basis_table(spans, phases).T, values, rcond=None)[0], dtype=float)
 
 
-def table(spans: int, phases: Array, order: int = 0) -> Array:
+def basis_table(spans: int, phases: Array, order: int = 0) -> Array:
     """(m, n) derivatives of the basis functions at phases (n,)."""
     return np.array(_basis_function(spans, order).map(len(phases))(phases[None, :]).full())
 

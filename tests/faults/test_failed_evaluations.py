@@ -7,7 +7,7 @@ import pytest
 
 from metaheuristics import ADAPTERS, ALGORITHMS, Deb, EpsilonLevel, StaticPenalty, algorithm, minimize
 from metaheuristics.adapters.pymoo import MODULES
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from tests.metaheuristics.problems import Function
 
 NAMES = sorted({*ALGORITHMS, "cma", "de", *(f"pymoo:{name}" for name in MODULES)})

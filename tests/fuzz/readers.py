@@ -209,8 +209,9 @@ def same_study(raw: Mapping[str, Any], settings: StudySettings) -> None:
 
 def same_robot(raw: Mapping[str, Any], robot: Robot) -> None:
     """Raise Misread unless every record of the file is in the robot with its numbers."""
-    same(raw.get("description", robot.description), robot.description, "description")
-    same(raw["name"] if "extends" not in raw else raw.get("name", robot.name), robot.name, "name")
+    for key in ("description", "name", "root"):
+        if raw.get(key) is not None:  # null as if it were not there
+            same(raw[key], getattr(robot, key), key)
     for name, link in raw.get("links", {}).items():
         for key in ("mass_kg", "com_m"):
             same(link[key], getattr(robot.links[name], key), f"{name}.{key}")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 
 
 class Function:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from metaheuristics import ALGORITHMS, Deb, EpsilonLevel, GeneticAlgorithm, Result, StaticPenalty, algorithm, minimize
-from metaheuristics.interface import Algorithm, Array
+from metaheuristics.array import Array
+from metaheuristics.interface import Algorithm
 from tests.metaheuristics.problems import Function, disc, infeasible, rosenbrock, sphere
 
 ALL = {name: factory() for name, factory in ALGORITHMS.items()}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metaheuristics import SearchError
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from metaheuristics.multi_objective import MODULES, MultiObjective, minimize_many
 
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metaheuristics.ant_colony import AntColony, deviations, kernel_probabilities
-from metaheuristics.ant_colony_grid import pick, renew
+from metaheuristics.algorithms.ant_colony import AntColony, deviations, kernel_probabilities
+from metaheuristics.algorithms.ant_colony_grid import pick, renew
+from metaheuristics.algorithms.genetic import GeneticAlgorithm, tournaments
+from metaheuristics.algorithms.genetic_operators import Flip, SinglePoint, polynomial, simulated_binary
+from metaheuristics.algorithms.particle_swarm import ParticleSwarm, move, reflect
+from metaheuristics.algorithms.points import Points
 from metaheuristics.constraint_handling import FEASIBILITY
-from metaheuristics.genetic import GeneticAlgorithm, tournaments
-from metaheuristics.genetic_operators import Flip, SinglePoint, polynomial, simulated_binary
 from metaheuristics.interface import Start
-from metaheuristics.particle_swarm import ParticleSwarm, move, reflect
-from metaheuristics.points import Points
 
 WIDE = 1e9  # bounds so far away that they do not bend a distribution
 repeatable = settings(derandomize=True, deadline=None)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import differential_evolution
 
 from metaheuristics import (
     ADAPTERS,
@@ -22,8 +24,10 @@ from metaheuristics import (
 )
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
-from metaheuristics.adapters.scipy_de import STRATEGIES, DifferentialEvolution
-from metaheuristics.interface import Array
+from metaheuristics.algorithms.differential_evolution import STRATEGIES, DifferentialEvolution
+from metaheuristics.array import Array
+from metaheuristics.constraint_handling import FEASIBILITY
+from metaheuristics.interface import Start
 from tests.metaheuristics.problems import disc, sphere
 
 
@@ -104,6 +108,41 @@ def test_every_pymoo_algorithm_runs_from_the_shared_points_and_leaves_the_global
     np.testing.assert_array_equal(generations[0], reference[0])
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]
     assert result.evaluations == 400 and result.objective < generations[0].sum(axis=1).max()
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_trials_of_differential_evolution_are_those_of_scipy(strategy: str) -> None:
+    """SciPy's first generation from the same members and the same random numbers."""
+    lower, upper = np.array([-1.0, 2.0, 0.0]), np.array([1.0, 5.0, 9.0])
+    members = lower + np.random.default_rng(1).random((9, 3)) * (upper - lower)
+    generations: list[Array] = []
+
+    def objective(columns: Array) -> Array:
+        generations.append(columns.T.copy())
+        return np.arange(float(columns.shape[1]))  # the first is the best
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # one generation does not converge
+        differential_evolution(
+            objective,
+            np.column_stack([lower, upper]),
+            init=members,
+            strategy=strategy,
+            maxiter=1,
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+            seed=np.random.default_rng(2),
+        )
+    start = Start(lower=lower, upper=upper, initial=members, evaluations=99, rng=np.random.default_rng(2))
+    search = DifferentialEvolution(strategy=strategy, population=9).start(start)
+    search.tell(members, np.arange(9.0), np.zeros(9), FEASIBILITY)
+    np.testing.assert_allclose(search.ask(), generations[1], rtol=1e-14)
+
+
+def test_two_mutants_of_random_members_need_six() -> None:
+    with pytest.raises(SearchError, match="population must be a whole number >= 6"):
+        DifferentialEvolution(strategy="rand2bin", population=5)
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)

@@ -1,13 +1,16 @@
 """Files that hold a gait."""
 
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 import nlp_gait
+from compare.study.record import RunRecord
 from nlp_gait.errors import InputError
 from nlp_gait.problem import load_result, sampled
+from nlp_gait.problem.result import BESIDE_RECORD
 
 X = dict(
     zip(
@@ -44,16 +47,19 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
     [
         ("{", "is not valid JSON"),
         ("[" * 100_000, "is not valid JSON"),
-        ("[]", "must be a JSON object, got list"),
-        ({"x": X}, "'problem' must be the name"),
-        ({"problem": 3, "x": X}, "'problem' must be the name"),
+        ("[]", "it must be an object, got []; `nlp-gait solve ... --out FILE` writes a valid one"),
+        ({"x": X}, "problem is missing"),
+        ({"problem": 3, "x": X}, "problem must be a text, got 3"),
         ({"problem": "nao-dps", "x": X}, "unknown problem 'nao-dps'; did you mean 'nao-dsp'"),
-        ({"problem": "nao-dsp"}, "'x' must be an object"),
-        ({"problem": "nao-dsp", "x": list(X.values())}, "'x' must be an object"),
+        ({"problem": "nao-dsp"}, "x is missing"),
+        ({"problem": "nao-dsp", "x": list(X.values())}, "x must be an object"),
         ({"problem": "nao-dsp", "x": {**X, "hip_hight_m": 1}}, "hip_hight_m"),
-        ({"problem": "nao-dsp", "x": {k: v for k, v in X.items() if k != "hip_height_m"}}, "'x' lacks hip_height_m"),
+        (
+            {"problem": "nao-dsp", "x": {k: v for k, v in X.items() if k != "hip_height_m"}},
+            "must name every variable once; missing: hip_height_m",
+        ),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": "tall"}}, "hip_height_m must be a number, got 'tall'"),
-        ({"problem": "nao-dsp", "x": {**X, "hip_height_m": None}}, "hip_height_m must be a number, got None"),
+        ({"problem": "nao-dsp", "x": {**X, "hip_height_m": None}}, "hip_height_m must be finite, got nan"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m' must be finite, got nan"),
         ({"problem": "nao-dsp", "x": X, "options": {"robot": 5}}, "option robot must be a text, got 5"),
         (
@@ -61,15 +67,28 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
             "option intervals must be a whole number, got True",
         ),
         ({"problem": "nao-dsp", "x": X, "options": {"robots": "nao-v5"}}, "unknown option of nao-dsp 'robots'"),
-        ({"problem": "nao-dsp", "x": X, "options": []}, "'options' must be an object"),
+        ({"problem": "nao-dsp", "x": X, "options": []}, "options must be an object"),
         ({"problem": "nao-dsp", "x": X, "parameters": {"gravity": 1.6}}, "unknown parameter"),
-        ({"problem": "nao-dsp", "x": X, "parameters": {"torque_change_limit_Nm": "1"}}, "must be a finite number"),
+        ({"problem": "nao-dsp", "x": X, "parameters": {"torque_change_limit_Nm": "1"}}, "must be a number, got '1'"),
+        ({"problem": "nao-dsp", "x": X, "paramters": {}}, "unknown key 'paramters'; did you mean 'parameters'"),
+        ({"problem": "nao-dsp", "x": X, "schema": 2}, "schema must be 1, got 2"),
+        ({"problem": "nao-dsp", "x": X, "robot": "nao-v4"}, "write it into 'options'"),
     ],
 )
 def test_damaged_files_are_refused_by_name(tmp_path, data, words):
     with pytest.raises(InputError, match="result.json") as caught:
         load_result(written(tmp_path, data))
     assert words in str(caught.value)
+
+
+def test_a_record_may_hold_what_studies_write_and_nothing_else(tmp_path):
+    written_keys = {"schema", *(field.name for field in fields(RunRecord))}
+    assert written_keys == {"schema", "definition", "x", *BESIDE_RECORD}
+    definition = {"problem": {"name": "nao-dsp", "options": {"robot": "nao-v6"}, "parameters": {}}, "seed": 0}
+    record = {"schema": 2, "definition": definition, "x": X, "status": "converged"}
+    assert load_result(written(tmp_path, record)).problem.options["robot"] == "nao-v6"
+    with pytest.raises(InputError, match="unknown key 'parameters'"):
+        load_result(written(tmp_path, record | {"parameters": {}}))
 
 
 def test_an_absent_file_is_refused(tmp_path):
@@ -87,6 +106,6 @@ def test_sampling_keeps_the_problems_samples(tmp_path, period, samples):
 
 
 @pytest.mark.parametrize("period", [0.0, -1.0, float("nan")])
-def test_a_period_that_is_none_is_refused(tmp_path, period):
+def test_a_period_that_is_not_positive_is_refused(tmp_path, period):
     with pytest.raises(InputError, match="must be > 0 s"):
         sampled(load_result(written(tmp_path, {"problem": "nao-dsp", "x": X})), period)

@@ -77,7 +77,7 @@ def test_the_statement_holds_for_the_links_of_its_own_file_only(tmp_path: Path) 
 
 
 def test_another_statement_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RobotDataError, match="'inertia_about' must be 'com' or 'joint', got 'origin'"):
+    with pytest.raises(RobotDataError, match="inertia_about must be 'com' or 'joint', got 'origin'"):
         load_robot(written(tmp_path, nao() | {"inertia_about": "origin"}))
 
 

@@ -63,26 +63,29 @@ def set_in(*path: str, to: object) -> Callable[[dict[str, Any]], None]:
 
 DAMAGES = [
     (set_in("links", "left", "mass_kg", to=-1.0), r"link 'left': mass_kg must be > 0, got -1\.0"),
-    (set_in("links", "left", "mass_kg", to="1"), r"link 'left': 'mass_kg' must be a finite number, got '1'"),
-    (set_in("links", "left", "mass_kg", to=True), r"'mass_kg' must be a finite number, got True"),
+    (set_in("links", "left", "mass_kg", to="1"), r"robot\.json': links\.left\.mass_kg must be a number, got '1'"),
+    (set_in("links", "left", "mass_kg", to=True), r"links\.left\.mass_kg must be a number, got True"),
     (set_in("links", "left", "mass_kg", to=float("nan")), r"'links\.left\.mass_kg' must be finite, got nan"),
-    (set_in("links", "left", "com_m", to=[0.0, 0.0]), r"'com_m' must be a list of 3 numbers, got \[0\.0, 0\.0\]"),
+    (
+        set_in("links", "left", "com_m", to=[0.0, 0.0]),
+        r"links\.left\.com_m must be a list of 3 values, got \[0\.0, 0\.0\]",
+    ),
     (
         set_in("links", "left", "inertia_com_kgm2", to=[3e-3, 1e-3, 1e-3, 0, 0, 0]),
         r"link 'left': .* principal moments 1\.000e-03, 1\.000e-03, 3\.000e-03 .* subtract m \(c\.c I - c c\^T\)",
     ),
     (set_in("links", "left", "inertia_com_kgm2", to=[-1e-3, 1e-3, 1e-3, 0, 0, 0]), "needs all >= 0"),
-    (set_in("links", to=[1, 2]), r"robot 'tiny': 'links' must be an object of records by name, got list"),
+    (set_in("links", to=[1, 2]), r"robot\.json': links must be an object, got \[1, 2\]"),
     (set_in("joints", "LHip", "limits_rad", to=[1.0, -1.0]), r"joint 'LHip': limits_rad must be ordered .* \[1\.0, -1"),
     (set_in("joints", "LHip", "planning_limits_rad", to=[1.0, 1.0]), "planning_limits_rad must be ordered"),
     (set_in("joints", "LHip", "axis", to=[0.0, 2.0, 0.0]), r"axis must be a unit vector, got \[0\.0, 2\.0, 0\.0\]"),
     (set_in("joints", "LHip", "velocity_limit_rad_s", to=0), r"velocity_limit_rad_s must be > 0, got 0\.0"),
     (set_in("joints", "LHip", "torque_limit_Nm", to=-2), r"torque_limit_Nm must be > 0, got -2\.0"),
     (set_in("joints", "LHip", "parent", to="tail"), r"joint 'LHip': link 'tail' does not exist"),
-    (set_in("joints", "LHip", "parent", to=None), r"joint 'LHip': 'parent' must be a text, got None"),
+    (set_in("joints", "LHip", "parent", to=None), r"robot\.json': joints\.LHip\.parent must be a text, got None"),
     (set_in("joints", "LHip", "child", to="right"), r"link 'right' already has a parent or is the root"),
     (set_in("joints", "LHip", "child", to="torso"), r"link 'torso' already has a parent or is the root"),
-    (set_in("joints", "LHip", "motor", to="Maxon"), r"joint 'LHip': 'motor' must be an object, got 'Maxon'"),
+    (set_in("joints", "LHip", "motor", to="Maxon"), r"joints\.LHip\.motor must be an object, got 'Maxon'"),
     (
         set_in(
             "joints",
@@ -101,15 +104,15 @@ DAMAGES = [
     (set_in("links", "tail", to=link()), r"robot 'tiny': no joint carries link tail"),
     (with_joint_ring, r"robot 'tiny': joints above link 'a' form a ring"),
     (set_in("root", to="pelvis"), r"robot 'tiny': root 'pelvis' is not a link"),
-    (set_in("root", to=3), r"robot 'tiny': 'root' must be a text, got 3"),
-    (set_in("name", to=None), r"'name' must be a text, got None"),
+    (set_in("root", to=3), r"robot\.json': root must be a text or null, got 3"),
+    (set_in("name", to=None), r"robot\.json': 'name' is missing"),
     (set_in("feet", to={"left": foot("left")}), r"robot 'tiny': foot 'right' is missing or names no link"),
     (set_in("feet", "left", "link", to="paw"), r"foot 'left' is missing or names no link"),
     (set_in("feet", "left", "front_m", to=0), r"foot 'left': front_m must be > 0, got 0\.0"),
-    (set_in("feet", "left", "sole_polygon_m", to="round"), r"sole_polygon_m must be a list of \[x, y\], got 'round'"),
-    (set_in("schema", to=2), r"'schema' must be 1, got 2"),
-    (set_in("extends", to=7), r"'extends' must name another robot, got 7"),
-    (set_in("sources", to=["somewhere"]), r"'sources' must be an object, got \['somewhere'\]"),
+    (set_in("feet", "left", "sole_polygon_m", to="round"), r"feet\.left\.sole_polygon_m must be a list, got 'round'"),
+    (set_in("schema", to=2), r"schema must be 1, got 2"),
+    (set_in("extends", to=7), r"extends must be a text or null, got 7"),
+    (set_in("sources", to=["somewhere"]), r"sources must be an object, got \['somewhere'\]"),
 ]
 
 
@@ -129,9 +132,9 @@ def test_what_is_wrong_with_a_robot_is_said(
     ("text", "message"),
     [
         ("{", "is not valid JSON"),
-        ("[]", "'schema' must be 1, got 'list'"),
+        ("[]", r"it must be an object, got \[\]"),
         ("[" * 100_000, "is not valid JSON"),
-        ("{}", "'schema' must be 1, got None"),
+        ("{}", "schema is missing"),
     ],
     ids=["cut off", "list", "too deep", "empty"],
 )
@@ -177,7 +180,7 @@ def test_a_file_is_extended_from_the_folder_of_the_one_that_names_it(tmp_path: P
 
 def test_a_damaged_group_beside_extends_is_named(tmp_path: Path) -> None:
     raw = {"schema": 1, "name": "odd", "extends": "nao-v5", "links": ["LThigh"]}
-    with pytest.raises(RobotDataError, match=r"'links' must be an object, got \['LThigh'\]"):
+    with pytest.raises(RobotDataError, match=r"links must be an object, got \['LThigh'\]"):
         load_robot(written(tmp_path, raw))
 
 
@@ -217,7 +220,9 @@ def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> 
 
 def test_records_made_in_code_are_checked_like_those_of_a_file() -> None:
     knee, thigh = load_robot("nao-v5").joint("LKneePitch"), load_robot("nao-v5").links["LThigh"]
-    with pytest.raises(RobotDataError, match=r"link 'LThigh': com_m must be finite numbers, got \(0\.0, nan, 0\.0\)"):
+    with pytest.raises(
+        RobotDataError, match=r"link 'LThigh': com_m must be finite numbers within 1e\+09, got \(0\.0, nan"
+    ):
         dataclasses.replace(thigh, com_m=(0.0, float("nan"), 0.0))
     with pytest.raises(
         RobotDataError, match=r"joint 'LKneePitch': axis must be a unit vector, got \(0\.0, 2\.0, 0\.0\)"

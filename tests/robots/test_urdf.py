@@ -196,9 +196,9 @@ DAMAGES = [
     (with_attribute(f"{KNEE}/child", "link", "RTibia"), r"link 'RTibia' already has a parent"),
     (with_attribute(f"{KNEE}/parent", "link", "l_ankle"), r"joint 'LKneePitch' is part of a ring of joints"),
     (with_attribute(f"{KNEE}/child", "link", "torso"), r"exactly one link must have no parent, got LTibia|ring|none"),
-    (with_attribute(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' is there twice"),
-    (with_attribute("link[@name='LTibia']", "name", "RTibia"), r"link 'RTibia' is there twice"),
-    (with_attribute(KNEE, "type", "hinge"), "is no URDF of a robot"),
+    (with_attribute(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' appears twice"),
+    (with_attribute("link[@name='LTibia']", "name", "RTibia"), r"link 'RTibia' appears twice"),
+    (with_attribute(KNEE, "type", "hinge"), "is not a URDF of a robot"),
 ]
 
 
@@ -217,7 +217,7 @@ def test_what_is_wrong_with_a_urdf_is_said(
     [
         ("", "is not valid XML"),
         ("<robot name='a'><link name='b'>", "is not valid XML"),
-        ("<mujoco/>", "is no URDF of a robot"),
+        ("<mujoco/>", "is not a URDF of a robot"),
         ("<robot name='a'/>", "exactly one link must have no parent, got none"),
     ],
     ids=["empty", "cut off", "another format", "no link"],
@@ -278,8 +278,8 @@ def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
     [
         ({"LKneePitch": "left_knee"}, r"unknown joint in joint_names of .*robot\.json' 'left_knee'"),
         ({"RKneePitch": "LKneePitch"}, "joint_names gives 'RKneePitch' to 'LKneePitch', but that name is taken"),
-        (["LKneePitch"], r"'joint_names' must be an object, got \['LKneePitch'\]"),
-        ({"LKneePitch": 3}, r"robot\.json': joint_names: 'LKneePitch' must be a text, got 3"),
+        (["LKneePitch"], r"joint_names must be an object, got \['LKneePitch'\]"),
+        ({"LKneePitch": 3}, r"robot\.json': joint_names\.LKneePitch must be a text, got 3"),
     ],
 )
 def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object, message: str) -> None:

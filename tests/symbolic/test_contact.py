@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, centres, points
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.contact import (
     CREEP_SPEED,
     YIELD_DEPTH,
@@ -19,7 +19,7 @@ from nlp_gait.symbolic.contact import (
     solve_definite,
 )
 from nlp_gait.symbolic.lagrange import equations_of_motion
-from nlp_gait.symbolic.quantised import Controller, State, after, implicit_quantum
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6
@@ -56,7 +56,7 @@ WEIGHT_TOLERANCE = 1e-5  # a contact 1.3 mm deep has faded in but for 1e-6 of it
 @pytest.mark.parametrize("names", [*((name,) for name in TOUCHING), TOUCHING], ids="".join)
 def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> None:
     """On each contact point alone, and on all six; its weight is what the springs then carry."""
-    rods = load_biped().rods
+    rods = toe_foot_biped().rods
     q, v = SX.sym("q", 11), SX.sym("v", 11)  # stance ankle and nine angles: nothing is fixed
     found = points(rods, q[2:], q[:2])
     middles = centres(found)
@@ -71,10 +71,10 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
     ]
     kp, kd = (SX([0.0, 0.0, *[gain] * 9]) for gain in HOLD)
     control = Controller(kp, kd, SX(0))
-    aim = State(SX([0.0, 0.0, *HELD]), SX(11, 1))
+    aim = QuantisedState(SX([0.0, 0.0, *HELD]), SX(11, 1))
     ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
-    equations = implicit_quantum(motion, State(q, v), control, aim, contacts, ground, SX(11, 1), QUANTUM)
-    following = after(State(q, v), solve_definite(*equations), QUANTUM)
+    equations = implicit_quantum(motion, QuantisedState(q, v), control, aim, contacts, ground, SX(11, 1), QUANTUM)
+    following = after(QuantisedState(q, v), solve_definite(*equations), QUANTUM)
     step = ca.Function("step", [ca.vertcat(q, v)], [ca.cse(ca.vertcat(*following))])
     heights = ca.Function("heights", [q], [ca.vertcat(*(contact.height for contact in contacts))])
     start = np.concatenate([[0.0, DROP_M], HELD, np.zeros(11)])
@@ -82,7 +82,7 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
     assert np.abs(path[11:, -50:]).max() < AT_REST
     depth = -np.array(heights(path[:11, -1])).ravel()
     carried = STIFFNESS * YIELD_DEPTH * np.tanh(np.maximum(depth, 0.0) / YIELD_DEPTH)
-    assert carried.sum() == pytest.approx(load_biped().mass_kg * GRAVITY, rel=WEIGHT_TOLERANCE)
+    assert carried.sum() == pytest.approx(toe_foot_biped().mass_kg * GRAVITY, rel=WEIGHT_TOLERANCE)
 
 
 def test_friction_slows_a_sliding_mass_and_holds_it() -> None:

@@ -8,7 +8,7 @@ from casadi import SX
 
 from nlp_gait.symbolic.contact import Ground, solve_definite
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
-from nlp_gait.symbolic.quantised import Controller, State, after, implicit_quantum
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, implicit_quantum
 
 QUANTUM = 0.01
 
@@ -17,7 +17,7 @@ QUANTUM = 0.01
 def test_a_free_link_keeps_its_rate_unless_it_turns_by_a_radian_in_a_quantum(rate: float, kept: float) -> None:
     motion = EquationsOfMotion(SX(0.3), SX(0.0), SX(0.0))
     nothing, ground = Controller(SX(0), SX(0), SX(0)), Ground(SX(0), SX(0), SX(0))
-    state = State(SX(0.2), SX(rate))
+    state = QuantisedState(SX(0.2), SX(rate))
     equations = implicit_quantum(motion, state, nothing, state, [], ground, SX(0), QUANTUM)
     following = after(state, solve_definite(*equations), QUANTUM)
     assert float(ca.evalf(following.v)) / rate == pytest.approx(kept, rel=1e-6)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from nlp_gait.symbolic.splines import DEGREE, coefficient_count, finer, fitted, spline, table
+from nlp_gait.symbolic.splines import DEGREE, basis_table, coefficient_count, finer, fitted, spline
 
 # The third derivative of 16 spans reaches 1e5; double precision leaves 1e-11 of it.
 TOLERANCE, DERIVATIVE_SHARE = 1e-12, 1e-11
@@ -31,7 +31,7 @@ def scipy_spline(coefficients: np.ndarray) -> BSpline:
 def test_derivatives_are_those_of_scipy(spans: int, order: int) -> None:
     coefficients = np.random.default_rng(spans).normal(size=coefficient_count(spans))
     expected = scipy_spline(coefficients)(PHASES, nu=order)
-    got = table(spans, PHASES, order).T @ coefficients
+    got = basis_table(spans, PHASES, order).T @ coefficients
     np.testing.assert_allclose(got, expected, rtol=0, atol=DERIVATIVE_SHARE * np.abs(expected).max())
 
 
@@ -52,8 +52,8 @@ def test_a_motion_is_a_spline_in_time(spans: int) -> None:
 def test_ends_and_their_velocities_stay(spans: int) -> None:
     ends = np.array([0.0, 1.0])
     for order in (0, 1):
-        assert np.abs(table(spans, ends, order)).max() == 0.0
-    assert np.abs(table(spans, ends, 2)).max() > 1.0
+        assert np.abs(basis_table(spans, ends, order)).max() == 0.0
+    assert np.abs(basis_table(spans, ends, 2)).max() > 1.0
 
 
 def test_no_coefficients_are_no_motion() -> None:
@@ -67,7 +67,7 @@ def test_every_spline_is_one_with_more_spans_whose_coefficients_are_averages(see
     more = finer(coefficients, times * spans)
     assert more.shape == (coefficient_count(times * spans), 2)
     np.testing.assert_allclose(
-        table(times * spans, PHASES).T @ more, table(spans, PHASES).T @ coefficients, rtol=0, atol=TOLERANCE
+        basis_table(times * spans, PHASES).T @ more, basis_table(spans, PHASES).T @ coefficients, rtol=0, atol=TOLERANCE
     )
     assert np.abs(more).max() <= np.abs(coefficients).max() + TOLERANCE
 

@@ -14,7 +14,7 @@ from compare.papers.stairs.paper import TABLE_4
 from compare.papers.stairs.runs import best_track, complete, plan_problem, tracked
 from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import SETBACK
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str)
 def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
     figure = new_figure()
     axes = figure.subplots()
-    foot = load_biped().foot_m
+    foot = toe_foot_biped().foot_m
     axes.axhspan(0.0, foot, color="0.9", label="stance foot")
     for case, arrays in followed.items():
         (line,) = axes.plot(arrays["t"], arrays["zmp"], label=f"case {case}")

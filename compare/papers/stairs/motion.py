@@ -11,10 +11,9 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.gait import Foot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
-from nlp_gait.problems.stairs.formulas.profile import Stair
-from nlp_gait.problems.stairs.governing import GOVERNING, plan_of
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.formulas.gait import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
+from nlp_gait.problems.stairs.governing import GOVERNING, stair_plan
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY
 
 
@@ -82,9 +81,9 @@ def _motion(plan: Mapping[str, float], tread: float, rise: float, times: Array) 
 @cache
 def _function() -> ca.Function:
     s, given = SX.sym("s", 4), SX.sym("given", len(GOVERNING) + 2)
-    plan, stair = plan_of(given[:-2]), Stair(given[-2], given[-1])
-    robot = load_biped()
-    foot = Foot(robot.sole_m, robot.toe_m)
+    plan, stair = stair_plan(given[:-2]), Stair(given[-2], given[-1])
+    robot = toe_foot_biped()
+    foot = ToeFoot(robot.sole_m, robot.toe_m)
     landed = landed_angles(plan, s)
     outputs = [
         hip(plan, stair, GRAVITY, s),
@@ -98,7 +97,7 @@ def _function() -> ca.Function:
 
 def _leg(at_hip: Array, at_ankle: Array, sole: Array, toe: Array) -> Leg:
     """Knee by the law of cosines, bent forward; sole joint and tip of the toe from their angles."""
-    robot = load_biped()
+    robot = toe_foot_biped()
     thigh, shank = robot.link("HK").length_m, robot.link("KA").length_m
     reach = at_ankle - at_hip
     distance = np.linalg.norm(reach, axis=1)

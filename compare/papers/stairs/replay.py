@@ -12,7 +12,7 @@ from casadi import MX, SX
 from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.loads import MOVING, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import biped_dynamics
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY
 
 STEP_S = 1e-3
@@ -47,7 +47,7 @@ def replay(arrays: Mapping[str, Array], gains: tuple[float, float]) -> tuple[Arr
 def _step() -> ca.Function:
     """(state, planned angles, rates and accelerations with the time since then, gains) to the state a step later."""
     q, v, planned, gains = SX.sym("q", N), SX.sym("v", N), SX.sym("planned", 3 * N + 1), SX.sym("gains", 2)
-    motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, link_angles(q))
+    motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, link_angles(q))
     dynamics = ca.Function("dynamics", [q, v], ca.cse([motion.M, motion.C @ v + motion.G]))
     q0, v0, a, time = ca.vertsplit(planned, [0, N, 2 * N, 3 * N, 3 * N + 1])
     now_q, now_v = q0 + v0 * time + a * time**2 / 2, v0 + a * time

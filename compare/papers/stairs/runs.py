@@ -18,9 +18,8 @@ from nlp_gait import IpoptSettings, compile_objective, load, solve
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.stairs.closed_loop import InverseKinematics
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.learned_path import LEGS
-from nlp_gait.problems.stairs.network import NetworkSettings, network_angles
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.network import LEGS, NetworkSettings, network_angles
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import PAPER_TIMES
 from nlp_gait.problems.stairs.track import PLAN
 
@@ -137,7 +136,7 @@ def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
     tread = TABLE_4[case].stair_length_m / 2
     times = np.linspace(0.0, plan["t3_s"], 351)
     q, hip_to_ankle = swing_leg(plan, tread, tread * TABLE_4[case].rise_run_ratio, times)
-    robot = load_biped()
+    robot = toe_foot_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
     rules = {
         "adam": NetworkSettings(),

@@ -13,7 +13,7 @@ from compare.papers.walk12.runs import Run, best_by_ipopt, judged, walk, weighte
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp
-from nlp_gait.problems.walk12.robot import load_biped
+from nlp_gait.problems.walk12.robot import point_mass_biped
 
 CORNER_M = 0.13
 STEP_M = 1e-4
@@ -27,7 +27,7 @@ def errata() -> Run:
         "stable": [_stable(row.x) for row in TABLE_3],
         "corner_slopes": _corner_slopes(),
         "corner_start": _from_corner(),
-        "hip_miss_m": _hip_miss(load_biped().leg_m - 2 * CORNER_M),
+        "hip_miss_m": _hip_miss(point_mass_biped().leg_m - 2 * CORNER_M),
     }
 
 
@@ -39,7 +39,7 @@ def _f1_of_table_3(reading: Zmp) -> list[float]:
 
 def _stable(x: tuple[float, ...]) -> Run:
     """Share of the step in which (8) holds, and the first and the last such time."""
-    robot = load_biped()
+    robot = point_mass_biped()
     arrays = locomotion(robot, np.array(x), steps=1, intervals=1000).arrays
     zmp_x, zmp_y = arrays["zmp_foot"].T
     inside = (-robot.foot_back_m <= zmp_x) & (zmp_x <= robot.foot_front_m) & (np.abs(zmp_y) <= robot.foot_width_m / 2)
@@ -71,7 +71,7 @@ def _hip_miss(distance: float) -> float:
     (2) takes theta_B, the complement of the angle at the ankle, from an arccosine that is never negative; below
     sqrt(d1^2 - d2^2) that angle exceeds a right one.
     """
-    robot = load_biped()
+    robot = point_mass_biped()
     d1, d2 = robot.thigh_m, robot.shank_m
     theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
     ankle = math.pi / 2 - math.acos(d1 * math.sin(theta_a) / distance)

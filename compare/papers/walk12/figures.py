@@ -10,7 +10,7 @@ import numpy as np
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.papers.walk12.runs import GA, Run
 from nlp_gait.problems.walk12.locomotion import locomotion
-from nlp_gait.problems.walk12.robot import PointMassBiped, load_biped
+from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +53,7 @@ def angles_figure(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 1
         figure = new_figure(6.3, 5.2)
         grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
         for label, x in gaits.items():
-            arrays = locomotion(load_biped(), np.array(x), steps=steps, intervals=40).arrays
+            arrays = locomotion(point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
             for row, pair in zip(grid, pairs, strict=True):
                 for axes, joint in zip(row, pair, strict=True):
                     degrees = np.degrees(arrays["q"][:, joint - 1])
@@ -70,7 +70,7 @@ def angles_figure(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 1
 
 def zmp_figure(gaits: Gaits) -> Figure:
     """Figs. 12 to 17: the ZMP over one step, in the plane of the sole and over time."""
-    robot = load_biped()
+    robot = point_mass_biped()
     with style():
         figure = new_figure(6.3, 3.0)
         plane, time = figure.subplots(1, 2)
@@ -132,7 +132,7 @@ def tradeoff_figure(front: Sequence[Run], weighted: Sequence[Run]) -> Figure:
 
 def circle_figure(x: Sequence[float], turn_rad: float) -> Figure:
     """Footprints and the waist's path over one full circle, seen from above."""
-    robot = load_biped()
+    robot = point_mass_biped()
     steps = int(np.ceil(2 * np.pi / turn_rad))
     arrays = locomotion(robot, np.array(x), steps=steps, intervals=20, turn_rad=turn_rad).arrays
     with style():

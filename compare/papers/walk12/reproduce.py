@@ -31,7 +31,7 @@ from compare.papers.walk12.tables import MODEL, PAPER, Findings
 from compare.study.steps import Steps, fingerprint
 from nlp_gait.files import writable_folder
 from nlp_gait.problems.walk12.locomotion import JOINTS, locomotion
-from nlp_gait.problems.walk12.robot import load_biped
+from nlp_gait.problems.walk12.robot import point_mass_biped
 
 TURN_RAD = math.radians(8.0)  # the largest that the paper allows
 TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
@@ -96,7 +96,7 @@ def _trajectories(folder: Path, findings: Findings) -> None:
     """Two steps of IPOPT's gaits as CSV: straight, and on a circle."""
     for name, weight, turn in (("walk-straight", 0.15, 0.0), ("walk-circle", TURNING_WEIGHT, TURN_RAD)):
         x = np.array(findings.runs(PAPER, weight)["ipopt"]["x"])
-        arrays = locomotion(load_biped(), x, intervals=50, turn_rad=turn).arrays
+        arrays = locomotion(point_mass_biped(), x, intervals=50, turn_rad=turn).arrays
         header = ["t_s", *(f"{joint}_rad" for joint in JOINTS), "zmp_x_m", "zmp_y_m", "left_stance"]
         table = np.column_stack([arrays[name] for name in ("t", "q", "zmp", "left_stance")])
         write_csv(folder / f"{name}.csv", header, table.tolist())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.questions.certainty.multistart import Ends
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from nlp_gait.problem import GaitProblem
 
 # Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this part of

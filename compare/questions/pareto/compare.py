@@ -11,7 +11,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from compare.study.progress import Progress, unwatched
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE

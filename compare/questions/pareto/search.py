@@ -14,7 +14,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from metaheuristics.multi_objective import MultiObjective, minimize_many
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.problem import GaitProblem

@@ -12,19 +12,19 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Point
+from nlp_gait.problems.stairs.formulas.gait import Stair, stair_height
 from nlp_gait.problems.stairs.formulas.loads import LEAST_LOAD, link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
-from nlp_gait.problems.stairs.learned_path import learned
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.problems.stairs.network import learned
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
     Controller,
-    State,
+    QuantisedState,
     after,
     controller_torque,
     explicit_quantum,
@@ -38,8 +38,8 @@ EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
 CONTACTS = ("T", "S", "A", "S'", "T'")
 N = len(LINKS)
-# What a quantum is given beside the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
-# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated by it.
+# What a quantum is given besides the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated with respect to it.
 GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
 TORSO = LINKS.index("UH")
 
@@ -116,11 +116,11 @@ class ClosedLoop:
             "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
         )
 
-    def _equations(self, state: State, parts: Mapping[str, Any]) -> Equations:
+    def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Of the acceleration within one quantum."""
         q, v = state
-        found = points(load_biped().rods, q, SX(2, 1))
-        motion = biped_dynamics(load_biped().rods, GRAVITY, q, v, q)
+        found = points(toe_foot_biped().rods, q, SX(2, 1))
+        motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, q)
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
@@ -140,9 +140,9 @@ class ClosedLoop:
     def _outcome(self) -> ca.Function:
         """(state, next state, given, tuned, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
-        following = State(SX.sym("q_next", N), SX.sym("v_next", N))
+        following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         slope = SX.sym("slope")
-        rods = load_biped().rods
+        rods = toe_foot_biped().rods
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
         acted = following if self.scheme == "implicit" else state
         torque = controller_torque(parts["control"], parts["desired"], acted, G)
@@ -157,7 +157,7 @@ class ClosedLoop:
             weight += rod.mass * (a[1] + GRAVITY)
             pull += rod.mass * a[0]
             moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
-        least = LEAST_LOAD * load_biped().mass_kg * GRAVITY
+        least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
         zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",
@@ -166,8 +166,8 @@ class ClosedLoop:
             {"is_diff_in": [True, True, False, True, False]},
         )
 
-    def _symbols(self) -> tuple[State, list[SX], dict[str, Any]]:
-        """State, the inputs given and tuned, and what they hold by name, with controller and desired state."""
+    def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
+        """QuantisedState, the inputs given and tuned, and what they hold by name, with controller and desired state."""
         given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
         ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
         parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
@@ -175,16 +175,18 @@ class ClosedLoop:
         each = N // self.gains
         aim = parts.pop("aim")
         parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), parts.pop("gravity_share"))
-        parts["desired"] = State(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
-        return State(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
+        parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
+        return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
 def _desired(ops: Nonsmooth) -> ca.Function:
     """(time, governing parameters with stair and reach margin) to the desired angles and rates (18,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
-    plan = plan_of(values)
-    step = posture(load_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops)
+    plan = stair_plan(values)
+    step = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
+    )
     given = ca.vertcat(values, size, margin)
     pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
     time = SX.sym("time")

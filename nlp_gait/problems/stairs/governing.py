@@ -3,142 +3,40 @@
 from __future__ import annotations
 
 import math
+from math import inf
 
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem import Parameter, Point, Variable
+from nlp_gait.problem import Point, Variable, parameters
 from nlp_gait.problems.stairs.formulas.gait import StairPlan
 from nlp_gait.problems.stairs.stair import within
 
-# Beyond minimum and maximum a plan is none, and its numbers may overflow.
-GOVERNING_VARIABLES = (
-    Variable(
-        name="hip_height_m",
-        unit="m",
-        lower=0.5,
-        upper=0.8,
-        description="z_Ci, above the rear ankle at the start",
-        minimum=0.1,
-        maximum=2.0,
-    ),
-    Variable(
-        name="hip_start_m",
-        unit="m",
-        lower=-0.1,
-        upper=0.25,
-        description="hip ahead of the rear ankle at the start",
-        minimum=-2.0,
-        maximum=2.0,
-    ),
-    Variable(
-        name="zmp_start_m",
-        unit="m",
-        lower=-0.1,
-        upper=0.4,
-        description="planned ZMP ahead of the rear ankle",
-        minimum=-2.0,
-        maximum=2.0,
-    ),
-    Variable(
-        name="zmp_end_m",
-        unit="m",
-        lower=-0.3,
-        upper=0.4,
-        description="planned ZMP ahead of the stance ankle",
-        minimum=-2.0,
-        maximum=2.0,
-    ),
-    Variable(
-        name="end_rate_rad_s",
-        unit="rad/s",
-        lower=0.0,
-        upper=3.0,
-        description="rate of the cycloid's angle at t3",
-        minimum=-20.0,
-        maximum=20.0,
-    ),
-    Variable(
-        name="torso_pitch_rad",
-        unit="rad",
-        lower=0.8,
-        upper=1.75,
-        description="q5, from the forward axis",
-        minimum=-3.2,
-        maximum=3.2,
-    ),
-    Variable(
-        name="t1_s",
-        unit="s",
-        lower=0.2,
-        upper=1.0,
-        description="t1, end of the heel's rise",
-        minimum=0.0,
-        maximum=20.0,
-    ),
-    Variable(
-        name="t2_s",
-        unit="s",
-        lower=0.6,
-        upper=2.0,
-        description="t2, end of the double support",
-        minimum=0.0,
-        maximum=20.0,
-    ),
-    Variable(
-        name="t_bc_s",
-        unit="s",
-        lower=1.0,
-        upper=3.2,
-        description="t_bc, the cycloid is caught",
-        minimum=0.0,
-        maximum=20.0,
-    ),
-    Variable(
-        name="foot_pitch_rad",
-        unit="rad",
-        lower=0.0,
-        upper=0.6,
-        description="upward pitch of the foot in the air",
-        minimum=-1.6,
-        maximum=1.6,
-    ),
+# Name, unit, description; bounds; minimum and maximum, beyond which no plan makes sense and numbers may overflow.
+_TABLE = (
+    ("hip_height_m", "m", "z_Ci, above the rear ankle at the start", (0.5, 0.8), (0.1, 2.0)),
+    ("hip_start_m", "m", "hip ahead of the rear ankle at the start", (-0.1, 0.25), (-2.0, 2.0)),
+    ("zmp_start_m", "m", "planned ZMP ahead of the rear ankle", (-0.1, 0.4), (-2.0, 2.0)),
+    ("zmp_end_m", "m", "planned ZMP ahead of the stance ankle", (-0.3, 0.4), (-2.0, 2.0)),
+    ("end_rate_rad_s", "rad/s", "rate of the cycloid's angle at t3", (0.0, 3.0), (-20.0, 20.0)),
+    ("torso_pitch_rad", "rad", "q5, from the forward axis", (0.8, 1.75), (-3.2, 3.2)),
+    ("t1_s", "s", "t1, end of the heel's rise", (0.2, 1.0), (0.0, 20.0)),
+    ("t2_s", "s", "t2, end of the double support", (0.6, 2.0), (0.0, 20.0)),
+    ("t_bc_s", "s", "t_bc, the cycloid is caught", (1.0, 3.2), (0.0, 20.0)),
+    ("foot_pitch_rad", "rad", "upward pitch of the foot in the air", (0.0, 0.6), (-1.6, 1.6)),
 )
-GIVEN_PARAMETERS = (  # Table III
-    Parameter(name="t3_s", unit="s", default=3.5, description="t3, end of the step", minimum=0.5),
-    Parameter(
-        name="sole_angle_rad",
-        unit="rad",
-        default=math.pi / 6,
-        description="theta_a, largest angle of the rear sole",
-        minimum=0.0,
-        maximum=1.2,
-    ),
-    Parameter(
-        name="toe_angle_rad",
-        unit="rad",
-        default=math.pi / 6,
-        description="theta_b, angle of the rear toe as it lifts",
-        minimum=0.0,
-        maximum=1.2,
-    ),
-    Parameter(
-        name="catch_angle_rad",
-        unit="rad",
-        default=0.01,
-        description="Delta theta_c0, half of what the bridge covers on the cycloid",
-        minimum=1e-4,
-        maximum=0.5,
-    ),
+GOVERNING_VARIABLES = tuple(
+    Variable(name=name, unit=unit, lower=lower, upper=upper, description=text, minimum=minimum, maximum=maximum)
+    for name, unit, text, (lower, upper), (minimum, maximum) in _TABLE
 )
-REACH_MARGIN = Parameter(
-    name="reach_margin",
-    unit="1",
-    default=0.005,
-    description="knees keep 1 - cos(knee) above this: 0.1 rad",
-    minimum=1e-6,
-    maximum=0.5,
+GIVEN_PARAMETERS = parameters(  # Table III
+    ("t3_s", "s", 3.5, "t3, end of the step", 0.5, inf),
+    ("sole_angle_rad", "rad", math.pi / 6, "theta_a, largest angle of the rear sole", 0.0, 1.2),
+    ("toe_angle_rad", "rad", math.pi / 6, "theta_b, angle of the rear toe as it lifts", 0.0, 1.2),
+    ("catch_angle_rad", "rad", 0.01, "Delta theta_c0, half of what the bridge covers on the cycloid", 1e-4, 0.5),
 )
+# Row of a table of parameters.
+REACH_MARGIN = ("reach_margin", "1", 0.005, "knees keep 1 - cos(knee) above this: 0.1 rad", 1e-6, 0.5)
 # In the order of StairPlan's fields.
 GOVERNING = (*(variable.name for variable in GOVERNING_VARIABLES), *(parameter.name for parameter in GIVEN_PARAMETERS))
 
@@ -149,6 +47,6 @@ def governing(point: Point) -> MX:
     return ca.vertcat(*variables, *(point[parameter.name] for parameter in GIVEN_PARAMETERS))
 
 
-def plan_of(values: SX) -> StairPlan:
+def stair_plan(values: SX) -> StairPlan:
     """Plan from its governing parameters (14,)."""
     return StairPlan(*ca.vertsplit(values))

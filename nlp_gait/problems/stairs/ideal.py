@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from math import inf
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Parameter, Signals, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker, parameters
 from nlp_gait.problem.blocks import Block, Layout
+from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
+from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.ideal_model import IdealModel
-from nlp_gait.problems.stairs.ideal_start import planned_angles
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
-from nlp_gait.problems.stairs.stair import ANGLE_LIMITS, COLUMNS, STAIR_PARAMETERS, joint_signals
+from nlp_gait.problems.stairs.stair import (
+    ANGLE_LIMITS,
+    COLUMNS,
+    GRAVITY,
+    LEAST_STANCE_FORCE,
+    PAPER_TIMES,
+    STAIR_PARAMETERS,
+    joint_signals,
+)
+from nlp_gait.symbolic.nonsmooth import Exact
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
@@ -21,44 +36,22 @@ FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of th
 SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
 # A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
+# A plan whose legs reach on common stairs; it need be neither optimal nor balanced.
+HIP_HEIGHT, ZMP_START, ZMP_END, END_RATE, TORSO_PITCH = 0.66, 0.18, 0.05, 2.0, 1.35
+HIP_BEHIND = 0.08  # the hip starts so far behind the middle of the rear tread [m]
+REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stretched leg
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
-    Parameter(name="step_time_s", unit="s", default=3.5, description="t3, time of the step", minimum=0.1),
-    Parameter(
-        name="torque_weight", unit="1/(N m)^2/s", default=0.01, description="cost of squared torque", minimum=0.0
-    ),
-    Parameter(
-        name="acceleration_weight",
-        unit="s^3/rad^2",
-        default=1e-3,
-        description="cost of squared link acceleration",
-        minimum=0.0,
-    ),
-    Parameter(name="friction", unit="1", default=0.6, description="mu below the rear foot", minimum=0.0),
-    Parameter(
-        name="stance_friction",
-        unit="1",
-        default=10.0,
-        description="mu below the stance foot; the default does not bind",
-        minimum=0.0,
-    ),
-    Parameter(
-        name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
-    ),
-    Parameter(
-        name="zmp_margin_m",
-        unit="m",
-        default=0.0,
-        description="least distance of the stance foot's ZMP from its ends",
-        minimum=0.0,
-        maximum=0.08,
-    ),
-    Parameter(
-        name="clearance_m",
-        unit="m",
-        default=-0.002,
-        description="least height of foot points above the smoothed stair",
+    *parameters(
+        ("step_time_s", "s", 3.5, "t3, time of the step", 0.1, inf),
+        ("torque_weight", "1/(N m)^2/s", 0.01, "cost of squared torque", 0.0, inf),
+        ("acceleration_weight", "s^3/rad^2", 1e-3, "cost of squared link acceleration", 0.0, inf),
+        ("friction", "1", 0.6, "mu below the rear foot", 0.0, inf),
+        ("stance_friction", "1", 10.0, "mu below the stance foot; the default does not bind", 0.0, inf),
+        LEAST_STANCE_FORCE,
+        ("zmp_margin_m", "m", 0.0, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
+        ("clearance_m", "m", -0.002, "least height of foot points above the smoothed stair", -inf, inf),
     ),
 )
 
@@ -79,7 +72,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
     Source:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
     """
-    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 10:
+    if intervals < 10:
         raise InputError(f"intervals must be a whole number >= 10, got {intervals!r}")
     sole_off, toe_off = round(SOLE_SHARE * intervals), round(TOE_SHARE * intervals)
     layout = _layout(intervals, sole_off, toe_off)
@@ -127,7 +120,11 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
 
 def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
     """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
-    links = len(MOVING)
+
+    def of_links(
+        quantity: str, unit: str, columns: int, limits: tuple[tuple[float, float], ...], description: str
+    ) -> Block:
+        return Block(quantity=quantity, unit=unit, rows=MOVING, columns=columns, limits=limits, description=description)
 
     def force(point: str, columns: int) -> Block:
         return Block(
@@ -139,32 +136,14 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
             description=f"force of the ground on the rear {point} along",
         )
 
+    angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
+    rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
+    accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
     return Layout(
         blocks=(
-            Block(
-                quantity="angle",
-                unit="rad",
-                rows=MOVING,
-                columns=intervals + 1,
-                limits=tuple(ANGLE_LIMITS[link] for link in MOVING),
-                description="absolute angle of link",
-            ),
-            Block(
-                quantity="rate",
-                unit="rad/s",
-                rows=MOVING,
-                columns=intervals + 1,
-                limits=((-RATE_LIMIT, RATE_LIMIT),) * links,
-                description="rate of link",
-            ),
-            Block(
-                quantity="acceleration",
-                unit="rad/s^2",
-                rows=MOVING,
-                columns=intervals,
-                limits=((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * links,
-                description="acceleration of link",
-            ),
+            of_links("angle", "rad", intervals + 1, angles, "absolute angle of link"),
+            of_links("rate", "rad/s", intervals + 1, rates, "rate of link"),
+            of_links("acceleration", "rad/s^2", intervals, accelerations, "acceleration of link"),
             force("toe", toe_off),
             force("sole", sole_off),
         )
@@ -174,7 +153,7 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
 def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Planned angles with noise, rates and accelerations by differences, a share of the weight behind."""
     tread = values["stair_length_m"] / 2
-    angle = planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
+    angle = _planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
     angle += NOISE * rng.standard_normal(angle.shape)
     step = values["step_time_s"] / intervals
     rate = np.gradient(angle, step, axis=1)
@@ -188,3 +167,44 @@ def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.
             "sole_force": np.tile([[0.0], [SOLE_LOAD]], blocks["sole_force"].columns),
         }
     )
+
+
+def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
+    """(7, intervals + 1) link angles of a plausible step at equidistant times [rad].
+
+    Args:
+        tread: of one step [m].
+        rise: of one step [m].
+        intervals: equal parts of the step.
+    """
+    ends = np.array([0.0, *PAPER_TIMES])
+    times = np.linspace(0.0, ends[-1], intervals + 1)
+    fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
+    return np.array(_angles().map(intervals + 1)(np.tile([[tread], [rise]], intervals + 1), fractions))
+
+
+@cache
+def _angles() -> ca.Function:
+    """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
+    size, s = SX.sym("size", 2), SX.sym("s", 4)
+    t1, t2, t_bc, t3 = PAPER_TIMES
+    plan = StairPlan(
+        hip_height=SX(HIP_HEIGHT),
+        hip_start=size[0] / 2 - HIP_BEHIND,
+        zmp_start=SX(ZMP_START),
+        zmp_end=SX(ZMP_END),
+        end_rate=SX(END_RATE),
+        torso_pitch=SX(TORSO_PITCH),
+        t1=SX(t1),
+        t2=SX(t2),
+        t_bc=SX(t_bc),
+        foot_pitch=SX(0),
+        t3=SX(t3),
+        sole_angle=SX(np.pi / 6),
+        toe_angle=SX(np.pi / 6),
+        catch_angle=SX(0.01),
+    )
+    found = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
+    )
+    return ca.Function("angles", [size, s], [found.q.position])

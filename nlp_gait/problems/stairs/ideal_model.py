@@ -12,12 +12,12 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Assembly, Constraint, Point
-from nlp_gait.problem.blocks import Layout, labels
-from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, Loads, link_angles, loads
+from nlp_gait.problem.blocks import Layout
+from nlp_gait.problems.stairs.formulas.gait import Stair, stair_height
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, StanceLoads, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.robot import load_biped
-from nlp_gait.problems.stairs.stair import GRAVITY, KNEE_LIMITS, KNEES, SETBACK, knee_angles, stair_of
+from nlp_gait.problems.stairs.robot import toe_foot_biped
+from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, rows, stair_of, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
@@ -63,8 +63,12 @@ class IdealModel:
             constraints=(
                 *self._motion(x, step),
                 *self._feet(x, point),
-                *self._ground(x, stance, pressure, point),
-                _limits("knee", knee_angles(x["angle"]), tuple(KNEES), range(self.intervals + 1), KNEE_LIMITS),
+                grip("friction_toe", x["toe_force"], point["friction"]),
+                grip("friction_sole", x["sole_force"], point["friction"]),
+                grip("friction_stance", stance, point["stance_friction"]),
+                stance_load(point, stance),
+                stance_zmp(point, pressure),
+                knee_limits("knee", x["angle"]),
             ),
             indexes={
                 "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
@@ -73,27 +77,27 @@ class IdealModel:
             },
         )
 
-    def loads_at(self, values: Mapping[str, Array]) -> Loads[Array]:
+    def loads_at(self, values: Mapping[str, Array]) -> StanceLoads[Array]:
         """Torques, stance force and its centre of pressure in every interval, from numbers: columns are intervals."""
         symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
-        return Loads(*(np.array(ca.evalf(part)) for part in symbolic))
+        return StanceLoads(*(np.array(ca.evalf(part)) for part in symbolic))
 
-    def _loads(self, x: Mapping[str, MX]) -> Loads[MX]:
+    def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
         n = self.intervals
         toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
-        return Loads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
+        return StanceLoads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
     @cached_property
     def _interval(self) -> ca.Function:
         q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
         toe, sole = SX.sym("toe", 2), SX.sym("sole", 2)
-        found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
+        found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
         return ca.Function("loads", [q, qd, qdd, toe, sole], ca.cse(list(found)))
 
     @cached_property
     def _instant(self) -> ca.Function:
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = points(load_biped().rods, link_angles(q), SX(2, 1))
+        found = points(toe_foot_biped().rods, link_angles(q), SX(2, 1))
         swing = [found[name] for name in "TSA"]
         stair = Stair(size[0], size[1])
         heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in swing]
@@ -122,20 +126,13 @@ class IdealModel:
         q = x["angle"]
         places = Places(*self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1)))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(load_biped().foot_m, 0) - size, 1, lift)
+        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(places.ankle[:, 0] + size, places.ankle[:, n] - size)
         advance = places.hip[:, n] - places.hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
-        def above(name: str, heights: MX, rows: tuple[str, ...], instants: range) -> Constraint:
-            return Constraint(
-                name=name,
-                labels=labels(rows, instants),
-                unit="m",
-                scale=0.01,
-                value=ca.vec(heights),
-                lower=point["clearance_m"],
-            )
+        def above(name: str, heights: MX, points: tuple[str, ...], instants: range) -> Constraint:
+            return rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
 
         return (
             _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
@@ -147,63 +144,9 @@ class IdealModel:
             above("clearance_in_swing", places.heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
         )
 
-    def _ground(self, x: Mapping[str, MX], stance: MX, pressure: MX, point: Point) -> tuple[Constraint, ...]:
-        """Friction, load and centre of pressure."""
-        intervals = range(self.intervals)
-        margin = point["zmp_margin_m"]
-        return (
-            _friction("friction_toe", x["toe_force"], point["friction"]),
-            _friction("friction_sole", x["sole_force"], point["friction"]),
-            _friction("friction_stance", stance, point["stance_friction"]),
-            Constraint(
-                name="stance_load",
-                labels=labels(("z",), intervals),
-                unit="N",
-                scale=100.0,
-                value=stance[1, :].T,
-                lower=point["least_stance_force_N"],
-            ),
-            Constraint(
-                name="stance_zmp",
-                labels=labels(("x",), intervals),
-                unit="m",
-                scale=0.01,
-                value=pressure.T,
-                lower=margin,
-                upper=load_biped().foot_m - margin,
-            ),
-        )
-
 
 def _equal(
-    name: str, value: MX, rows: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
+    name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
 ) -> Constraint:
     """Rows value == 0."""
-    return Constraint(
-        name=name, labels=labels(rows, columns), unit=unit, scale=scale, value=ca.vec(value), lower=MX(0), upper=MX(0)
-    )
-
-
-def _limits(name: str, value: MX, rows: tuple[str, ...], columns: range, limits: tuple[float, float]) -> Constraint:
-    return Constraint(
-        name=name,
-        labels=labels(rows, columns),
-        unit="rad",
-        scale=0.1,
-        value=ca.vec(value),
-        lower=MX(limits[0]),
-        upper=MX(limits[1]),
-    )
-
-
-def _friction(name: str, force: MX, coefficient: MX) -> Constraint:
-    """|F_x| <= mu F_z as two rows."""
-    grip = coefficient * force[1, :]
-    return Constraint(
-        name=name,
-        labels=labels(("forward", "backward"), range(force.shape[1])),
-        unit="N",
-        scale=100.0,
-        value=ca.vec(ca.vertcat(grip - force[0, :], grip + force[0, :])),
-        lower=MX(0),
-    )
+    return rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)

@@ -9,11 +9,13 @@ from typing import Literal, NamedTuple, get_args
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.leg_network import network_error
+from nlp_gait.problems.stairs.formulas.leg_network import leg_rates, leg_vector, network_error, trained_path
+from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 
 Rule = Literal["gradient", "adam"]
 # Decay rates of Adam's two moments and its guard against division by zero (Kingma, Ba 2015).
@@ -43,7 +45,7 @@ class NetworkSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot train."""
+        """Refuse settings with which nothing can be trained."""
         if self.rule not in get_args(Rule):
             raise InputError(f"rule must be one of {', '.join(get_args(Rule))}, got {self.rule!r}")
         if self.hidden < 1 or self.iterations < 1:
@@ -57,6 +59,12 @@ class NetworkSettings:
         rng = np.random.default_rng(self.seed)
         inner, outer = rng.standard_normal((self.hidden, 2)), rng.standard_normal((2, self.hidden))
         return np.concatenate([inner.ravel(order="F"), outer.ravel(order="F")])
+
+
+# Gradient steps, as printed, at a rate with which every pose of the three planned steps converges within 40 of them; the
+# printed 5,000 would take a minute for each rollout, as all of them are counted.
+ONLINE = NetworkSettings(rule="gradient", rate=0.3, iterations=100)
+LEGS = (("HK", "KA"), ("HK'", "K'A'"))
 
 
 class NetworkPath(NamedTuple):
@@ -92,7 +100,7 @@ def network_angles(
     settings = settings or NetworkSettings()
     training = _training(settings.hidden, thigh, shank)
     weights = settings.first_weights
-    step = _Adam(settings.rate) if settings.rule == "adam" else _Gradient(settings.rate)
+    step = _Adam(settings.rate) if settings.rule == "adam" else lambda gradient: settings.rate * gradient
     rows = []
     for target in hip_to_ankle:
         started = time.perf_counter()
@@ -105,22 +113,36 @@ def network_angles(
     return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
+def learned(desired: MX) -> MX:
+    """Desired angles and rates (18, m) of all links along a path, those of thighs and shanks by the network.
+
+    The network learns where the ankle is from the hip; rates follow by differentiating its forward kinematics. It is trained
+    anew, pose after pose, in every evaluation: the paper trains online.
+    """
+    columns = desired.shape[1]
+    rows = ca.vertsplit(desired)
+    for thigh, shank in LEGS:
+        lengths = toe_foot_biped().link(thigh).length_m, toe_foot_biped().link(shank).length_m
+        at = [LINKS.index(thigh), LINKS.index(shank)]
+        at += [len(LINKS) + i for i in at]
+        q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)
+        reached = leg_vector(q, *lengths)
+        follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
+        rates = ca.Function("rates", [q, velocity], [leg_rates(q, velocity, *lengths)]).map(columns)
+        train = trained_path(ONLINE.hidden, *lengths, columns, ONLINE.rate, ONLINE.iterations, ONLINE.tolerance_m2)
+        targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
+        angles = train(DM(ONLINE.first_weights), targets)
+        for i, row in zip(at, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
+            rows[i] = row
+    return ca.vertcat(*rows)
+
+
 @cache
 def _training(nodes: int, thigh: float, shank: float) -> ca.Function:
     """(weights, target) to the angles, the error and its gradient by the weights."""
     weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
     angles, error = network_error(weights, target, thigh, shank)
     return ca.Function("training", [weights, target], ca.cse([angles, error, ca.gradient(error, weights)]))
-
-
-class _Gradient:
-    """Plain gradient step."""
-
-    def __init__(self, rate: float) -> None:
-        self._rate = rate
-
-    def __call__(self, gradient: Array) -> Array:
-        return self._rate * gradient
 
 
 class _Adam:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Literal
 
 import casadi as ca
@@ -13,24 +14,35 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import (
     Array,
     Assembly,
+    Constraint,
     GaitProblem,
     Grid,
     NumericPoint,
     Objective,
-    Parameter,
     Point,
     Signals,
     Variable,
     maker,
+    parameters,
 )
 from nlp_gait.problems.stairs.formulas.gait import PHASES
-from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS
+from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
-from nlp_gait.problems.stairs.plan_rows import clearance_rows, ground_rows, phase_rows, posture_rows
-from nlp_gait.problems.stairs.plan_samples import PlannedStep, Samples
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.plan_samples import PlannedStep, PlanSamples
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
-from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, joint_signals
+from nlp_gait.problems.stairs.stair import (
+    ANGLE_LIMITS,
+    COLUMNS,
+    LEAST_STANCE_FORCE,
+    STAIR_PARAMETERS,
+    grip,
+    joint_signals,
+    knee_limits,
+    rows,
+    stance_load,
+    stance_zmp,
+)
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
@@ -53,40 +65,29 @@ VARIABLES = (
 # half of all runs of IPOPT end at unreachable poses.
 PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.8, 0.35, 0.2)
 SCATTER = 0.1
+# Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
+# square of the intervals in a phase is kept in reserve [m]; a millimetre on the usual grid.
+SAMPLING_RESERVE = 0.1
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
     *GIVEN_PARAMETERS,
-    REACH_MARGIN,
-    Parameter(
-        name="zmp_margin_m",
-        unit="m",
-        default=0.01,
-        description="least distance of the stance foot's ZMP from its ends",
-        minimum=0.0,
-        maximum=0.08,
-    ),
-    Parameter(
-        name="least_stance_force_N", unit="N", default=20.0, description="least load of the stance foot", minimum=0.0
-    ),
-    Parameter(name="friction", unit="1", default=0.6, description="mu below both feet", minimum=0.0),
-    Parameter(
-        name="clearance_m", unit="m", default=0.002, description="least height of the swing foot above the stair"
-    ),
-    Parameter(
-        name="acceleration_limit_rad_s2",
-        unit="rad/s^2",
-        default=80.0,
-        description="largest acceleration of a link",
-        minimum=0.0,
-    ),
-    Parameter(name="least_phase_s", unit="s", default=0.1, description="least duration of each phase", minimum=0.0),
-    Parameter(
-        name="quantum_s",
-        unit="s",
-        default=0.01,
-        description="time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
-        minimum=1e-4,
+    *parameters(
+        REACH_MARGIN,
+        ("zmp_margin_m", "m", 0.01, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
+        LEAST_STANCE_FORCE,
+        ("friction", "1", 0.6, "mu below both feet", 0.0, inf),
+        ("clearance_m", "m", 0.002, "least height of the swing foot above the stair", -inf, inf),
+        ("acceleration_limit_rad_s2", "rad/s^2", 80.0, "largest acceleration of a link", 0.0, inf),
+        ("least_phase_s", "s", 0.1, "least duration of each phase", 0.0, inf),
+        (
+            "quantum_s",
+            "s",
+            0.01,
+            "time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
+            1e-4,
+            inf,
+        ),
     ),
 )
 
@@ -106,7 +107,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     Source:
         Bhardwaj et al., section V and Table III.
     """
-    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 4 or intervals % len(PHASES):
+    if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
     step = PlannedStep(per_phase=intervals // len(PHASES))
 
@@ -137,61 +138,61 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
 
 def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:
     samples = step.samples(point, ops)
-    jerk = _jerk(samples, step.per_phase, point["quantum_s"])
+    jerk = step.jerk(samples, point["quantum_s"])
     exact = Exact()
     pressure = samples.stance_pressure.T
     return Assembly(
-        objective=_energy(samples, step.per_phase, ops) if minimise == "energy" else ops.largest(jerk),
+        objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
-            *posture_rows(point, samples),
-            *ground_rows(point, samples),
-            clearance_rows(point, step, ops),
-            phase_rows(point),
+            *_posture_rows(point, samples),
+            stance_load(point, samples.stance_force),
+            grip("friction", samples.stance_force, point["friction"]),
+            stance_zmp(point, samples.stance_pressure),
+            _clearance(point, step, ops),
+            _phase_durations(point),
         ),
         indexes={
-            "energy_J": _energy(samples, step.per_phase, exact),
+            "energy_J": step.energy(samples, exact),
             "peak_jerk_rad_s3": exact.largest(jerk),
-            "peak_acceleration_rad_s2": exact.largest(ca.vec(_joints(samples.qdd))),
+            "peak_acceleration_rad_s2": exact.largest(ca.vec(DM(JOINT_RATES) @ samples.qdd)),
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
-            "zmp_margin_min_m": ca.mmin(exact.min(pressure, load_biped().foot_m - pressure)),
+            "zmp_margin_min_m": ca.mmin(exact.min(pressure, toe_foot_biped().foot_m - pressure)),
         },
+    )
+
+
+def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
+    """Reach, link angles, knees and accelerations at every sample."""
+    m = samples.q.shape[1]
+    lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
+    most = point["acceleration_limit_rad_s2"]
+    return (
+        rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
+        rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
+        knee_limits("knee_angle", samples.q),
+        rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
+    )
+
+
+def _clearance(point: Point, step: PlannedStep, ops: Nonsmooth) -> Constraint:
+    """Toe, sole and ankle of the swing foot above the stair while it is in the air."""
+    least = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
+    return rows("clearance", step.clearances(point, ops), ("toe", "sole", "ankle"), "m", 0.01, lower=least)
+
+
+def _phase_durations(point: Point) -> Constraint:
+    """Every phase takes time."""
+    ends = ca.vertcat(0, *(point[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s")))
+    return Constraint(
+        name="phase_duration",
+        labels=PHASES,
+        unit="s",
+        scale=0.1,
+        value=ends[1:] - ends[:-1],
+        lower=point["least_phase_s"],
     )
 
 
 def _start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
     ranges = np.array([variable.upper - variable.lower for variable in VARIABLES])
     return np.array(PLAUSIBLE) + SCATTER * ranges * rng.standard_normal(len(VARIABLES))
-
-
-def _joints(links: MX) -> MX:
-    """Derivatives of joint angles from those of link angles."""
-    return DM(JOINT_RATES) @ links
-
-
-def _energy(samples: Samples, per_phase: int, ops: Nonsmooth) -> MX:
-    """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
-    power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-    total = MX(0)
-    for first in _phase_starts(per_phase):
-        durations = samples.time[first + per_phase] - samples.time[first]
-        ends = power[:, first] + power[:, first + per_phase]
-        inner = power[:, first : first + per_phase + 1]
-        total += durations / per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
-    return total
-
-
-def _jerk(samples: Samples, per_phase: int, quantum: MX) -> MX:
-    """Joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum of time."""
-    change = _joints(samples.qdd[:, 1:] - samples.qdd[:, :-1])
-    starts = _phase_starts(per_phase)
-    columns = []
-    for k in range(change.shape[1]):
-        jump = k + 1 in starts
-        duration = quantum if jump else samples.time[k + 1] - samples.time[k]
-        columns.append(change[:, k] / duration)
-    return ca.vertcat(*columns)
-
-
-def _phase_starts(per_phase: int) -> tuple[int, ...]:
-    """Number of the first sample of each phase."""
-    return tuple(i * (per_phase + 1) for i in range(len(PHASES)))

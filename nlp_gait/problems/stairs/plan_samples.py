@@ -11,13 +11,12 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Point
-from nlp_gait.problems.stairs.formulas.gait import PHASES, StairPlan
+from nlp_gait.problems.stairs.formulas.gait import PHASES, Stair, StairPlan, stair_height
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import Posture, posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.governing import GOVERNING, governing, plan_of
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -27,7 +26,7 @@ CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1
 
 
-class Samples(NamedTuple):
+class PlanSamples(NamedTuple):
     """A step at its samples; columns are samples, both ends of each phase included.
 
     Attributes:
@@ -80,14 +79,39 @@ class PlannedStep:
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
         return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
-    def samples(self, point: Point, ops: Nonsmooth) -> Samples:
+    def samples(self, point: Point, ops: Nonsmooth) -> PlanSamples:
         """The step at all samples."""
         s, passing = self.grid
-        return Samples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
+        return PlanSamples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
 
     def clearances(self, point: Point, ops: Nonsmooth) -> MX:
         """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
         return self._mapped(clearance_function(ops), point, *self.clearance_grid)
+
+    def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
+        """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
+        power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
+        total = MX(0)
+        for first in self._phase_starts:
+            durations = samples.time[first + self.per_phase] - samples.time[first]
+            ends = power[:, first] + power[:, first + self.per_phase]
+            inner = power[:, first : first + self.per_phase + 1]
+            total += durations / self.per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
+        return total
+
+    def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
+        """Joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum of time [s]."""
+        change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
+        columns = []
+        for k in range(change.shape[1]):
+            jump = k + 1 in self._phase_starts
+            columns.append(change[:, k] / (quantum if jump else samples.time[k + 1] - samples.time[k]))
+        return ca.vertcat(*columns)
+
+    @property
+    def _phase_starts(self) -> tuple[int, ...]:
+        """Number of the first sample of each phase."""
+        return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
     def _mapped(self, function: ca.Function, point: Point, s: Array, passing: Array, *more: MX) -> MX:
         stair = stair_of(point)
@@ -110,7 +134,7 @@ def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
 
 
 def sample_function(ops: Nonsmooth) -> ca.Function:
-    """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``Samples``.
+    """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``PlanSamples``.
 
     The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
     """
@@ -119,7 +143,7 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
     s = inputs[0]
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     toe = SX.sym("toe", 2)
-    found = loads(load_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
     dynamics = ca.Function("loads", [q, qd, qdd, toe], list(found))
 
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
@@ -147,7 +171,7 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
 def clearance_function(ops: Nonsmooth) -> ca.Function:
     """Heights (3,) of toe, sole and ankle above the stair, from the inputs of ``sample_function`` but the last."""
     inputs, _, stair, step = _planned(ops)
-    found = points(load_biped().rods, link_angles(step.q.position), SX(2, 1))
+    found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
@@ -155,7 +179,7 @@ def clearance_function(ops: Nonsmooth) -> ca.Function:
 def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
-    plan, stair = plan_of(values), Stair(size[0], size[1])
+    plan, stair = stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = posture(load_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
+    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
     return [s, passing, values, size, margin], plan, stair, step

@@ -8,9 +8,10 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from nlp_gait.decoding import read_decoded
 from nlp_gait.errors import RobotDataError
-from nlp_gait.files import read_json
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, Rod
+from nlp_gait.robots.fields import check_numbers
 
 DEFAULT_FILE = resources.files("nlp_gait.problems.stairs") / "biped.json"
 
@@ -30,11 +31,8 @@ class PlanarLink:
     mass_kg: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no rod."""
-        for what in ("length_m", "mass_kg"):
-            value = getattr(self, what)
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-                raise RobotDataError(f"link {self.name!r}: {what} must be a number > 0, got {value!r}")
+        """Length and mass are positive."""
+        check_numbers(f"link {self.name!r}", self, positive=("length_m", "mass_kg"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +42,7 @@ class ToeFootBiped:
     Attributes:
         name: of the robot.
         source: of the numbers.
+        inertia: how the moments of inertia follow from them.
         links: in the order of ``planar_biped.LINKS``; both legs are alike.
 
     Source:
@@ -52,6 +51,7 @@ class ToeFootBiped:
 
     name: str
     source: str
+    inertia: str
     links: tuple[PlanarLink, ...]
 
     def __post_init__(self) -> None:
@@ -97,18 +97,10 @@ class ToeFootBiped:
 
 
 @cache
-def load_biped(file: str = "") -> ToeFootBiped:
-    """Biped from a JSON file; without one, the paper's.
+def toe_foot_biped(path: str = "") -> ToeFootBiped:
+    """Robot from a JSON file with the fields of ``ToeFootBiped``; by default that of the paper.
 
     Raises:
-        RobotDataError: the file cannot be read, or describes no such robot.
+        RobotDataError: the file cannot be read, or does not describe such a robot.
     """
-    source = Path(file) if file else DEFAULT_FILE
-    data = read_json(Path(str(source)), "robot file", error=RobotDataError)
-    try:
-        links = tuple(PlanarLink(**link) for link in data["links"])
-        return ToeFootBiped(name=data["name"], source=data["source"], links=links)
-    except (KeyError, TypeError) as error:
-        raise RobotDataError(
-            f"robot file {str(source)!r} cannot be used: {error}; it needs name, source and links with name, length_m, mass_kg"
-        ) from error
+    return read_decoded(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

@@ -13,7 +13,7 @@ from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.formulas.planar_biped import points as planar_points
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import SETBACK
 
 LINES = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
@@ -23,7 +23,7 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """The robot on its stair."""
     history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
     q = SX.sym("q", history.shape[1])
-    found = planar_points(load_biped().rods, q if q.numel() == len(LINKS) else link_angles(q), SX(2, 1))
+    found = planar_points(toe_foot_biped().rods, q if q.numel() == len(LINKS) else link_angles(q), SX(2, 1))
     function = ca.Function("points", [q], list(found.values()))
     samples = len(signals.arrays["t"])
     values = dict(zip(found, function.map(samples)(history.T), strict=True))

@@ -1,13 +1,18 @@
-"""What the stair problems share: the stair as two parameters, gravity, limits of the links."""
+"""What the stair problems share: the stair as two parameters, gravity, limits of the links, rows of knees and stance foot."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
 
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.problem import Array, Columns, Parameter, Point, Variable, in_space
+from nlp_gait.problem import Array, Columns, Constraint, Point, Variable, in_space, parameters
+from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.stairs.formulas.gait import Stair
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
-from nlp_gait.problems.stairs.formulas.profile import Stair
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 
 GRAVITY = 9.81  # [m/s^2]
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
@@ -43,23 +48,17 @@ COLUMNS = {
     "ankle": in_space("m", "xz"),
 }
 
-STAIR_PARAMETERS = (
-    Parameter(
-        name="stair_length_m",
-        unit="m",
-        default=CASES[2][0],
-        description="length of a double step: two treads (Table IV)",
-        minimum=0.05,
-        maximum=2.0,
-    ),
-    Parameter(
-        name="rise_run_ratio", unit="1", default=CASES[2][1], description="rise over run", minimum=0.01, maximum=5.0
-    ),
+
+STAIR_PARAMETERS = parameters(
+    ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
+    ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
 )
+# Row of a table of parameters.
+LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stance foot", 0.0, inf)
 
 
 def within(point: Point, variable: Variable) -> MX:
-    """Value of a variable for the mathematics: beyond its minimum and maximum, where no bound lies, that of the nearer one."""
+    """Value of a variable for the mathematics, kept within its minimum and maximum, beyond which no bound may be set."""
     return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
 
 
@@ -79,6 +78,60 @@ def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
     return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
-def knee_angles(q: MX) -> MX:
-    """(2, m) angles of the knees in the order of KNEES from link angles (7, m); positive when bent."""
-    return ca.vertcat(*(q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values()))
+def rows(
+    name: str,
+    value: MX,
+    of: Sequence[str],
+    unit: str,
+    scale: float,
+    *,
+    lower: MX | float | None = None,
+    upper: MX | float | None = None,
+    columns: Sequence[int] = (),
+) -> Constraint:
+    """Rows of a table (r, m), each of whose r quantities is bounded at each of m instants.
+
+    Args:
+        name: of the rows.
+        value: (r, m) [unit].
+        of: (r,) names of the quantities.
+        unit: of the values.
+        scale: of a violation, see ``Constraint``.
+        lower: bound, for all or for each.
+        upper: likewise.
+        columns: (m,) numbers of the instants; from zero if empty.
+    """
+    return Constraint(
+        name=name,
+        labels=labels(of, columns or range(value.shape[1])),
+        unit=unit,
+        scale=scale,
+        value=ca.vec(value),
+        lower=None if lower is None else MX(lower),
+        upper=None if upper is None else MX(upper),
+    )
+
+
+def knee_limits(name: str, q: MX) -> Constraint:
+    """Knees bent within their limits; q (7, m) are link angles [rad]."""
+    knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
+    return rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
+
+
+def grip(name: str, force: MX, friction: MX) -> Constraint:
+    """|F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
+    limit = friction * force[1, :]
+    both = ca.vertcat(limit - force[0, :], limit + force[0, :])
+    return rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
+
+
+def stance_load(point: Point, force: MX) -> Constraint:
+    """The ground carries the stance foot with a force (2, m) [N] at least as large as the parameter says."""
+    return rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
+
+
+def stance_zmp(point: Point, pressure: MX) -> Constraint:
+    """The centre of pressure (1, m) [m] lies within the stance foot, by the margin that the parameter says."""
+    margin = point["zmp_margin_m"]
+    front = toe_foot_biped().foot_m - margin
+    return rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)

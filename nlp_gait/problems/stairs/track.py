@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Literal
 
 import casadi as ca
 import numpy as np
+from casadi import DM, MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import (
     Array,
+    Assembly,
     Columns,
     GaitProblem,
     NumericPoint,
     Objective,
-    Parameter,
     Point,
     Signals,
     Variable,
     maker,
+    parameters,
 )
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
-from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, within
-from nlp_gait.problems.stairs.track_rows import track_rows
+from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, rows, within
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
@@ -48,54 +51,28 @@ TORSO_PITCH = "torso_pitch_rad"
 # a rollout of a robot that falls has no gradient of use.
 PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
 SCATTER = 0.05
+LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
-    *(
-        Parameter(
-            name=v.name,
-            unit=v.unit,
-            default=PLAN[v.name],
-            description=v.description,
-            minimum=v.minimum,
-            maximum=v.maximum,
+    *parameters(
+        *(
+            (v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum)
+            for v in GOVERNING_VARIABLES
+            if v.name != TORSO_PITCH
         )
-        for v in GOVERNING_VARIABLES
-        if v.name != TORSO_PITCH
     ),
     *GIVEN_PARAMETERS,
-    REACH_MARGIN,
-    Parameter(
-        name="tracking_tolerance_rad",
-        unit="rad",
-        default=0.1,
-        description="largest error of a link angle at any time",
-        minimum=0.0,
+    *parameters(
+        REACH_MARGIN,
+        ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
+        ("zmp_weight", "1/m", 100.0, "cost of the mean distance of the ZMP from the supporting polygon", 0.0, inf),
+        ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
+        ("disturbance_Nm", "N m", 1 / 70, "amplitude of the disturbance sin(2 t) on every link", -inf, inf),
+        ("ground_stiffness_N_m", "N/m", 5e4, "k_s of a contact", 0.0, inf),
+        ("ground_damping_N_s_m", "N s/m", 500.0, "k_d of a contact", 0.0, inf),
+        ("friction", "1", 0.6, "mu of a contact", 0.0, inf),
     ),
-    Parameter(
-        name="zmp_weight",
-        unit="1/m",
-        default=100.0,
-        description="cost of the mean distance of the ZMP from the supporting polygon",
-        minimum=0.0,
-    ),
-    Parameter(
-        name="gravity_compensation",
-        unit="1",
-        default=1.0,
-        description="share of gravity that the controller compensates; 0 as printed",
-        minimum=0.0,
-        maximum=1.0,
-    ),
-    Parameter(
-        name="disturbance_Nm",
-        unit="N m",
-        default=1 / 70,
-        description="amplitude of the disturbance sin(2 t) on every link",
-    ),
-    Parameter(name="ground_stiffness_N_m", unit="N/m", default=5e4, description="k_s of a contact", minimum=0.0),
-    Parameter(name="ground_damping_N_s_m", unit="N s/m", default=500.0, description="k_d of a contact", minimum=0.0),
-    Parameter(name="friction", unit="1", default=0.6, description="mu of a contact", minimum=0.0),
 )
 
 
@@ -173,13 +150,65 @@ def stairs_track(
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: track_rows(point, rollout(point, ops), ops),
+        assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
         start=start,
         starts=1,
         long_derivatives=True,
         motion=motion,
         skeleton=skeleton,
     )
+
+
+def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
+    """Mean of (53) over all quanta, and how far the ZMP leaves the supporting polygon."""
+    quanta = loop.state.shape[1]
+    errors = loop.state - loop.desired
+    power = loop.torque * loop.state[N:, :]
+    below, above = _beyond(point, loop.zmp)
+    tolerance = point["tracking_tolerance_rad"]
+    exact = Exact()
+    tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
+    outside = ca.sum1(_positive(below, ops) + _positive(above, ops)) / quanta
+    finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
+    return Assembly(
+        objective=tracking + effort + point["zmp_weight"] * outside,
+        constraints=(
+            rows(
+                "tracking",
+                errors[:N, :],
+                LINKS,
+                "rad",
+                0.1,
+                lower=-tolerance,
+                upper=tolerance,
+                columns=range(1, quanta + 1),
+            ),
+        ),
+        indexes={
+            "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
+            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
+            "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
+            "peak_torque_Nm": exact.largest(ca.vec(loop.torque)),
+            "zmp_margin_min_m": -ca.mmax(ca.fmax(below, above)),
+            "quanta_before_divergence": ca.sum2(finite),
+        },
+    )
+
+
+def _beyond(point: Point, zmp: MX) -> tuple[MX, MX]:
+    """Distance by which the ZMP lies behind and ahead of the supporting polygon, (m, 1) each [m]; negative inside.
+
+    It reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
+    """
+    foot = toe_foot_biped().foot_m
+    times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)
+    rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
+    return rear - zmp.T, zmp.T - foot
+
+
+def _positive(v: MX, ops: Nonsmooth) -> MX:
+    """Elementwise max(v, 0)."""
+    return (v + ops.abs(v)) / 2
 
 
 def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> tuple[Variable, ...]:

@@ -22,7 +22,7 @@ from nlp_gait.problems.walk12.robot import PointMassBiped
 from nlp_gait.symbolic.nonsmooth import Exact
 
 JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
-# Columns of a leg's joints in the order of ``Leg.joints``: ankle roll, ankle pitch, knee, hip pitch, hip roll.
+# Columns of a leg's joints in the order of ``LegMotion.joints``: ankle roll, ankle pitch, knee, hip pitch, hip roll.
 COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
 YAW_COLUMN = {"left": 3, "right": 8}
 COLUMNS_OF = {

@@ -30,7 +30,7 @@ GRAVITY = 9.81  # [m/s^2]
 Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
 
 
-class Leg(NamedTuple):
+class LegMotion(NamedTuple):
     """One leg.
 
     Attributes:
@@ -48,7 +48,7 @@ class Leg(NamedTuple):
 
 
 # From a leg and heights (1, k) above the ankle to (3, k) points of the shank, relative to the ankle and in the leg's axes [m].
-Shank: TypeAlias = Callable[[Leg, DM], Motion]
+Shank: TypeAlias = Callable[[LegMotion, DM], Motion]
 
 
 def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
@@ -79,7 +79,7 @@ def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> 
 
 def legs(
     x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
-) -> tuple[Leg, Leg]:
+) -> tuple[LegMotion, LegMotion]:
     """Stance leg and swing leg.
 
     Args:
@@ -111,7 +111,7 @@ def masses(robot: PointMassBiped) -> DM:
     return DM([foot, knee, hip, robot.waist_mass_kg, hip, knee, foot])
 
 
-def mass_motion(stance: Leg, swing: Leg, robot: PointMassBiped, shank: Shank | None = None) -> Motion:
+def mass_motion(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, shank: Shank | None = None) -> Motion:
     """(3, 7) motion of the masses [m], in the order of ``masses``; by exact forward kinematics unless told otherwise."""
     heights = DM([robot.foot_com_height_m, robot.shank_m]).T
     near, far = (_from_ankle(leg, (shank or exact_shank)(leg, heights)) for leg in (stance, swing))
@@ -119,7 +119,7 @@ def mass_motion(stance: Leg, swing: Leg, robot: PointMassBiped, shank: Shank | N
     return Motion(*(ca.horzcat(a, p6, (p6 + other) / 2, other, b[:, 1], b[:, 0]) for a, p6, other, b in orders))
 
 
-def exact_shank(leg: Leg, heights: DM) -> Motion:
+def exact_shank(leg: LegMotion, heights: DM) -> Motion:
     """Points of the shank by forward kinematics; see ``Shank``."""
 
     def points(angles: SX) -> SX:
@@ -129,7 +129,7 @@ def exact_shank(leg: Leg, heights: DM) -> Motion:
     return through(points, _ankle_angles(leg))
 
 
-def appendix_shank(leg: Leg, heights: DM) -> Motion:
+def appendix_shank(leg: LegMotion, heights: DM) -> Motion:
     """Points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
     upward = Motion(*(hip - ankle for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     lean = through(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
@@ -142,7 +142,7 @@ def appendix_shank(leg: Leg, heights: DM) -> Motion:
     return through(points, stack(_ankle_angles(leg), lean))
 
 
-def zero_moment_point(stance: Leg, swing: Leg, robot: PointMassBiped, reading: Zmp) -> SX:
+def zero_moment_point(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:
     """(2,) zero-moment point relative to the stance ankle, on the height of that ankle [m].
 
     Source:
@@ -165,27 +165,27 @@ def _across(robot: PointMassBiped) -> DM:
     return DM([0.0, -robot.hip_distance_m, 0.0])
 
 
-def _leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> Leg:
+def _leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> LegMotion:
     """Joint angles (2), (3) from the closed form that NAO's legs have too; unlike (2), it holds for a folded knee."""
     hip_to_ankle = Motion(*(to - origin for to, origin in zip(ankle, hip, strict=True)))
     angles = leg_angles(hip_to_ankle, robot.thigh_m, robot.shank_m, margin, ops).joints
     # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
     signs = DM([1, -1, 1, -1, 1])
-    return Leg(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
+    return LegMotion(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
 
 
-def _turned(leg: Leg, turn: SX) -> Leg:
+def _turned(leg: LegMotion, turn: SX) -> LegMotion:
     """The leg yawed at its hip."""
     heading = axis_rotation((0.0, 0.0, 1.0), turn)
     ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     return leg._replace(ankle=ankle, heading=heading)
 
 
-def _from_ankle(leg: Leg, points: Motion) -> Motion:
+def _from_ankle(leg: LegMotion, points: Motion) -> Motion:
     pairs = zip(leg.ankle, points, strict=True)
     return Motion(*(ca.repmat(ankle, 1, 2) + leg.heading @ offsets for ankle, offsets in pairs))
 
 
-def _ankle_angles(leg: Leg) -> Motion:
+def _ankle_angles(leg: LegMotion) -> Motion:
     """(2,) roll and pitch."""
     return Motion(*(part[:2] for part in leg.joints))

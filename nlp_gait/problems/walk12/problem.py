@@ -17,15 +17,15 @@ from nlp_gait.problem import (
     Grid,
     NumericPoint,
     Objective,
-    Parameter,
     Point,
     Signals,
     Variable,
     maker,
+    parameters,
 )
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp, legs, reaches, zero_moment_point
-from nlp_gait.problems.walk12.robot import PointMassBiped, load_biped
+from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
 from nlp_gait.problems.walk12.skeleton import skeleton
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -42,33 +42,19 @@ VARIABLES = (  # (eq. 7)
     Variable(name="bending_height_m", unit="m", lower=0.001, upper=0.13, description="h, hip below a stretched leg"),
 )
 
-PARAMETERS = (
-    Parameter(
-        name="lambda",
-        unit="1",
-        default=0.15,
-        description="weight of stability against step length (eq. 11)",
-        minimum=0.0,
-        maximum=1.0,
-    ),
-    Parameter(name="step_time_s", unit="s", default=1.0, description="T, time of one step", minimum=0.01),
-    Parameter(name="f1max", unit="1/(m^2 s)", default=F1MAX, description="f1 that counts as 1 (eq. 11)", minimum=1e-6),
-    Parameter(name="f2max_m", unit="m", default=F2MAX, description="step length that counts as 1", minimum=1e-6),
-    Parameter(
-        name="reach_margin_rad",
-        unit="rad",
-        default=0.05,
-        description="kappa, least angle of a knee",
-        minimum=0.0,
-        maximum=1.0,
-    ),
-    Parameter(
-        name="turn_rad",
-        unit="rad",
-        default=0.0,
-        description="K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging",
-        minimum=0.0,
-        maximum=LARGEST_TURN,
+PARAMETERS = parameters(
+    ("lambda", "1", 0.15, "weight of stability against step length (eq. 11)", 0.0, 1.0),
+    ("step_time_s", "s", 1.0, "T, time of one step", 0.01, math.inf),
+    ("f1max", "1/(m^2 s)", F1MAX, "f1 that counts as 1 (eq. 11)", 1e-6, math.inf),
+    ("f2max_m", "m", F2MAX, "step length that counts as 1", 1e-6, math.inf),
+    ("reach_margin_rad", "rad", 0.05, "kappa, least angle of a knee", 0.0, 1.0),
+    (
+        "turn_rad",
+        "rad",
+        0.0,
+        "K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging",
+        0.0,
+        LARGEST_TURN,
     ),
 )
 
@@ -85,9 +71,9 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     Raises:
         InputError: an option that is not allowed.
     """
-    if isinstance(intervals, bool) or not isinstance(intervals, int) or intervals < 2 or intervals % 2:
+    if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
-    robot = load_biped()
+    robot = point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)

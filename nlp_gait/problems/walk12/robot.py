@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from nlp_gait.decoding import read_decoded
 from nlp_gait.errors import RobotDataError
-from nlp_gait.files import read_json
+from nlp_gait.robots.fields import check_numbers
 
 DEFAULT_FILE = resources.files("nlp_gait.problems.walk12") / "robot.json"
 
@@ -58,14 +58,9 @@ class PointMassBiped:
     foot_width_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no robot: every mass and every length must be positive."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name in TEXT:
-                if not isinstance(value, str):
-                    raise RobotDataError(f"robot {self.name!r}: {field.name} must be text, got {value!r}")
-            elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-                raise RobotDataError(f"robot {self.name!r}: {field.name} must be a number > 0, got {value!r}")
+        """Every mass and every length is positive."""
+        numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
+        check_numbers(f"robot {self.name!r}", self, positive=numbers)
 
     @property
     def leg_m(self) -> float:
@@ -73,22 +68,11 @@ class PointMassBiped:
         return self.thigh_m + self.shank_m
 
 
-TEXT = ("name", "description", "source")
-
-
 @cache
-def load_biped(path: str | None = None) -> PointMassBiped:
+def point_mass_biped(path: str = "") -> PointMassBiped:
     """Robot from a JSON file with the fields of ``PointMassBiped``; by default that of the paper.
 
     Raises:
         RobotDataError: the file cannot be read, lacks a field or has one too many, or a value is not allowed.
     """
-    file = DEFAULT_FILE if path is None else Path(path)
-    raw = read_json(Path(str(file)), "robot file", error=RobotDataError)
-    wanted = {field.name for field in fields(PointMassBiped)}
-    if not isinstance(raw, dict) or set(raw) != wanted:
-        wrong = sorted(wanted.symmetric_difference(raw)) if isinstance(raw, dict) else type(raw).__name__
-        raise RobotDataError(
-            f"robot file {str(file)!r} must hold one object with the fields {sorted(wanted)}; missing or unknown: {wrong}"
-        )
-    return PointMassBiped(**raw)
+    return read_decoded(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

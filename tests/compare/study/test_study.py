@@ -23,7 +23,8 @@ from compare.study.settings import SolverSpec, StudySettings, read_settings, set
 from compare.study.study import Study, read_records, record_file, run_study
 from compare.study.task import Handling, ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm, SearchError
-from metaheuristics.interface import Array, Start
+from metaheuristics.array import Array
+from metaheuristics.interface import Start
 from nlp_gait.errors import GaitError, InputError
 
 SSP = ProblemSpec(name="nao-ssp")

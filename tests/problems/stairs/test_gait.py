@@ -7,12 +7,21 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import Foot, StairPlan, ankle, ankle_on_toe, hip, in_time, landed_angles
+from nlp_gait.problems.stairs.formulas.gait import (
+    Stair,
+    StairPlan,
+    ToeFoot,
+    ankle,
+    ankle_on_toe,
+    hip,
+    in_time,
+    landed_angles,
+    stair_height,
+)
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import points
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.formulas.profile import Stair, stair_height
-from nlp_gait.problems.stairs.robot import load_biped
+from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import CASES, GRAVITY
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -32,7 +41,7 @@ PLAN = dict(
     toe_angle=np.pi / 6,
     catch_angle=0.01,
 )
-FOOT = Foot(0.12, 0.05)
+FOOT = ToeFoot(0.12, 0.05)
 KNOTS = [[1, 0, 0, 0], [1, 1, 0, 0], [1, 1, 1, 0]]
 
 
@@ -80,8 +89,8 @@ def test_hip_advances_one_step_and_rises_with_it(case: int) -> None:
 
 def test_forward_kinematics_of_the_posture_meets_hip_and_ankle() -> None:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    found = posture(load_biped().rods, plan(), step(2), GRAVITY, s, passing / plan().durations, SX(0.005), Exact())
-    placed = points(load_biped().rods, link_angles(found.q.position), SX(2, 1))
+    found = posture(toe_foot_biped().rods, plan(), step(2), GRAVITY, s, passing / plan().durations, SX(0.005), Exact())
+    placed = points(toe_foot_biped().rods, link_angles(found.q.position), SX(2, 1))
     errors = ca.vertcat(placed["H"] - found.hip.position, placed["A"] - found.ankle.position)
     rate_error = ca.jtimes(found.q.position, s, passing / plan().durations) - found.q.velocity
     check = ca.Function("check", [s, passing], [errors, rate_error, found.reach])

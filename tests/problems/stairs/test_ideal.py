@@ -35,7 +35,7 @@ def test_case_2_meets_the_known_optimum(solution: nlp_gait.Solution) -> None:
 
 
 def test_replay_by_rk4_reaches_the_planned_end_pose(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
-    _, error = replay(problem.signals(np.array(list(solution.x.values())), problem.p).arrays, FEEDBACK)
+    _, error = replay(problem.signals(solution.x).arrays, FEEDBACK)
     assert np.abs(error[-1]).max() < REPLAY_TOLERANCE
 
 
@@ -43,7 +43,7 @@ def test_replay_without_feedback_leaves_the_plan_as_an_inverted_pendulum_does(
     problem: GaitProblem, solution: nlp_gait.Solution
 ) -> None:
     """It follows the first phase; what rounding and truncation put in then grows exponentially until the robot falls."""
-    time, error = replay(problem.signals(np.array(list(solution.x.values())), problem.p).arrays, OPEN_LOOP)
+    time, error = replay(problem.signals(solution.x).arrays, OPEN_LOOP)
     largest = np.abs(error).max(axis=1)
     assert largest[time <= FIRST_PHASE_S].max() < REPLAY_TOLERANCE
     assert largest[-1] > 1.0

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.problems.walk12.robot import load_biped
+from nlp_gait.problems.walk12.robot import point_mass_biped
 
 
 def test_table_1() -> None:
-    robot = load_biped()
+    robot = point_mass_biped()
     masses = (robot.knee_mass_kg, robot.waist_mass_kg, robot.foot_mass_kg, robot.hip_mass_kg)
     assert masses == (0.07, 0.02, 0.14, 0.21)
     assert robot.leg_m == pytest.approx(0.34)
@@ -23,18 +23,18 @@ def test_table_1() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"thigh_m": 0.0}, "thigh_m must be a number > 0, got 0.0"),
-        ({"thigh_m": "long"}, "thigh_m must be a number > 0, got 'long'"),
-        ({"foot_mass_kg": True}, "foot_mass_kg must be a number > 0"),
-        ({"source": 1}, "source must be text"),
-        ({"tail_m": 1.0}, "missing or unknown: \\['tail_m'\\]"),
+        ({"thigh_m": 0.0}, "thigh_m must be > 0, got 0.0"),
+        ({"thigh_m": "long"}, "thigh_m must be a number, got 'long'"),
+        ({"foot_mass_kg": True}, "foot_mass_kg must be a number, got True"),
+        ({"source": 1}, "source must be a text, got 1"),
+        ({"tail_m": 1.0}, "unknown key 'tail_m'"),
     ],
 )
 def test_damaged_data(tmp_path: Path, change: dict[str, object], message: str) -> None:
     file = tmp_path / "robot.json"
-    file.write_text(json.dumps(asdict(load_biped()) | change))
+    file.write_text(json.dumps(asdict(point_mass_biped()) | change))
     with pytest.raises(RobotDataError, match=message):
-        load_biped(str(file))
+        point_mass_biped(str(file))
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
@@ -42,4 +42,4 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     file.write_text("{")
     for path in (file, tmp_path / "none.json"):
         with pytest.raises(RobotDataError, match="cannot be read|is not valid JSON"):
-            load_biped(str(path))
+            point_mass_biped(str(path))

@@ -1,4 +1,6 @@
-"""Planned motion of swing foot and hip on stairs: double support about toe and sole, Bezier bridge, cycloid, arc of the hip.
+"""The staircase, and the planned motion of swing foot and hip on it.
+
+Double support about toe and sole, a Bezier bridge, a cycloid; the hip moves on an arc.
 
 A step has four phases. Time enters as the four fractions of them that have passed, so a formula holds in every phase
 without a branch: fractions of later phases are zero, of earlier ones one. Origin: the rear ankle at the start.
@@ -6,12 +8,11 @@ without a branch: fractions of later phases are zero, of earlier ones one. Origi
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.symbolic.trajectories import Motion
 
 PHASES = ("heel rises", "sole rises", "catch the cycloid", "track the cycloid")
@@ -22,8 +23,22 @@ _NEWTON_STEPS = 6
 _LEAST_CYCLOID_ARGUMENT = 1e-15
 # Keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2].
 _LEAST_ROOT_SQUARED = 1e-6
-# Time passes t3 only in plans whose knots are out of order; by more than this it does not drive the hip further [s].
+# Time exceeds t3 only in plans whose knots are out of order; more than this beyond t3, the hip no longer advances [s].
 _LATEST = 1.0
+
+E = TypeVar("E")
+
+
+class Stair(NamedTuple, Generic[E]):
+    """Two equal steps; the stance ankle stands at the origin, the rear ankle one tread back and one rise down.
+
+    Attributes:
+        tread: X, from ankle to ankle of neighbouring steps [m].
+        rise: Z, of one step [m].
+    """
+
+    tread: E
+    rise: E
 
 
 class StairPlan(NamedTuple):
@@ -68,11 +83,27 @@ class StairPlan(NamedTuple):
         return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
 
 
-class Foot(NamedTuple):
+class ToeFoot(NamedTuple):
     """Lengths of a foot: ankle to sole joint, sole joint to tip of the toe [m]."""
 
     sole: float
     toe: float
+
+
+def stair_height(x: SX, stair: Stair[SX], setback: float, width: float) -> SX:
+    """Height of the ground under a point, relative to the stance ankle [m].
+
+    Args:
+        x: position of the point [m].
+        stair: steps.
+        setback: the edge of each step lies so far behind the ankle that stands on it [m].
+        width: an edge is a sigmoid; half of its rise happens within 2.2 widths [m].
+    """
+
+    def edge(at: SX | float) -> SX:
+        return 0.5 * (1 + ca.tanh((x - at + setback) / (2 * width)))
+
+    return stair.rise * (edge(0.0) + edge(stair.tread) - 1)
 
 
 def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
@@ -91,7 +122,7 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
-def ankle_on_toe(foot: Foot, sole: SX, toe: SX) -> SX:
+def ankle_on_toe(foot: ToeFoot, sole: SX, toe: SX) -> SX:
     """(2,) ankle from where it is with the foot flat [m], while the tip of the toe stands still.
 
     Source:
@@ -119,7 +150,7 @@ def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return foot_angles(plan, back)
 
 
-def ankle(plan: StairPlan, stair: Stair[SX], foot: Foot, s: SX) -> SX:
+def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
     Source:

@@ -88,5 +88,5 @@ def trained_path(
     pose = ca.Function("pose", [w, aim], [learned, answer(learned, aim)])
     first, targets = ca.MX.sym("first", 4 * nodes), ca.MX.sym("targets", 2, poses)
     _, found = pose.mapaccum(poses)(first, targets)
-    # Trained for given poses: nothing is ever differentiated by them.
+    # Trained for given poses: nothing is ever differentiated with respect to them.
     return ca.Function("path", [first, targets], [found], {"is_diff_in": [False, False]})

@@ -34,7 +34,7 @@ LEAST_LOAD = 1e-3
 E = TypeVar("E")
 
 
-class Loads(NamedTuple, Generic[E]):
+class StanceLoads(NamedTuple, Generic[E]):
     """What joints and ground must give.
 
     Attributes:
@@ -53,13 +53,13 @@ def link_angles(q: SX) -> SX:
     return ca.vertcat(q, 0, 0)
 
 
-def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> Loads[SX]:
+def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
     """Inverse dynamics with given forces below the rear foot.
 
     Args:
         rods: of the robot.
         gravity: [m/s^2].
-        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for they are differentiated by.
+        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for derivatives are taken with respect to them.
         qd: (7,) rates [rad/s]; symbols.
         qdd: (7,) [rad/s^2].
         rear: forces of the ground (2,) [N] by the point of the rear foot on which they act.
@@ -81,4 +81,4 @@ def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear:
     stance = force - sum(rear.values(), SX(2, 1))
     foot = sum((rods[link].mass * gravity * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
     load = ca.fmax(stance[1], LEAST_LOAD * mass * gravity)
-    return Loads(torque, stance, (foot - torque[0]) / load)
+    return StanceLoads(torque, stance, (foot - torque[0]) / load)

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.problems.stairs.formulas.gait import Foot, StairPlan, ankle, foot_angles, hip, in_time
+from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan, ToeFoot, ankle, foot_angles, hip, in_time
 from nlp_gait.problems.stairs.formulas.planar_biped import Rod
-from nlp_gait.problems.stairs.formulas.profile import Stair
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
@@ -20,7 +19,7 @@ class Posture(NamedTuple):
     """Planned motion of the whole robot at one instant, origin at the stance ankle.
 
     Attributes:
-        q: (7,) absolute link angles in the order of ``stair_loads.MOVING`` [rad], with rates and accelerations.
+        q: (7,) absolute link angles in the order of ``loads.MOVING`` [rad], with rates and accelerations.
         reach: (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach.
         hip: (2,) [m].
         ankle: (2,) of the swing leg [m].
@@ -55,7 +54,7 @@ def posture(
         ops: interpretation of acos.
     """
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
-    swing_foot = Foot(rods["AS"].length, rods["ST"].length)
+    swing_foot = ToeFoot(rods["AS"].length, rods["ST"].length)
     at_hip = in_time(hip(plan, stair, gravity, s) - stance, s, rates)
     at_ankle = in_time(ankle(plan, stair, swing_foot, s) - stance, s, rates)
     swing, swing_reach = _leg(rods, at_hip, at_ankle, margin, ops)

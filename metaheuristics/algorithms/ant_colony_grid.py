@@ -8,9 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.algorithms.points import Points
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
-from metaheuristics.points import Points
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import check_count, check_number
 
 
@@ -94,21 +95,15 @@ def pick(probability: Array, u: Array) -> NDArray[np.intp]:
     return levels
 
 
-class AntColonyGridSearch:
+class AntColonyGridSearch(PopulationSearch[AntColonyGrid]):
     """A run of `AntColonyGrid`; see `Search`."""
 
     def __init__(self, settings: AntColonyGrid, start: Start) -> None:
         """Spread pheromone evenly and ask for the starting points first."""
-        self._settings = settings
-        self._start = start
-        self._X = start.initial
+        super().__init__(settings, start)
         self._best = Points.none(start.initial.shape[1])
         self._pheromone = np.full((start.initial.shape[1], settings.levels), 1.0 / settings.levels)
         self._spacing = (start.upper - start.lower) / (settings.levels - 1)
-
-    def ask(self) -> Array:
-        """Return the points that the ants chose, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Renew the pheromone and send the ants out; see `Search.tell`."""
@@ -125,7 +120,3 @@ class AntColonyGridSearch:
         probability = (1.0 - settings.exploration) * self._pheromone + settings.exploration / settings.levels
         levels = pick(probability, start.rng.random((settings.population, X.shape[1])))
         self._X = np.clip(start.lower + levels * self._spacing, start.lower, start.upper)
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason: the ants explore for ever."""
-        return ()

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from metaheuristics.interface import Array
+from metaheuristics.array import Array
 from metaheuristics.settings import check_number
 
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code

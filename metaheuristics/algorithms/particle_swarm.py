@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import check_count, check_number
 
 
@@ -94,24 +95,18 @@ def reflect(X: Array, V: Array, lower: Array, upper: Array) -> tuple[Array, Arra
     return inside, np.where(inside == X, V, -V)
 
 
-class ParticleSwarmSearch:
+class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
     """A run of `ParticleSwarm`; see `Search`."""
 
     def __init__(self, settings: ParticleSwarm, start: Start) -> None:
         """Put the particles at rest on the starting points, with bests that any success will beat."""
-        self._settings = settings
-        self._start = start
+        super().__init__(settings, start)
         self._limit = settings.velocity_limit * (start.upper - start.lower)
         self._inertia = settings.inertia
-        self._X = start.initial
         self._V = np.zeros_like(start.initial)
         self._own_X = start.initial
         self._own_f = np.full(len(start.initial), np.inf)
         self._own_violation = np.full(len(start.initial), np.inf)
-
-    def ask(self) -> Array:
-        """Return the positions of the particles, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Update the bests and move; see `Search.tell`."""
@@ -128,7 +123,3 @@ class ParticleSwarmSearch:
         moved, V = move(X, self._V, to_own, to_swarm, self._inertia, self._limit)
         self._X, self._V = reflect(moved, V, start.lower, start.upper)
         self._inertia *= settings.inertia_damping
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason: a swarm never gives up."""
-        return ()

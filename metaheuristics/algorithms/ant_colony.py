@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.algorithms.points import Points
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import Array, Start
-from metaheuristics.points import Points
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import check_count, check_number
 
 
@@ -91,19 +92,13 @@ def deviations(archive: Array, picked: Array, spread: float) -> Array:
     return spread / (len(archive) - 1) * distance
 
 
-class AntColonySearch:
+class AntColonySearch(PopulationSearch[AntColony]):
     """A run of `AntColony`; see `Search`."""
 
     def __init__(self, settings: AntColony, start: Start) -> None:
         """Ask for the starting points first; the archive is empty."""
-        self._settings = settings
-        self._start = start
-        self._X = start.initial
+        super().__init__(settings, start)
         self._archive = Points.none(start.initial.shape[1])
-
-    def ask(self) -> Array:
-        """Return where the ants are, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Renew the archive and send the ants out; see `Search.tell`."""

@@ -8,10 +8,18 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.algorithms.genetic_operators import (
+    Crossover,
+    Flip,
+    Mutation,
+    Polynomial,
+    SimulatedBinary,
+    SinglePoint,
+)
+from metaheuristics.algorithms.points import Points
+from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
-from metaheuristics.genetic_operators import Crossover, Flip, Mutation, Polynomial, SimulatedBinary, SinglePoint
-from metaheuristics.interface import Array, Start
-from metaheuristics.points import Points
+from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.settings import bad_setting, check_count
 
 
@@ -54,7 +62,7 @@ class GeneticAlgorithm:
             raise bad_setting(self, "survival", "'plus' or 'generational'")
         for name in ("crossover", "mutation"):
             if not callable(getattr(self, name)):
-                raise bad_setting(self, name, "an operator of metaheuristics.genetic_operators or alike")
+                raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic_operators or alike")
 
     @classmethod
     def goswami2008(cls) -> GeneticAlgorithm:
@@ -97,19 +105,13 @@ def tournaments(places: int, population: int, size: int, rng: np.random.Generato
     return winners
 
 
-class GeneticSearch:
+class GeneticSearch(PopulationSearch[GeneticAlgorithm]):
     """A run of `GeneticAlgorithm`; see `Search`."""
 
     def __init__(self, settings: GeneticAlgorithm, start: Start) -> None:
         """Ask for the starting points first, as children without parents."""
-        self._settings = settings
-        self._start = start
-        self._X = start.initial
+        super().__init__(settings, start)
         self._parents = Points.none(start.initial.shape[1])
-
-    def ask(self) -> Array:
-        """Return the children, (P, n)."""
-        return self._X
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Choose the survivors and mate them; see `Search.tell`."""
@@ -122,10 +124,6 @@ class GeneticSearch:
             rest = children.best(settings.population - len(elites.f), rule)
             self._parents = elites.join(rest).best(settings.population, rule)
         self._X = self._mate()
-
-    def stop(self) -> tuple[str, ...]:
-        """Return no reason: mutation never ends."""
-        return ()
 
     def _mate(self) -> Array:
         """Make as many children as there are parents."""
