@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -11,12 +12,14 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.problem import Constraint, InstantPoint, Parameter, Point
-from nlp_gait.problems.biped.samples import Samples, Trace, labels
+from nlp_gait.problem.assembly import parameters as table
+from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-# Violations that count alike in the total: 1 rad, 1 Nm, 10 mm of a margin or a height, 1 in the cosine of a knee.
-ANGLE_SCALE, TORQUE_SCALE, MARGIN_SCALE, HEIGHT_SCALE, REACH_SCALE = 1.0, 1.0, 0.01, 0.01, 1.0
+# Violations that count alike in the total, by unit: 10 mm of a margin or a height counts like 1 rad.
+SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "m": 0.01, "1": 1.0}
 REACH_MARGIN = "reach_margin"
 
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
@@ -49,6 +52,15 @@ class Part:
         raise NotImplementedError
 
 
+def rows(
+    name: str, unit: str, value: MX, lower: MX | None = None, upper: MX | None = None, labels: Sequence[str] = ()
+) -> Constraint:
+    """Rows of a part, in which a violation counts as every other in its unit."""
+    return Constraint(
+        name=name, labels=tuple(labels), unit=unit, scale=SCALES[unit], value=value, lower=lower, upper=upper
+    )
+
+
 class JointLimits(Part):
     """Planned angles within the robot's limits, which are parameters (sections 4.1 and 4.2)."""
 
@@ -68,59 +80,31 @@ class JointLimits(Part):
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Two-sided rows."""
         n = samples.steps + 1
-        lower, upper = (ca.vertcat(*(at[f"{j}_rad.{end}"] for j in self._planned)) for end in ("lower", "upper"))
-        row = Constraint(
-            name="joint_angle",
-            labels=labels(self._planned, _columns(n)),
-            unit="rad",
-            scale=ANGLE_SCALE,
-            value=ca.vec(samples.planned),
-            lower=ca.repmat(lower, n, 1),
-            upper=ca.repmat(upper, n, 1),
-        )
-        return Contribution(rows=(row,))
+        limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
+        lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
+        names = labels(self._planned, range(n))
+        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names),))
 
 
 class Reach(Part):
     """Knees neither straight nor folded beyond reach: the cosine that gives a knee's angle, off +-1 by a margin."""
 
-    parameters = (
-        Parameter(
-            name=REACH_MARGIN,
-            unit="1",
-            default=0.01,
-            description="distance of a knee's cosine from +-1: 0.01 keeps it bent by 0.14 rad",
-            minimum=0.0,
-            maximum=0.5,
-        ),
+    parameters = table(
+        (REACH_MARGIN, "1", 0.01, "distance of a knee's cosine from +-1: 0.01 keeps it bent by 0.14 rad", 0.0, 0.5)
     )
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Two-sided rows."""
         limit = 1 - at[REACH_MARGIN]
-        row = Constraint(
-            name="reach",
-            labels=labels(("left leg", "right leg"), _columns(samples.steps + 1)),
-            unit="1",
-            scale=REACH_SCALE,
-            value=ca.vec(samples.reach),
-            lower=-limit,
-            upper=limit,
-        )
-        return Contribution(rows=(row,))
+        names = labels(("left leg", "right leg"), range(samples.steps + 1))
+        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names),))
 
 
 class TorqueChange(Part):
     """Change of every torque over an interval of time, limited (sections 4.1 and 4.2)."""
 
-    parameters = (
-        Parameter(
-            name="torque_change_limit_Nm",
-            unit="Nm",
-            default=1.2,
-            description="largest change of a torque over one interval",
-            minimum=0.0,
-        ),
+    parameters = table(
+        ("torque_change_limit_Nm", "Nm", 1.2, "largest change of a torque over one interval", 0.0, math.inf)
     )
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
@@ -128,16 +112,11 @@ class TorqueChange(Part):
         step = samples.per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = at["torque_change_limit_Nm"]
-        row = Constraint(
-            name="torque_change",
-            labels=labels(samples.joints, _columns(change.shape[1])),
-            unit="Nm",
-            scale=TORQUE_SCALE,
-            value=ca.vec(change),
-            lower=-limit,
-            upper=limit,
+        names = labels(samples.joints, range(change.shape[1]))
+        return Contribution(
+            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names),),
+            indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
         )
-        return Contribution(rows=(row,), indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))})
 
 
 class BalanceMargins(Part):
@@ -150,19 +129,12 @@ class BalanceMargins(Part):
 
     def __init__(self, margins: Margins, mean_limits_m: tuple[float, float]) -> None:
         self._margins = margins
-        self.parameters = (
-            *(
-                Parameter(
-                    name=f"dbm_{axis}_min_limit_m", unit="m", default=0.0, description=f"least balance margin in {axis}"
-                )
-                for axis in "xy"
-            ),
-            *(
-                Parameter(
-                    name=f"dbm_{axis}_mean_limit_m", unit="m", default=least, description=f"least mean margin in {axis}"
-                )
-                for axis, least in zip("xy", mean_limits_m, strict=True)
-            ),
+        x, y = mean_limits_m
+        self.parameters = table(
+            ("dbm_x_min_limit_m", "m", 0.0, "least balance margin in x", -math.inf, math.inf),
+            ("dbm_y_min_limit_m", "m", 0.0, "least balance margin in y", -math.inf, math.inf),
+            ("dbm_x_mean_limit_m", "m", x, "least mean margin in x", -math.inf, math.inf),
+            ("dbm_y_mean_limit_m", "m", y, "least mean margin in y", -math.inf, math.inf),
         )
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
@@ -170,27 +142,12 @@ class BalanceMargins(Part):
         n = samples.steps + 1
         margins = dict(zip("xy", self._margins(samples.zmp, at, ops), strict=True))
         means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
+        names = [str(k) for k in range(n)]
         each = [
-            Constraint(
-                name=f"dbm_{axis}",
-                labels=tuple(_columns(n)),
-                unit="m",
-                scale=MARGIN_SCALE,
-                value=margin.T,
-                lower=at[f"dbm_{axis}_min_limit_m"],
-            )
+            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names)
             for axis, margin in margins.items()
         ]
-        mean = [
-            Constraint(
-                name=f"dbm_{axis}_mean",
-                unit="m",
-                scale=MARGIN_SCALE,
-                value=value,
-                lower=at[f"dbm_{axis}_mean_limit_m"],
-            )
-            for axis, value in means.items()
-        ]
+        mean = [rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"]) for axis, value in means.items()]
         return Contribution(
             rows=(*each, *mean),
             indexes={
@@ -227,15 +184,7 @@ def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> 
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
     )
-    return Constraint(
-        name=name,
-        labels=labels(joints, [str(k) for k in range(1, columns + 1)]),
-        unit="rad",
-        scale=ANGLE_SCALE,
-        value=ca.vec(angles),
-        lower=lower,
-        upper=upper,
-    )
+    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)))
 
 
 class FootClearance(Part):
@@ -254,17 +203,9 @@ class FootClearance(Part):
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows with a lower bound, and the equation of the middle."""
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
-        above = Constraint(
-            name="foot_height",
-            labels=tuple(str(k) for k in range(1, n)),
-            unit="m",
-            scale=HEIGHT_SCALE,
-            value=heights.T,
-            lower=MX(0.0),
-        )
+        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)])
         halfway = self._halfway(at)
-        rows = halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])
-        return Contribution(rows=(above, *rows))
+        return Contribution(rows=(above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])))
 
     def _halfway(self, at: Point) -> MX:
         """The foot at half the phase, which is a sample only on some grids."""
@@ -287,14 +228,6 @@ def halfway_rows(
         corners: names of the points.
     """
     return (
-        Constraint(
-            name="foot_middle", unit="m", scale=HEIGHT_SCALE, value=along - middle, lower=MX(0.0), upper=MX(0.0)
-        ),
-        Constraint(
-            name="foot_lift", labels=corners, unit="m", scale=HEIGHT_SCALE, value=heights - least, lower=MX(0.0)
-        ),
+        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0)),
+        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners),
     )
-
-
-def _columns(count: int) -> list[str]:
-    return [str(k) for k in range(count)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -103,8 +103,8 @@ class Phase:
     loads: Loader
     grid: Grid
     derivatives: Derivatives = "analytic"
-    parts: Sequence[Part] = field(default=())
-    goal: Goal
+    parts: Sequence[Part] = ()
+    goal: Goal = Goal()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -115,15 +115,12 @@ class Phase:
     def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
         """Rows of all parts, the goal, and the indexes of both."""
         added = [part.contribute(at, samples, ops) for part in self.parts]
-        goal = self.goal.value(at, samples, ops)
+        value, before, after = self.goal.value(at, samples, ops)
+        indexes = {name: index for part in added for name, index in part.indexes.items()}
         return Assembly(
-            objective=goal.value,
+            objective=value,
             constraints=tuple(row for part in added for row in part.rows),
-            indexes={
-                **goal.first,
-                **{name: value for part in added for name, value in part.indexes.items()},
-                **goal.last,
-            },
+            indexes={**before, **indexes, **after},
         )
 
     def samples(self, at: Point, ops: Nonsmooth) -> Samples:

@@ -79,8 +79,3 @@ def time_mean(values: MX) -> MX:
     weights = np.full(n, 1.0 / (n - 1))
     weights[[0, -1]] /= 2
     return values @ DM(weights)
-
-
-def labels(rows: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
-    """Labels of a column-major matrix."""
-    return tuple(f"{row}, {column}" for column in columns for row in rows)

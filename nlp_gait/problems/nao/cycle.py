@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
-from nlp_gait.problems.biped.goals import MeanPower
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.cycle_motion import (
@@ -114,7 +113,6 @@ def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given
             loads=loads,
             grid=grid,
             parts=paper_parts(model, margins, means[name]),
-            goal=MeanPower(),
         )
         for name, (plan, loads, margins) in halves.items()
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,8 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.problem import Array, Assembly, Constraint, Parameter, Point, Signals, Variable
-from nlp_gait.problems.biped.parts import MARGIN_SCALE, TORQUE_SCALE, Margins
+from nlp_gait.problem.assembly import parameters
+from nlp_gait.problems.biped.parts import Margins, rows
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS
@@ -62,26 +64,18 @@ class WalkingCycle:
             if parameter.name in BALANCE
         ]
         shared = [parameter for parameter in own["ssp"] if parameter.name not in BALANCE]
-        jump = Parameter(
-            name="torque_jump_limit_Nm",
-            unit="Nm",
-            default=NO_JUMP_LIMIT,
-            description="largest jump of a torque at a switch; the default is out of reach",
-            minimum=0.0,
-        )
-        return (*self._speed_parameters(), *balance, jump, *shared)
+        jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
+        limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT, *jump))
+        return (*self._speed_parameters(), *balance, *limit, *shared)
 
     def _speed_parameters(self) -> tuple[Parameter, ...]:
         if not self.at_given_speed:
             return ()
         step = self.variables[-1]
-        ends = (("lower", step.lower), ("upper", step.upper))
-        return (
-            Parameter(name=SPEED, unit="m/s", default=0.03, description="speed of walking", minimum=LEAST_SPEED),
-            *(
-                Parameter(name=f"{STEP}.{end}", unit="m", default=value, description=f"{end} bound of the step length")
-                for end, value in ends
-            ),
+        return parameters(
+            (SPEED, "m/s", 0.03, "speed of walking", LEAST_SPEED, math.inf),
+            (f"{STEP}.lower", "m", step.lower, "lower bound of the step length", -math.inf, math.inf),
+            (f"{STEP}.upper", "m", step.upper, "upper bound of the step length", -math.inf, math.inf),
         )
 
     def motion(self, at: Point) -> Point:
@@ -103,12 +97,12 @@ class WalkingCycle:
         times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
         energy = parts["ssp"].objective * times["ssp"] + parts["dsp"].objective * times["dsp"]
-        rows = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
+        own = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
         indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
             objective=energy / period if self.at_given_speed else energy / step,
-            constraints=(*rows, *_jump_rows(jumps, at), *self._step_rows(at)),
+            constraints=(*own, *_jump_rows(jumps, at), *self._step_rows(at)),
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
@@ -123,10 +117,7 @@ class WalkingCycle:
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
         if not self.at_given_speed:
             return ()
-        lower, upper = (motion[f"{STEP}.{end}"] for end in ("lower", "upper"))
-        return (
-            Constraint(name="step_length", unit="m", scale=MARGIN_SCALE, value=motion[STEP], lower=lower, upper=upper),
-        )
+        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"]),)
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Changes of torques (22, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""
@@ -204,18 +195,7 @@ def joined(phases: Mapping[str, Signals]) -> Signals:
 
 def _jump_rows(jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
     limit = motion["torque_jump_limit_Nm"]
-    return tuple(
-        Constraint(
-            name=f"{switch}_torque_jump",
-            labels=JOINTS,
-            unit="Nm",
-            scale=TORQUE_SCALE,
-            value=jump,
-            lower=-limit,
-            upper=limit,
-        )
-        for switch, jump in jumps.items()
-    )
+    return tuple(rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, JOINTS) for switch, jump in jumps.items())
 
 
 def _named_for(point: Point, phase: str) -> Point:

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.problem import Constraint, GaitProblem, Grid, InstantPoint, Point, maker
-from nlp_gait.problems.biped.goals import MeanPower
-from nlp_gait.problems.biped.parts import ANGLE_SCALE, REACH_MARGIN, AngleLimits, Contribution, Part
+from nlp_gait.problem import GaitProblem, Grid, InstantPoint, Point, maker
+from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.parts import REACH_MARGIN, AngleLimits, Contribution, Part, rows
 from nlp_gait.problems.biped.phase import Phase, Plan
 from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
@@ -105,7 +105,6 @@ def nao_dsp_free(
             ),
             FlatSoles(lambda at, s: closure(model, pose(at, s), ankles)[1]),
         ),
-        goal=MeanPower(),
     )
     return phase_problem(
         "nao-dsp-free",
@@ -129,13 +128,6 @@ class FlatSoles(Part):
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Two-sided rows."""
-        row = Constraint(
-            name="sole_turn",
-            labels=tuple(f"{side}, {k}" for k in range(1, samples.steps) for side in ("left", "right")),
-            unit="rad",
-            scale=ANGLE_SCALE,
-            value=ca.vec(samples.traces["sole_turn"][:, 1:-1]),
-            lower=MX(-FLAT),
-            upper=MX(FLAT),
-        )
-        return Contribution(rows=(row,))
+        names = labels(("left", "right"), range(1, samples.steps))
+        turns = ca.vec(samples.traces["sole_turn"][:, 1:-1])
+        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names),))

@@ -18,13 +18,14 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Constraint, InstantPoint, Point, Signals
+from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.parts import (
-    HEIGHT_SCALE,
     REACH_MARGIN,
     Contribution,
     Part,
     halfway_rows,
     limit_rows,
+    rows,
 )
 from nlp_gait.problems.biped.phase import Loader, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import Samples
@@ -233,8 +234,8 @@ class FreeLimits(Part):
 
 def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
     """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
-    labels = tuple(f"{corner}, {k}" for k in range(1, values.shape[1] + 1) for corner in corners)
-    return Constraint(name=name, labels=labels, unit="m", scale=HEIGHT_SCALE, value=ca.vec(values), lower=MX(0.0))
+    names = labels(corners, range(1, values.shape[1] + 1))
+    return rows(name, "m", ca.vec(values), MX(0.0), labels=names)
 
 
 def free_splines(trajectory: Trajectory) -> Splines:

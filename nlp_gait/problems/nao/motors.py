@@ -22,16 +22,16 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem import Constraint, Parameter, Point
+from nlp_gait.problem import Parameter, Point
+from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.goals import HEAT_LOSS, Draw
-from nlp_gait.problems.biped.parts import ANGLE_SCALE, TORQUE_SCALE, Contribution, Part
-from nlp_gait.problems.biped.samples import Samples, labels, time_mean
+from nlp_gait.problems.biped.parts import Contribution, Part, rows
+from nlp_gait.problems.biped.samples import Samples, time_mean
 from nlp_gait.problems.nao.body import JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-SPEED_SCALE = 1.0  # 1 rad/s too fast counts like 1 rad or 1 Nm
 FEATURES = ("limits", "ankle", "free-braking", "regeneration", "heat")
 
 SHARED = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
@@ -157,7 +157,6 @@ class MotorLimits(Part):
         """Two-sided rows, and an upper bound on the mean squares' roots."""
         torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
         n = torque.shape[1]
-        at_samples = [str(k) for k in range(n)]
         motors = [k for k, joint in enumerate(JOINTS) if joint != SHARED[1]]
         names = tuple(JOINTS[k] for k in motors)
         loads = _by_motor(torque)[motors, :]
@@ -169,35 +168,14 @@ class MotorLimits(Part):
             place[names.index(joint), column] = 1.0
         drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
         speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in moving])
-        too_fast = Constraint(
-            name="joint_speed",
-            labels=labels(moving, at_samples),
-            unit="rad/s",
-            scale=SPEED_SCALE,
-            value=ca.vec(qd),
-            lower=MX(-ca.repmat(speed, n, 1)),
-            upper=MX(ca.repmat(speed, n, 1)),
-        )
+        fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
+        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, labels(moving, range(n)))
         too_weak = [
-            Constraint(
-                name=f"torque_{kind}",
-                labels=labels(names, at_samples),
-                unit="Nm",
-                scale=TORQUE_SCALE,
-                value=ca.vec(loads + sign * drop),
-                lower=-supply * ca.repmat(stall, n, 1),
-                upper=supply * ca.repmat(stall, n, 1),
-            )
-            for kind, sign in (("forwards", 1.0), ("backwards", -1.0))
+            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, labels(names, range(n)))
+            for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
-        too_hot = Constraint(
-            name="continuous_torque",
-            labels=names,
-            unit="Nm",
-            scale=TORQUE_SCALE,
-            value=ca.sqrt(time_mean(loads**2)),
-            upper=MX(DM([rating.continuous_torque_Nm for rating in ratings])),
-        )
+        continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
+        too_hot = rows("continuous_torque", "Nm", ca.sqrt(time_mean(loads**2)), upper=continuous, labels=names)
         return Contribution(rows=(too_fast, *too_weak, too_hot))
 
 
@@ -209,26 +187,16 @@ class AnkleCoupling(Part):
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows with one bound each."""
         angles: Mapping[str, MX] = dict(zip(samples.moving, ca.vertsplit(samples.q), strict=True))
-        rows = []
+        names = [str(k) for k in range(samples.steps + 1)]
+        found = []
         for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
             pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
             least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
-            for name, line, lower, upper in (
-                ("least", least, MX(0.0), None),
-                ("greatest", greatest, None, MX(0.0)),
-            ):
-                rows.append(
-                    Constraint(
-                        name=f"{side}AnkleRoll_{name}",
-                        labels=tuple(str(k) for k in range(samples.steps + 1)),
-                        unit="rad",
-                        scale=ANGLE_SCALE,
-                        value=roll - line,
-                        lower=lower,
-                        upper=upper,
-                    )
-                )
-        return Contribution(rows=tuple(rows))
+            found += [
+                rows(f"{side}AnkleRoll_least", "rad", roll - least, lower=MX(0.0), labels=names),
+                rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, upper=MX(0.0), labels=names),
+            ]
+        return Contribution(rows=tuple(found))
 
 
 def ankle_roll(pitch: MX, column: int) -> MX:

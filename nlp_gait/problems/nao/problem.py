@@ -9,7 +9,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Assembly, GaitProblem, Playback, Point
-from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal, MeanPower
+from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal
 from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import GRAVITY, PLANNED_JOINTS, nao
@@ -39,7 +39,7 @@ def goal_of(criterion: Criterion, motors: Motors) -> Goal:
         )
     if criterion != "power":
         return SMOOTHNESS[criterion]
-    return MeanPower() if motors.draw is None else MeanPower(draw=motors.draw)
+    return Goal() if motors.draw is None else Goal(draw=motors.draw)
 
 
 def phase_problem(

@@ -9,7 +9,6 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Grid, maker
-from nlp_gait.problems.biped.goals import MeanPower
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory
 from nlp_gait.problems.nao.free_joints import FreeLimits, FreeMotion, FreePhase, free_splines, joint_coefficients
@@ -75,7 +74,6 @@ def nao_ssp_free(
             *paper_parts(model, single_support_margins(stance.support_xy, foot), single_support_mean_margins(foot)),
             FreeLimits(model, sum(stance.swing_x) / 2, stance.support_xy[1] - foot.right_m),
         ),
-        goal=MeanPower(),
         free=motion,
     )
 
