@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from casadi import DM, SX
+from casadi import DM, SX, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import InstantPoint
+from nlp_gait.problems.biped.phase import Plan
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
@@ -84,20 +85,30 @@ def hip_motion(
     )
 
 
-def leg_joints(
-    robot: Robot, side: str, hip: Motion, ankle: Motion, margin: SX, ops: Nonsmooth
-) -> tuple[dict[str, Motion], SX]:
-    """Joint motions of one leg under an upright torso, and the cosine of its knee."""
-    geometry = leg_geometry(robot, side)
-    hip_to_ankle = Motion(
-        ankle.position - hip.position - DM(geometry.hip_m),
-        ankle.velocity - hip.velocity,
-        ankle.acceleration - hip.acceleration,
+def upright_plan(
+    robot: Robot, hip: Motion, ankles: Mapping[str, Motion], arms: Mapping[str, Motion], margin: SX, ops: Nonsmooth
+) -> Plan:
+    """Motion of the whole robot under an upright torso: legs in closed form between the hip and both ankles by side."""
+    joints: dict[str, Motion] = {}
+    reach = []
+    for side, ankle in ankles.items():
+        geometry = leg_geometry(robot, side)
+        hip_to_ankle = Motion(
+            ankle.position - hip.position - DM(geometry.hip_m),
+            ankle.velocity - hip.velocity,
+            ankle.acceleration - hip.acceleration,
+        )
+        leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
+        rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS)))
+        joints |= {f"{side}HipYawPitch": constant(0.0)}
+        joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
+        reach.append(leg.reach)
+    return Plan(
+        joints={**joints, **arms},
+        hip=hip.position,
+        ankles={side: ankle.position for side, ankle in ankles.items()},
+        reach=vertcat(*reach),
     )
-    leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-    rows = [Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS))]
-    joints = {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
-    return {f"{side}HipYawPitch": constant(0.0), **joints}, leg.reach
 
 
 def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from casadi import SX, fmax, vertcat
+from casadi import SX, fmax, vertcat, vertsplit
 
 from nlp_gait.problem import InstantPoint, Variable
 from nlp_gait.problems.biped.parts import REACH_MARGIN
 from nlp_gait.problems.biped.phase import Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
-from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, leg_joints
+from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, upright_plan
 from nlp_gait.problems.nao.legs import hip_variables, leg_geometry
 from nlp_gait.problems.nao.single_support import LIFT, swing_foot
 from nlp_gait.robots import Robot
@@ -135,60 +135,35 @@ def cycle_from(at: InstantPoint) -> Cycle:
 
 def single_support_planner(robot: Robot) -> Planner:
     """From lift-off to touch-down over the left foot."""
-    (left_y, right_y), (left_z, right_z) = _feet_y(robot), _ankle_heights(robot)
+    left, (right_y, right_z) = _standing(robot, "L"), _place(robot, "R")
 
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
-        cycle, margin = cycle_from(at), at[REACH_MARGIN]
-        ankles = {
-            "L": stack(*map(constant, (0.0, left_y, left_z))),
-            "R": swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase),
-        }
-        return _plan(robot, cycle.lift_off, cycle.touch_down, ankles, cycle.single, margin, phase, ops)
+        cycle = cycle_from(at)
+        swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
+        hip, arms = _between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
+        return upright_plan(robot, hip, {"L": left, "R": swing}, arms, at[REACH_MARGIN], ops)
 
     return plan
 
 
 def double_support_planner(robot: Robot) -> Planner:
     """From touch-down to the mirror image of lift-off over both feet."""
-    (left_y, right_y), (left_z, right_z) = _feet_y(robot), _ankle_heights(robot)
+    left, right = _standing(robot, "L"), _standing(robot, "R")
 
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
-        cycle, margin = cycle_from(at), at[REACH_MARGIN]
-        ahead = Motion(cycle.step, SX(0), SX(0))
-        ankles = {
-            "L": stack(*map(constant, (0.0, left_y, left_z))),
-            "R": stack(ahead, constant(right_y), constant(right_z)),
-        }
-        return _plan(robot, cycle.touch_down, cycle.end, ankles, cycle.double, margin, phase, ops)
+        cycle = cycle_from(at)
+        ahead = right._replace(position=right.position + vertcat(cycle.step, 0, 0))
+        hip, arms = _between(cycle.touch_down, cycle.end, cycle.double, phase)
+        return upright_plan(robot, hip, {"L": left, "R": ahead}, arms, at[REACH_MARGIN], ops)
 
     return plan
 
 
-def _plan(
-    robot: Robot,
-    start: State,
-    end: State,
-    ankles: dict[str, Motion],
-    duration: SX,
-    margin: SX,
-    phase: SX,
-    ops: Nonsmooth,
-) -> Plan:
-    hip = stack(
-        *(
-            cubic(start.hip[i], end.hip[i], start.hip_velocity[i], end.hip_velocity[i], duration, phase)
-            for i in range(3)
-        )
-    )
-    swing = cubic(start.arms, end.arms, start.arms_rate, end.arms_rate, duration, phase)
-    left, left_reach = leg_joints(robot, "L", hip, ankles["L"], margin, ops)
-    right, right_reach = leg_joints(robot, "R", hip, ankles["R"], margin, ops)
-    return Plan(
-        joints={**left, **right, **_arms(swing)},
-        hip=hip.position,
-        ankles={side: ankle.position for side, ankle in ankles.items()},
-        reach=vertcat(left_reach, right_reach),
-    )
+def _between(start: State, end: State, duration: SX, phase: SX) -> tuple[Motion, dict[str, Motion]]:
+    """Motion of the hip (3,) [m] and of the arms' joints [rad] from state to state."""
+    ends = zip(*(vertsplit(part) for part in (start.hip, end.hip, start.hip_velocity, end.hip_velocity)), strict=True)
+    hip = stack(*(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in ends))
+    return hip, _arms(cubic(start.arms, end.arms, start.arms_rate, end.arms_rate, duration, phase))
 
 
 def _arms(swing: Motion) -> dict[str, Motion]:
@@ -206,10 +181,12 @@ def _arms(swing: Motion) -> dict[str, Motion]:
     }
 
 
-def _feet_y(robot: Robot) -> tuple[float, float]:
-    """Of both ankles, each below its own hip joint [m]."""
-    return leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1]
+def _place(robot: Robot, side: str) -> tuple[float, float]:
+    """Of an ankle below its own hip joint: across the walking direction, and its height [m]."""
+    geometry = leg_geometry(robot, side)
+    return geometry.hip_m[1], geometry.ankle_height_m
 
 
-def _ankle_heights(robot: Robot) -> tuple[float, float]:
-    return robot.feet["left"].ankle_height_m, robot.feet["right"].ankle_height_m
+def _standing(robot: Robot, side: str) -> Motion:
+    """An ankle (3,) at rest at x = 0 [m]."""
+    return stack(*map(constant, (0.0, *_place(robot, side))))

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
-from casadi import DM, MX, SX, fmax, vertcat
+from casadi import DM, MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
 from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
-from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, leg_joints, nao, upright_links
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.problems.nao.curves import (
     Splines,
     Trajectory,
@@ -157,21 +157,14 @@ def double_support_mean_margins(box: Box[float]) -> Point2:
 
 def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Planner:
     """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
-    ankles = standing_ankles(robot, soles)
+    ankles = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in standing_ankles(robot, soles).items()}
 
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
-        duration, margin = double_support_duration(at), at[REACH_MARGIN]
+        duration = double_support_duration(at)
         more = splines.motions(at, duration, phase)
         hip = double_support_hip(at, more, soles, phase)
-        still = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in ankles.items()}
-        left, left_reach = leg_joints(robot, "L", hip, still["L"], margin, ops)
-        right, right_reach = leg_joints(robot, "R", hip, still["R"], margin, ops)
-        return Plan(
-            joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
-            hip=hip.position,
-            ankles=ankles,
-            reach=vertcat(left_reach, right_reach),
-        )
+        arms = arm_motions(more, ARM_SWING, duration, phase)
+        return upright_plan(robot, hip, ankles, arms, at[REACH_MARGIN], ops)
 
     return plan
 

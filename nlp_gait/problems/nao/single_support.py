@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from casadi import MX, SX, fmax, vertcat
+from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
-from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, leg_joints, nao, upright_links
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.problems.nao.curves import (
     Splines,
     Trajectory,
@@ -133,16 +133,12 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
         duration = single_support_duration(at)
         more = splines.motions(at, duration, phase)
         hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, duration, phase)
-        support = stack(*map(constant, (*stance.support_xy, ankle_heights[0])))
-        swing = _swing(at, stance, more, ankle_heights[1], phase)
-        left, left_reach = leg_joints(robot, "L", hip, support, at[REACH_MARGIN], ops)
-        right, right_reach = leg_joints(robot, "R", hip, swing, at[REACH_MARGIN], ops)
-        return Plan(
-            joints={**left, **right, **arm_motions(more, ARM_SWING, duration, phase)},
-            hip=hip.position,
-            ankles={"L": support.position, "R": swing.position},
-            reach=vertcat(left_reach, right_reach),
-        )
+        ankles = {
+            "L": stack(*map(constant, (*stance.support_xy, ankle_heights[0]))),
+            "R": _swing(at, stance, more, ankle_heights[1], phase),
+        }
+        arms = arm_motions(more, ARM_SWING, duration, phase)
+        return upright_plan(robot, hip, ankles, arms, at[REACH_MARGIN], ops)
 
     return plan
 
