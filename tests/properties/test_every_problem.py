@@ -16,6 +16,7 @@ from nlp_gait.backends.solvers.ipopt import WIDTHS, IpoptSettings, ipopt_for
 from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.registry import PROBLEMS
+from tests.evaluation import evaluated
 
 # Left out of all but the first test, with the reason.
 TRANSCRIBED = {
@@ -50,11 +51,6 @@ def problem_of(name: str, kind: str | None = None) -> GaitProblem:
     return load(name) if kind is None else load(name, derivatives=kind)
 
 
-def evaluated(problem: GaitProblem, x: Array) -> tuple[Array, ...]:
-    """cost, violation, g, lower, upper and indexes."""
-    return tuple(np.array(value).ravel() for value in exact_model(problem).function(x, problem.p))
-
-
 def test_what_is_left_out_is_left_out_for_its_reason() -> None:
     assert set(TRANSCRIBED) == {name for name in PROBLEMS if not problem_of(name).searchable}
 
@@ -70,9 +66,8 @@ far = (
 def test_every_output_is_finite_for_every_finite_x(name: str, kind: str | None, data: st.DataObject) -> None:
     problem = problem_of(name, kind)
     x = np.array(data.draw(st.lists(far, min_size=len(problem.names), max_size=len(problem.names))))
-    cost, violation, g, _, _, indexes = evaluated(problem, x)
-    for output in (cost, violation, g, indexes):
-        assert np.isfinite(output).all()
+    found = evaluated(problem, x)
+    assert np.isfinite([found.cost, found.violation, *found.g, *found.indexes.values()]).all()
 
 
 @of_every_variant
@@ -87,10 +82,10 @@ def test_a_violation_is_zero_if_and_only_if_every_row_holds(
     share = rng.uniform(-0.1, 1.1, len(problem.names)) if outside else rng.random(len(problem.names))
     x = problem.lower + share * problem.scale
     for candidate in (problem, relaxed(problem)):
-        _, violation, g, lower, upper, _ = evaluated(candidate, x)
-        excess = np.maximum(np.maximum(lower - g, g - upper), 0.0)
-        assert (violation[0] == 0.0) == bool(((lower <= g) & (g <= upper)).all())
-        assert violation[0] == pytest.approx(float(excess @ (1 / exact_model(problem).row_scales)), rel=ROUNDING)
+        found = evaluated(candidate, x)
+        excess = np.maximum(np.maximum(found.lower - found.g, found.g - found.upper), 0.0)
+        assert (found.violation == 0.0) == (not found.broken)
+        assert found.violation == pytest.approx(float(excess @ (1 / exact_model(problem).row_scales)), rel=ROUNDING)
 
 
 def relaxed(problem: GaitProblem) -> GaitProblem:
@@ -108,7 +103,7 @@ def relaxed(problem: GaitProblem) -> GaitProblem:
 def test_the_test_above_sees_feasible_and_infeasible_candidates(name: str) -> None:
     problem, rng = problem_of(name), np.random.default_rng(0)
     points = [rng.uniform(problem.lower, problem.upper) for _ in range(200)]
-    feasible = [evaluated(candidate, x)[1][0] == 0.0 for candidate in (problem, relaxed(problem)) for x in points]
+    feasible = [evaluated(candidate, x).violation == 0.0 for candidate in (problem, relaxed(problem)) for x in points]
     assert {True, False} == set(feasible)
 
 
@@ -139,9 +134,9 @@ def test_no_start_ends_below_what_the_exact_functions_find_around_it(name: str) 
     for size in (1e-2, 1e-3, 1e-4):
         for _ in range(100):
             x = np.clip(end.x + size * problem.scale * rng.normal(size=end.x.size), problem.lower, problem.upper)
-            cost, violation, *_ = evaluated(problem, x)
-            if violation[0] == 0.0:
-                assert cost[0] >= end.cost * (1 - np.sign(end.cost) * SOLVED)
+            found = evaluated(problem, x)
+            if found.violation == 0.0:
+                assert found.cost >= end.cost * (1 - np.sign(end.cost) * SOLVED)
 
 
 def inside(name: str) -> tuple[NlpModel, Array, Array]:

@@ -32,5 +32,5 @@ def test_lever_rule_and_fast_motion(gait):
 def test_a_wrong_mass_is_noticed(gait):
     """The oracle is not blind: another robot's torques differ by far more than rounding."""
     v5, v6 = gait("ssp optimum"), gait("ssp optimum", robot="nao-v6")
-    signals = v5.problem.signals(v5.x, v5.problem.p)
+    signals = v5.problem.signals(v5.x)
     assert np.abs(engine_torques(v6, signals) - signals.arrays["tau"]).max() > 1e-3

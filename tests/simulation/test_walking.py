@@ -124,6 +124,7 @@ def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int)
 
 def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(
-        InputError, match="only gaits of 'nao-cycle' can be played for several steps, got one of 'nao-ssp'"
+        InputError,
+        match="problem 'nao-ssp' is no cycle that can be repeated; several steps can be played of 'nao-cycle'",
     ):
         plan_of(gait("ssp optimum"), 2)

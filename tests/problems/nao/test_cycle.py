@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
-from nlp_gait.problems.nao.body import GRAVITY
+from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.properties.mirror import JOINT_SIGNS, partner
 
@@ -70,7 +70,11 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
-    found = walking_cycle(**problem.options).signals(problem.symbols(), x, problem.p)  # type: ignore[arg-type]
+    """Single and double support, both with their samples at the switch."""
+    model, share = nao("nao-v5", rotational_inertia=True), problem.options["torso_share"]
+    assert problem.grid is not None
+    cycle = walking_cycle(model, share, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 
 
@@ -79,11 +83,6 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
     columns = {joint: i for i, joint in enumerate(signals.joints)}
     values = signals.arrays[name][row]
     return np.array([JOINT_SIGNS[joint] * values[columns[partner(joint)]] for joint in signals.joints])
-
-
-def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    model = exact_model(problem)
-    return dict(zip(model.index_names, np.array(model.function(x, problem.p)[5]).ravel().tolist(), strict=True))
 
 
 def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
@@ -97,7 +96,7 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
     at_speed: GaitProblem, sampled: list[Sampled]
 ) -> None:
     for x, single, double in sampled:
-        step = indexes(at_speed, x)["step_length_m"]
+        step = evaluated(at_speed, x).indexes["step_length_m"]
         for name in ("q", "qd"):
             np.testing.assert_allclose(double.arrays[name][-1], mirrored_row(single, name, 0), rtol=0, atol=CONTINUITY)
         for end, start in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
@@ -110,8 +109,7 @@ def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed
     dense = at_speed.dense(100)
     assert dense is not None
     x = candidates(at_speed)[0]
-    cycle = walking_cycle(**dense.options, samples_per_interval=100)  # type: ignore[arg-type]
-    single, double = cycle.signals(dense.symbols(), x, dense.p).values()
+    single, double = phases(dense, x)
 
     def rate(signals: Signals, name: str, end: int) -> Array:
         t, y = signals.arrays["t"], signals.arrays[name]
@@ -129,7 +127,6 @@ def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed
 
 
 def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
-    assert at_speed.signals is not None
     x = candidates(at_speed)[0]
     signals = at_speed.signals(x)
     assert (np.diff(signals.arrays["t"]) > 0.0).all()
@@ -186,11 +183,11 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         for signals in halves:
             tau, qd, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
             energy += float(np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
-        power = float(exact_model(at_speed).function(x, at_speed.p)[0])
+        power = evaluated(at_speed, x).cost
         assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
-        per_metre = float(exact_model(free).function(np.append(x, step), free.p)[0])
+        per_metre = evaluated(free, np.append(x, step)).cost
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
-        figures = indexes(at_speed, x)
+        figures = evaluated(at_speed, x).indexes
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
         weight = load_robot("nao-v5").mass_kg * GRAVITY
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
@@ -198,7 +195,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
 
 def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     x, single, double = sampled[0]
-    figures = indexes(at_speed, x)
+    figures = evaluated(at_speed, x).indexes
     touch_down = double.arrays["tau"][0] - single.arrays["tau"][-1]
     lift_off = mirrored_row(single, "tau", 0) - double.arrays["tau"][-1]
     assert figures["touch_down_torque_jump_Nm"] == pytest.approx(np.abs(touch_down).max(), rel=ROUNDING)
@@ -208,10 +205,9 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
 def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
     x = candidates(at_speed)[0]
     fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
-    model = exact_model(fast)
-    _, _, g, _, upper, _ = (np.array(value).ravel() for value in model.function(x, fast.p))
-    row = model.row_names.index("step_length")
-    assert g[row] == pytest.approx(0.144) and upper[row] == pytest.approx(0.122)
+    found = evaluated(fast, x)
+    row = found.row_names.index("step_length")
+    assert found.g[row] == pytest.approx(0.144) and found.upper[row] == pytest.approx(0.122)
 
 
 def test_the_published_limits_are_the_defaults() -> None:

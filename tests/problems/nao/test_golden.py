@@ -16,8 +16,9 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, load
+from nlp_gait.problem import load
 from nlp_gait.problems.nao.double_support import TorsoShare, torso_shares
+from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 LABELS = [row["label"] for row in GOLDEN["rows"]]
@@ -31,15 +32,9 @@ MOST_INSTRUCTIONS = 5000
 NAMES = ("nao-ssp", "nao-dsp")
 
 
-def indexes(problem: GaitProblem, x: Array | list[float]) -> dict[str, float]:
-    exact = exact_model(problem)
-    values = np.array(exact.function(x, problem.p)[5]).ravel()
-    return dict(zip(exact.index_names, map(float, values), strict=True))
-
-
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
 def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
-    got = indexes(load(row["problem"]), row["x"])
+    got = evaluated(load(row["problem"]), row["x"]).indexes
     assert list(got) == GOLDEN["indexes"]
     assert list(got.values()) == pytest.approx(row["values"], rel=0, abs=GOLDEN_TOLERANCE)
 
@@ -54,7 +49,7 @@ def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> 
 
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
 def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: dict[str, Any]) -> None:
-    power = indexes(load(row["problem"], derivatives="finite-difference"), row["x"])["power_W"]
+    power = evaluated(load(row["problem"], derivatives="finite-difference"), row["x"]).indexes["power_W"]
     analytic = row["values"][0]
     assert 1e-4 < abs(power / analytic - 1) < FINITE_DIFFERENCE_SHARE
 
@@ -63,7 +58,7 @@ def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: d
 def test_with_many_intervals_finite_differences_become_the_derivatives(row: dict[str, Any]) -> None:
     """One-sided differences at the ends err by the first power of the step: 1,000 intervals leave less than 1e-3."""
     powers = [
-        indexes(load(row["problem"], derivatives=kind, intervals=1000), row["x"])["power_W"]
+        evaluated(load(row["problem"], derivatives=kind, intervals=1000), row["x"]).indexes["power_W"]
         for kind in ("analytic", "finite-difference")
     ]
     assert powers[0] == pytest.approx(powers[1], rel=1e-3)
@@ -79,14 +74,14 @@ def test_the_function_of_one_sample_stays_small(name: str) -> None:
 @pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
 def test_other_versions_of_the_robot_give_a_similar_but_other_gait(name: str, robot: str) -> None:
     row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
-    power = indexes(load(name, robot=robot), row["x"])["power_W"]
+    power = evaluated(load(name, robot=robot), row["x"]).indexes["power_W"]
     assert 1e-5 < abs(power / row["values"][0] - 1) < 0.1  # masses differ by at most 2 %
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_point_masses_change_torques_a_little(name: str) -> None:
     row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
-    power = indexes(load(name, rotational_inertia=False), row["x"])["power_W"]
+    power = evaluated(load(name, rotational_inertia=False), row["x"]).indexes["power_W"]
     assert 1e-6 < abs(power / row["values"][0] - 1) < 0.02  # the gaits are slow: gravity rules
 
 
@@ -114,7 +109,7 @@ def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     dense = coarse.dense(100)
     assert dense is not None
     assert dense.value("torque_change_limit_Nm") == 0.9
-    few, many = indexes(coarse, x), indexes(dense, x)
+    few, many = evaluated(coarse, x).indexes, evaluated(dense, x).indexes
     assert many["power_W"] == pytest.approx(few["power_W"], rel=0.02)
     assert many["dbm_y_min_m"] <= few["dbm_y_min_m"] + 1e-12  # the dense grid contains the coarse one
     assert many["torque_change_Nm"] >= few["torque_change_Nm"] - 1e-12  # still over a tenth of the phase
@@ -130,8 +125,8 @@ wild = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 1e-300, -1.0, 1e6])
 @example(x=[1e6] * 9)
 def test_the_exact_functions_are_finite_for_every_finite_x(x: list[float]) -> None:
     for problem in EVALUATED:
-        for output in exact_model(problem).function(x[: len(problem.names)], problem.p)[:3]:
-            assert np.isfinite(np.array(output)).all()
+        found = evaluated(problem, x[: len(problem.names)])
+        assert np.isfinite([found.cost, found.violation, *found.g]).all()
 
 
 EVALUATED = [load(name, derivatives=kind) for name in NAMES for kind in ("analytic", "finite-difference")]
@@ -139,13 +134,10 @@ EVALUATED = [load(name, derivatives=kind) for name in NAMES for kind in ("analyt
 
 def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
     problem = load("nao-ssp")
-    exact = exact_model(problem)
-    x = np.array([0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
-    cost, violation, g, lower, upper, _ = (np.array(value).ravel() for value in exact.function(x, problem.p))
-    assert np.isfinite(cost[0])
-    assert violation[0] > 0
-    broken = {name for name, bad in zip(exact.row_names, (g < lower) | (g > upper), strict=True) if bad}
-    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in broken)
+    found = evaluated(problem, [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
+    assert np.isfinite(found.cost)
+    assert found.violation > 0
+    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in found.broken)
 
 
 @pytest.mark.parametrize(
