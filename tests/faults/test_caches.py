@@ -41,7 +41,7 @@ def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
 
 
 def test_two_processes_share_a_cache_and_an_output_folder(tmp_path: Path) -> None:
-    alone = start(*SEARCH, "--out", str(tmp_path / "alone"), NLP_GAIT_CACHE=str(tmp_path / "other-cache"))
+    alone = start(*SEARCH, "--out", str(tmp_path / "alone"))
     both = [start(*SEARCH, "--out", str(tmp_path / "both"), NLP_GAIT_CACHE=str(tmp_path / "cache")) for _ in range(2)]
     for process in (alone, *both):
         _, messages = process.communicate(timeout=120)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.fuzz.commands import ended, mutated_line, workplace
 
-LINES = 80
+LINES = 40
 # Each once ended in a traceback, a hang, or an answer to another question.
 KEPT = (
     ("report", "9" * 400),

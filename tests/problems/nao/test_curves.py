@@ -114,7 +114,9 @@ def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: 
 
 
 def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
-    cubic, quintic = (load("nao-dsp", trajectory=order, samples_per_interval=2) for order in ("cubic", "quintic"))
+    cubic, quintic = (
+        load("nao-dsp", trajectory=order, intervals=5, samples_per_interval=2) for order in ("cubic", "quintic")
+    )
     first = solve(cubic, starts=1, seed=1)
     second = solve(quintic, starts=1, x0=np.array([*first.x.values(), *np.zeros(14)]))
     assert first.success and second.success
