@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Array, GaitProblem
 
@@ -46,13 +44,4 @@ class Evaluation:
 def evaluated(problem: GaitProblem, x: Array | Sequence[float]) -> Evaluation:
     """The exact functions at x (n,) and the current parameter values."""
     model = exact_model(problem)
-    found = {key: np.array(value).ravel() for key, value in model.function(x=x, p=problem.p).items()}
-    return Evaluation(
-        cost=float(found["cost"][0]),
-        violation=float(found["violation"][0]),
-        g=found["g"],
-        lower=found["lower"],
-        upper=found["upper"],
-        indexes=dict(zip(model.index_names, found["indexes"].tolist(), strict=True)),
-        row_names=model.row_names,
-    )
+    return Evaluation(**model.at(x, problem.p)._asdict(), row_names=model.row_names)

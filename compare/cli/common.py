@@ -20,7 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from compare.study.runner import ProblemSpec
+from compare.study.task import ProblemSpec
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError, InputError, OutputError, kind_name, unknown
 from nlp_gait.files import without_nan

@@ -28,7 +28,7 @@ def list_problems(
 
 
 def _overview(as_json: bool) -> None:
-    from compare.study.runner import solver_names
+    from compare.study.task import solver_names
     from nlp_gait.robots import robot_names
 
     problems = {name: problem_spec(name, None, None, None, None, None).load() for name in problem_names()}

@@ -49,34 +49,36 @@ def solve(
     option: Options = None,
     values: Set = None,
     fix: Fix = None,
+    solver: Annotated[str, typer.Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
     linear_solver: Annotated[
         str | None, typer.Option(help="IPOPT's, for example ma57 if its library is there (default: mumps).")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Solve a problem with IPOPT from several random starts; the best is judged by the exact functions.
+    """Solve a problem with an NLP solver from several random starts; the best is judged by the exact functions.
 
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
     import nlp_gait
     from nlp_gait.backends.interrupts import Interrupted
+    from nlp_gait.backends.solvers import registry
     from nlp_gait.files import without_nan, write_json
 
     target = None if out is None else output_file(out)
     loaded = problem_spec(problem, robot, intervals, derivatives, option, values, fix).load()
     first = None if x0 is None else loaded.check_x(parse_numbers(x0))
-    settings = nlp_gait.IpoptSettings(linear_solver=linear_solver)
+    chosen = registry.solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
     starts = loaded.starts if starts is None else starts
     stopped = ""
-    with progress_bar("IPOPT starts", starts) as advance:
+    with progress_bar(f"{solver} starts", starts) as advance:
         try:
             solution = nlp_gait.solve(
                 loaded,
                 starts=starts,
                 seed=seed,
                 x0=first,
-                settings=settings,
+                solver=chosen,
                 progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
             )
         except Interrupted as interrupt:
@@ -113,5 +115,5 @@ def _print(solution: Solution) -> None:
     time = solution.time_s
     stdout.print(
         f"build {time.build:.2f} s, derivatives {time.compile:.2f} s, solve {time.solve:.2f} s; "
-        f"{solution.solver} with {solution.linear_solver}"
+        f"{solution.solver}{f' with {solution.linear_solver}' if solution.linear_solver else ''}"
     )

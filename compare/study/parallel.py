@@ -10,7 +10,7 @@ from typing import Any
 
 from compare.study.steps import Steps
 from compare.study.workers import default_jobs
-from nlp_gait.backends.interrupts import deaf_children
+from nlp_gait.backends.interrupts import children_ignore_interrupts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ def _results(out: Path, jobs: Sequence[Job]) -> Iterator[Any]:
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers, return_as="generator", batch_size=1, pre_dispatch="all")
-    with deaf_children():
+    with children_ignore_interrupts():
         results = parallel(delayed(_run)(out, job) for job in jobs)
     yield from results
 

@@ -73,9 +73,9 @@ def test_ipopt_goes_on_with_interpreted_functions_and_that_is_said(
 ) -> None:
     monkeypatch.setenv("CXX", fake_compiler(tmp_path, FAULTS[fault][0]))
     monkeypatch.setattr(compiler_module, "TIME_LIMIT_S", 0.5)
-    monkeypatch.setattr(ipopt, "WORTHWHILE_STARTS", 2)
+    monkeypatch.setattr(ipopt, "WORTHWHILE_SOLVES", 2)
     solution = nlp_gait.solve(toy(corner), starts=2)
     assert solution.success and solution.functions == "interpreted"
     assert len(caplog.messages) == 1 and "IPOPT's functions are interpreted: " in caplog.messages[0]
     with pytest.raises(CompilerError):
-        nlp_gait.solve(toy(corner), settings=IpoptSettings(compiled=True))
+        nlp_gait.solve(toy(corner), solver=IpoptSettings(compiled=True))

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.backends.solvers.ipopt import WIDTHS, IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.registry import PROBLEMS
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Outcome
 from tests.evaluation import evaluated
 
 # Left out of all but the first test, with the reason.
@@ -108,17 +108,17 @@ def test_the_test_above_sees_feasible_and_infeasible_candidates(name: str) -> No
 
 
 @cache
-def solved(name: str) -> tuple[GaitProblem, End]:
+def solved(name: str) -> tuple[GaitProblem, Outcome]:
     """The best of two starts, on a coarse grid: what is compared holds on every one."""
     problem = load(name, intervals=4)
-    ipopt, rng = ipopt_for(problem, IpoptSettings()), np.random.default_rng(0)
+    ipopt, rng = IpoptSettings(), np.random.default_rng(0)
     return problem, min((ipopt.run(problem, problem.start_point(rng)) for _ in range(2)), key=lambda end: end.rank)
 
 
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solved(name)
-    assert end.success
+    assert end.success and end.guess is not None
     model = nlp_model(problem)
     lifted = ca.Function("lifted", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"]])
     cost = float(lifted(end.guess.primal, np.append(problem.p, WIDTHS[-1])))
@@ -143,9 +143,8 @@ def inside(name: str) -> tuple[NlpModel, Array, Array]:
     """NLP, a start point of its variables within the bounds, and its parameters with the widest sigmoid."""
     problem = problem_of(name)
     model = nlp_model(problem)
-    z = (problem.start_point(np.random.default_rng(0)) - model.offset) / model.scale
-    lifted = np.array(model.lift_start(z, problem.p, WIDTHS[0])).ravel()
-    return model, np.concatenate([z, lifted]), np.append(problem.p, WIDTHS[0])
+    start = model.start(problem, problem.start_point(np.random.default_rng(0)), WIDTHS[0])
+    return model, start, np.append(problem.p, WIDTHS[0])
 
 
 def assert_derivative(function: ca.Function, slope: ca.Function, at: Array, rest: tuple[Array, ...]) -> None:

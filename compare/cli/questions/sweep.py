@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 def sweep(
     problem: ProblemName,
     over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
-    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
+    algorithm: Annotated[str, typer.Option(help="An NLP solver, or a search algorithm; see nlp-gait list.")] = "ipopt",
     starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
     evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")] = 10_000,
     seed: Seed = 0,
@@ -58,6 +58,7 @@ def sweep(
     from compare.questions.sweep.report import write_sweep
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
+    from compare.study.task import GRADIENT_SOLVERS
     from nlp_gait.backends.interrupts import Interrupted
     from nlp_gait.files import writable_folder
 
@@ -94,7 +95,7 @@ def sweep(
     if unwritten is not None:
         raise unwritten
     if stopped:
-        not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
+        not_twice = ", not all of them solved from both sides" if algorithm in GRADIENT_SOLVERS else ""
         end_interrupted(f"{stopped}; these are in {folder}{not_twice}")
 
 

@@ -61,7 +61,7 @@ def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
         found["track"]["ipopt"] = steps(
             f"track-ipopt-{case}",
             fingerprint(track),
-            partial(stairs_runs.by_ipopt, track, 1, x0=TRACK_START, settings=TRACK_SETTINGS),
+            partial(stairs_runs.by_ipopt, track, 1, x0=TRACK_START, solver=TRACK_SETTINGS),
         )
         best = best_track(found)
         found["learned"] = steps(

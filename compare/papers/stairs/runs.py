@@ -123,10 +123,10 @@ def other_stairs() -> list[dict[str, Any]]:
     for tread, rise in OTHER_STAIRS:
         impossible = rise >= IMPOSSIBLE_RISE_M
         values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
-        settings = IpoptSettings(iterations=100) if impossible else None
+        solver = IpoptSettings(iterations=100) if impossible else None
         row: dict[str, Any] = {"tread_m": tread, "rise_m": rise}
         for name, starts in (("stairs-plan", 3 if impossible else 8), ("stairs-ideal", 1)):
-            run = by_ipopt(loaded(name).with_values(**values), starts, settings=settings)
+            run = by_ipopt(loaded(name).with_values(**values), starts, solver=solver)
             row[name] = {key: run[key] for key in ("success", "status", "objective", "violations")}
         found.append(row)
     return found

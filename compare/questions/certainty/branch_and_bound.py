@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -88,7 +89,7 @@ def certify(
     if not (tolerance > 0.0 and time_limit_s > 0.0):
         raise InputError(f"tolerance and time limit must be positive, got {tolerance}, {time_limit_s} s")
     x = problem.check_x(incumbent)
-    cost, violation = (float(v) for v in exact_model(problem).function(x, problem.p)[:2])
+    cost, violation, *_ = exact_model(problem).at(x, problem.p)
     if not violation <= FEASIBILITY_TOLERANCE:
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {violation:.3g}")
     started, used = time.perf_counter(), time.process_time()

@@ -17,10 +17,10 @@ from compare.questions.certainty.branch_and_bound import Certificate, certify
 from compare.questions.certainty.clusters import Optimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import Ends, multistart
 from compare.study.steps import Steps, fingerprint
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 # Branch and bound is for this many variables at most: its work grows exponentially with them.
 MOST_CERTIFIED = 4

@@ -120,7 +120,7 @@ def _solved(task: MotionTask, earlier: Sequence[Motion], seed: int) -> Motion:
         starts=task.starts + 1,
         seed=seed,
         x0=x0,
-        settings=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
+        solver=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
     )
     x = np.array(list(solution.x.values()))
     verdict = evaluate(problem, x)
@@ -181,9 +181,7 @@ def _objectives(task: MotionTask, x: Array) -> dict[str, float]:
     found: dict[str, float] = {}
     for name in SMOOTH:
         problem = ProblemSpec(name=task.problem, options={**task.options, "objective": name}).load()
-        found[f"{problem.objective.name} [{problem.objective.unit}]"] = float(
-            exact_model(problem).function(x, problem.p)[0]
-        )
+        found[f"{problem.objective.name} [{problem.objective.unit}]"] = exact_model(problem).at(x, problem.p).cost
     return found
 
 

@@ -121,16 +121,16 @@ def _variant(
     x = np.array([solution.x[variable] for variable in problem.names])
     first = x if first is None else first
     moves = np.abs(x - first) / problem.scale
-    unchanged, violation, *_ = exact_model(problem).function(first, problem.p)
+    unchanged = exact_model(problem).at(first, problem.p)
     return Variant(
         name=name,
         features=VARIANTS[name],
         success=solution.success,
         status=solution.status,
         power_W=solution.objective,
-        unchanged_power_W=float(unchanged),
-        unchanged_violation=float(violation),
-        published_power_W=float(exact_model(published).function(x, published.p)[0]),
+        unchanged_power_W=unchanged.cost,
+        unchanged_violation=unchanged.violation,
+        published_power_W=exact_model(published).at(x, published.p).cost,
         x=solution.x,
         moved=(float(moves.max()), problem.names[int(moves.argmax())]),
         uses=limit_uses(limited, x),
@@ -140,11 +140,11 @@ def _variant(
 def limit_uses(limited: GaitProblem, x: np.ndarray) -> dict[str, Use]:
     """Largest shares of the motors' limits that x (n,) uses, in a problem with ``motors=limits``."""
     exact = exact_model(limited)
-    _, _, value, lower, upper, _ = (np.array(part).ravel() for part in exact.function(x, limited.p))
+    at = exact.at(x, limited.p)
     uses = {}
     for kind, groups in USES.items():
         rows = [i for i, name in enumerate(exact.row_names) if name.split("[")[0] in groups]
-        shares = [value[i] / (upper[i] if value[i] > 0.0 else lower[i]) for i in rows]
+        shares = [at.g[i] / (at.upper[i] if at.g[i] > 0.0 else at.lower[i]) for i in rows]
         largest = int(np.argmax(shares))
         uses[kind] = Use(share=float(shares[largest]), row=exact.row_names[rows[largest]])
     return uses

@@ -11,8 +11,9 @@ from compare.questions.pareto.criteria import Criterion
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from metaheuristics.interface import Array
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 MOST_CHALLENGES = 1000
 
@@ -121,7 +122,7 @@ def challenge(
     excess: list[float] = []
     infeasible = moved = 0
     for point in lowest:
-        power, violation = (float(v) for v in exact.function(np.array(point.x), free.p)[:2])
+        power, violation, *_ = exact.at(point.x, free.p)
         if not violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue

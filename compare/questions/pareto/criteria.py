@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-import numpy as np
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model
@@ -80,9 +79,7 @@ class Margin:
 
     def value(self, problem: GaitProblem, x: Array) -> float:
         """See ``Criterion``."""
-        exact = exact_model(problem)
-        indexes = np.array(exact.function(x, problem.p)[-1]).ravel()
-        return float(indexes[exact.index_names.index(f"{self.name}_m")])
+        return exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
         """See ``Criterion``."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,13 +12,13 @@ import numpy as np
 from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
 from compare.questions.prices.price import STANDS, Price, Prices
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.optima.continuation import Continuation, best_end
+from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
-from nlp_gait.backends.solvers.ipopt import ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import Outcome
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.perturbation import perturbed_name, quantities, split_name
 
@@ -34,26 +33,26 @@ MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 
 
 class Solved(NamedTuple):
-    """An optimum with IPOPT's end, from which neighbours are solved."""
+    """An optimum with the outcome near it, from which neighbours are solved."""
 
     problem: GaitProblem
-    end: End
+    near: Outcome
     optimum: Optimum
 
 
-def solved(problem: GaitProblem, starts: int, seed: int) -> Solved:
+def solved(problem: GaitProblem, starts: int, seed: int, solver: Solver | None = None) -> Solved:
     """Best optimum from random starts, to machine precision.
 
     Raises:
-        InputError: none converged to a feasible point, or the problem is too large.
+        InputError: none converged to a feasible point, the solver gives no multipliers, or the problem is too large.
     """
-    end = best_end(Continuation(starts=starts, seed=seed).run(problem))
-    if end is None:
+    near = best_success(Continuation(starts=starts, seed=seed, solver=solver).run(problem))
+    if near is None:
         raise InputError(
             f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
             "try more --starts, or relax the limits that `nlp-gait solve` names"
         )
-    return Solved(problem, end, optimum(problem, end))
+    return Solved(problem, near, optimum(problem, near))
 
 
 def prices(
@@ -62,24 +61,26 @@ def prices(
     starts: int = 10,
     seed: int = 0,
     checks: int = 3,
+    solver: Solver | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Prices:
     """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
 
     Args:
         spec: the problem.
-        starts: random starts of IPOPT.
+        starts: random starts.
         seed: of the starts.
         checks: how many of the robot's dearest quantities are checked by solving again; of the parameters all are.
+        solver: one that gives multipliers; None for IPOPT, which in any case sharpens what was found.
         progress: called with a note as the work goes on.
 
     Raises:
-        InputError: no optimum was found, or the problem is too large.
+        InputError: no optimum was found, the solver gives no multipliers, or the problem is too large.
     """
     note = progress or (lambda _: None)
     problem = spec.load()
     note("solving")
-    base = solved(problem, starts, seed)
+    base = solved(problem, starts, seed, solver)
     found = base.optimum
     limits, free = list[Price](), 0
     robot: list[Price] = []
@@ -213,7 +214,7 @@ def _checked(
     )
 
 
-def _x_error(problem: GaitProblem, price: Price, low: End, high: End, small: float) -> float | None:
+def _x_error(problem: GaitProblem, price: Price, low: Outcome, high: Outcome, small: float) -> float | None:
     if price.x is None:
         return None
     expected = np.array(list(price.x.values())) / problem.scale
@@ -223,12 +224,11 @@ def _x_error(problem: GaitProblem, price: Price, low: End, high: End, small: flo
     return float(np.abs((high.x - low.x) / (2 * small) / problem.scale - expected).max() / largest)
 
 
-def _neighbour(base: Solved, problem: GaitProblem | None) -> End | None:
+def _neighbour(base: Solved, problem: GaitProblem | None) -> Outcome | None:
     """Optimum of a neighbour, None if there is none or IPOPT does not get there."""
     if problem is None:
         return None
-    ipopt = ipopt_for(problem, SHARP)
-    end = ipopt.run_from(problem, base.end.guess)
-    if not end.success:
-        end = ipopt.run(problem, np.clip(base.end.x, problem.lower, problem.upper))
-    return end if end.success and math.isfinite(end.cost) else None
+    end = SHARP.run_from(problem, base.near)
+    if end is None or not end.success:
+        end = SHARP.run(problem, np.clip(base.near.x, problem.lower, problem.upper))
+    return end if end.success else None

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.robots.perturbation import perturbed_name, split_name
 
 # Limits for which a worst corner is looked for in one round, dearest violation first, one of each group of rows.
@@ -78,8 +79,8 @@ class Family:
 
     def values(self, corner: Corner, x: Array) -> tuple[float, Array, Array, Array]:
         """Cost, rows and their bounds at x (n,)."""
-        cost, _, rows, lower, upper, _ = exact_model(self.problem(corner)).function(x, self.nominal.p)
-        return float(cost), *(np.array(part).ravel() for part in (rows, lower, upper))  # type: ignore[return-value]
+        at = exact_model(self.problem(corner)).at(x, self.nominal.p)
+        return at.cost, at.g, at.lower, at.upper
 
     def worst(self, x: Array, corners: Sequence[Corner]) -> Worst:
         """The worst that a gait meets in some corners; rows are compared in units of their scales."""
@@ -126,5 +127,5 @@ class Family:
         return [corner for corner in dict.fromkeys(candidates) if corner not in known and self._worse(corner, x, cost)]
 
     def _worse(self, corner: Corner, x: Array, cost: float) -> bool:
-        exact_cost, violation = (float(v) for v in exact_model(self.problem(corner)).function(x, self.nominal.p)[:2])
+        exact_cost, violation, *_ = exact_model(self.problem(corner)).at(x, self.nominal.p)
         return violation > FEASIBILITY_TOLERANCE or exact_cost > cost * (1.0 + COST_TOLERANCE)

@@ -62,15 +62,13 @@ def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> P
     point = np.array([x[name] for name in problem.names])
     plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
     trace = play(plan, drive=drive)
-    model = exact_model(problem)
-    indexes = np.array(model.function(point, problem.p)[5]).ravel()
     return Played(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,
         largest_tilt_deg=math.degrees(float(trace.tilt.max())),
         margin_m=lateral_margin(plan, trace, drive),
-        predicted_margin_m=float(indexes[model.index_names.index(MARGIN)]),
+        predicted_margin_m=exact_model(problem).at(point, problem.p).indexes[MARGIN],
     )
 
 

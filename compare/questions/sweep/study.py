@@ -11,9 +11,10 @@ from typing import cast
 import numpy as np
 
 from compare.study.runner import run_task
-from compare.study.task import IPOPT, ProblemSpec, Stop, Task, check_task
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
@@ -88,15 +89,15 @@ def sweep(
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
 
-    IPOPT walks the grid there and back so that each point is a neighbour of the last and starts from it; a search algorithm
-    starts anew at each. Infeasible points are kept, with the rows that stand in the way.
+    An NLP solver walks the grid there and back so that each point is a neighbour of the last and starts from it; a search
+    algorithm starts anew at each. Infeasible points are kept, with the rows that stand in the way.
 
     Args:
         spec: problem with its other values.
         axes: at least one.
-        algorithm: ``"ipopt"`` or a search algorithm.
-        starts: random starts of IPOPT at both ends of its walk, and where no neighbour helps.
-        evaluations: budget of a search run.
+        algorithm: an NLP solver or a search algorithm.
+        starts: random starts of an NLP solver at both ends of its walk, and where no neighbour helps.
+        evaluations: budget of a search run, and of a run of SLSQP.
         seed: of starts and searches.
         progress: called ``count_solves`` times.
 
@@ -111,13 +112,12 @@ def sweep(
     walk = _snake(axes)
     specs = [_with(spec, axes, at) for at in walk]  # all checked before the work
     named = [dict(zip(names, at, strict=True)) for at in walk]
-    if algorithm == IPOPT:
-        solutions, sentence = _solutions([s.load() for s in specs], starts, seed, progress)
-        points = [None if s is None else _ipopt_point(at, s) for at, s in zip(named, solutions, strict=True)]
+    tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
+    check_task(tasks[0])
+    if not tasks[0].is_search:
+        solutions, sentence = _solutions([s.load() for s in specs], tasks[0].solver(), starts, seed, progress)
+        points = [None if s is None else _solved_point(at, s) for at, s in zip(named, solutions, strict=True)]
     else:
-        stop = Stop(evaluations=evaluations)
-        tasks = [Task(problem=s, algorithm=algorithm, stop=stop, seed=seed) for s in specs]
-        check_task(tasks[0])
         points, sentence = _search_points(named, tasks, progress)
     found = dict(zip(walk, points, strict=False))
     grid = [found.get(at) for at in itertools.product(*(axis.values for axis in axes))]
@@ -128,8 +128,8 @@ def sweep(
 
 
 def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
-    """How often a sweep solves a problem: IPOPT twice at each point of the grid."""
-    return math.prod(len(axis.values) for axis in axes) * (2 if algorithm == IPOPT else 1)
+    """How often a sweep solves a problem: an NLP solver twice at each point of the grid."""
+    return math.prod(len(axis.values) for axis in axes) * (2 if algorithm in GRADIENT_SOLVERS else 1)
 
 
 def _with(spec: ProblemSpec, axes: Sequence[Axis], at: Sequence[float]) -> ProblemSpec:
@@ -154,11 +154,11 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
 
 
 def _solutions(
-    problems: Sequence[GaitProblem], starts: int, seed: int, progress: Callable[[], None] | None
+    problems: Sequence[GaitProblem], solver: Solver, starts: int, seed: int, progress: Callable[[], None] | None
 ) -> tuple[Sequence[Solution | None], str]:
     """Solutions along the walk, and how far it came if it was interrupted."""
     try:
-        return solve_both_ways(problems, starts=starts, seed=seed, progress=progress), ""
+        return solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=progress), ""
     except Interrupted as interrupt:
         return cast("list[Solution | None]", interrupt.partial), interrupt.sentence
 
@@ -179,7 +179,7 @@ def _search_points(
     return points, ""
 
 
-def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
+def _solved_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
     return SweepPoint(
         at=at,
         objective=solution.objective,

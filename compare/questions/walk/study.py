@@ -123,9 +123,7 @@ def result_of(spec: ProblemSpec, point: SweepPoint) -> Result:
 
 
 def _indexes(result: Result) -> dict[str, float]:
-    model = exact_model(result.problem)
-    values = np.array(model.function(result.x, result.problem.p)[5]).ravel()
-    return dict(zip(model.index_names, values.tolist(), strict=True))
+    return exact_model(result.problem).at(result.x, result.problem.p).indexes
 
 
 def walk_csv(gaits: Sequence[Gait]) -> str:

@@ -91,13 +91,10 @@ class CompiledObjective:
         if parts <= 1:
             self._part(X, f, violation, g)
         else:
-            edges = [rows * i // parts for i in range(parts + 1)]
-            cuts = [slice(a, b) for a, b in zip(edges, edges[1:], strict=False)]
-            jobs = [
-                self._pool.submit(self._part, X[cut], f[cut], violation[cut], None if g is None else g[cut])
-                for cut in cuts[1:]
-            ]
-            self._part(X[cuts[0]], f[cuts[0]], violation[cuts[0]], None if g is None else g[cuts[0]])
+            cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
+            pieces = [(X[cut], f[cut], violation[cut], None if g is None else g[cut]) for cut in cuts]
+            jobs = [self._pool.submit(self._part, *piece) for piece in pieces[1:]]
+            self._part(*pieces[0])
             wait(jobs)
             for job in jobs:
                 job.result()

@@ -13,6 +13,7 @@ from casadi import MX
 from nlp_gait.backends.interrupts import never
 
 INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
+REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limit"}
 
 
 class IterationWatch(ca.Callback):

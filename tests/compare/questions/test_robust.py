@@ -53,9 +53,9 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
     # Solved independently: the nominal problem with a limit that is 2 mm stricter has the same optimum.
     x = np.array(list(found["x"].values()))
     stricter = load("nao-ssp").with_values(dbm_y_mean_limit_m=0.022)
-    cost, violation, *_ = exact_model(stricter).function(x, stricter.p)
-    assert float(violation) < 1e-6
-    assert float(cost) == pytest.approx(found["power_W"])
+    at = exact_model(stricter).at(x, stricter.p)
+    assert at.violation < 1e-6
+    assert at.cost == pytest.approx(found["power_W"])
 
 
 def test_boxes_grow_and_name_every_link() -> None:

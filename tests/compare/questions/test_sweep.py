@@ -11,7 +11,7 @@ import pytest
 from compare.drawing.labels import axis_label, quantity
 from compare.questions.sweep.report import sweep_figure, write_sweep
 from compare.questions.sweep.study import Axis, SweepPoint, count_solves, parse_axis, sweep
-from compare.study.runner import ProblemSpec
+from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError, UnknownNameError
 
 SSP, DSP = ProblemSpec(name="nao-ssp"), ProblemSpec(name="nao-dsp")

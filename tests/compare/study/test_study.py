@@ -179,7 +179,7 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
         (Task(problem=SSP, algorithm="psoo"), "unknown algorithm 'psoo'; did you mean"),
         (Task(problem=SSP, algorithm="pso", settings={"inertial": 1}), "no setting 'inertial'"),
         (Task(problem=SSP, algorithm="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
-        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "slsqp has no settings"),
+        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
         (Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
         (Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
         (Task(problem=SSP, algorithm="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),

@@ -136,8 +136,8 @@ def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) ->
     written(tmp_path, partner(raw, "robot.urdf"))
     one, other = load("nao-ssp", robot=str(tmp_path / "robot.urdf")), load("nao-ssp", robot=path)
     x = (one.lower + one.upper) / 2
-    for a, b in zip(exact_model(one).function(x, one.p), exact_model(other).function(x, other.p), strict=True):
-        np.testing.assert_allclose(np.array(a), np.array(b), rtol=0, atol=1e-10)  # violations of some hundred
+    for a, b in zip(exact_model(one).at(x, one.p)[:5], exact_model(other).at(x, other.p)[:5], strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-10)  # violations of some hundred
 
 
 def test_joints_that_no_gait_moves_are_locked(tmp_path: Path) -> None:
