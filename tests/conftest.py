@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,6 +18,16 @@ settings.load_profile("reproducible")
 
 # A shell ignores Ctrl-C for what it runs in the background, and so would all that the tests of it start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
+SLOW_FOLDERS = tuple(Path(__file__).parent / "compare" / name for name in ("cli", "papers", "questions"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what lies in these folders."""
+    for item in items:
+        if any(folder in item.path.parents for folder in SLOW_FOLDERS):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session", autouse=True)

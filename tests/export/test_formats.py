@@ -21,6 +21,7 @@ def result():
     return Result(problem=problem, x=problem.check_x(DSP))
 
 
+@pytest.mark.slow
 def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_path):
     path = tmp_path / "gait.csv"
     write_as("csv", path, result, 100)
@@ -36,6 +37,7 @@ def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_pa
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", problem_names())
 def test_every_time_history_of_every_problem_has_its_unit(name):
     problem = nlp_gait.load(name)

@@ -76,6 +76,7 @@ def test_what_is_derived_of_what_is_derived_has_its_own_functions() -> None:
     assert [evaluated(problem, [1.5, 0.0]).cost for problem in (once, twice)] == [5.0, 10.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "walk12", "stairs-plan", "stairs-track"])
 def test_time_histories_are_those_of_the_problem_below(name: str) -> None:
     """With a parameter and a variable more, at the current values of both."""

@@ -68,6 +68,7 @@ def test_every_option_is_recorded(name: str, option: str, value: Any) -> None:
     assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_recorded_options_make_the_same_problem(name: str) -> None:
     """With no option at its default: grid, rows, and every exact value at a point off the middle."""
@@ -82,6 +83,7 @@ def test_recorded_options_make_the_same_problem(name: str) -> None:
     np.testing.assert_equal(there.indexes, here.indexes)
 
 
+@pytest.mark.slow
 def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     """With three samples an interval it needs 34 times as many to have at least 1,000."""
     problem = load("nao-cycle", samples_per_interval=3)

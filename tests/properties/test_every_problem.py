@@ -60,6 +60,7 @@ far = (
 )
 
 
+@pytest.mark.slow
 @of_every_variant
 @settings(max_examples=60)
 @given(data=st.data())
@@ -70,6 +71,7 @@ def test_every_output_is_finite_for_every_finite_x(name: str, kind: str | None, 
     assert np.isfinite([found.cost, found.violation, *found.g, *found.indexes.values()]).all()
 
 
+@pytest.mark.slow
 @of_every_variant
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), outside=st.booleans())
@@ -109,12 +111,12 @@ def test_the_test_above_sees_feasible_and_infeasible_candidates(name: str) -> No
 
 @cache
 def solved(name: str) -> tuple[GaitProblem, Outcome]:
-    """The best of two starts, on a coarse grid: what is compared holds on every one."""
-    problem = load(name, intervals=4)
-    ipopt, rng = IpoptSettings(), np.random.default_rng(0)
-    return problem, min((ipopt.run(problem, problem.start_point(rng)) for _ in range(2)), key=lambda end: end.rank)
+    """From one start."""
+    problem = problem_of(name)
+    return problem, IpoptSettings().run(problem, problem.start_point(np.random.default_rng(0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solved(name)
@@ -126,6 +128,7 @@ def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     assert end.violation <= FEASIBILITY_TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_no_start_ends_below_what_the_exact_functions_find_around_it(name: str) -> None:
     """Feasible neighbours of an optimum are not better."""
@@ -158,6 +161,7 @@ def assert_derivative(function: ca.Function, slope: ca.Function, at: Array, rest
         np.testing.assert_allclose((up - down) / (2 * DIFFERENCE_STEP), expected, rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     """Of the Lagrangian with random multipliers."""
@@ -180,6 +184,7 @@ def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
     assert_derivative(value, slope, at, (values,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_row_and_index_has_its_own_name(name: str) -> None:
     model = exact_model(problem_of(name))

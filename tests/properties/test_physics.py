@@ -63,6 +63,7 @@ def larger(factor: float) -> Record:
     return raw
 
 
+@pytest.mark.slow
 @of_both_phases
 def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -> None:
     """Mechanical power grows like the masses, heat like their square: with K / factor all power grows alike."""
@@ -80,6 +81,7 @@ def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -
             assert after[index] == pytest.approx(before[index], rel=ROUNDING, abs=ROUNDING)
 
 
+@pytest.mark.slow
 @of_both_phases
 def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> None:
     """Froude's similarity with a robot twice as large: equal angles, lengths times 2, times and speeds times sqrt(2)."""
@@ -109,6 +111,7 @@ def loads(robot: Robot, foot: str, arrays: dict[str, Array], sample: int) -> tup
     return {name: float(torque) for name, torque in torques.items()}, np.array([float(zmp[0]), float(zmp[1])])
 
 
+@pytest.mark.slow
 def test_a_gait_mirrored_left_to_right_needs_mirrored_torques() -> None:
     """Single support on the left foot against the mirrored robot on its right foot."""
     problem = load("nao-ssp")

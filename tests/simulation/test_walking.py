@@ -17,6 +17,7 @@ from nlp_gait.problems.nao.body import nao
 from nlp_gait.simulation.steps import step_of, walk
 
 pytest.importorskip("mujoco")
+pytestmark = pytest.mark.slow  # each gait is played in the engine
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.plan import plan_of  # noqa: E402

@@ -45,6 +45,7 @@ def some(problem: GaitProblem, seed: int = 0) -> Array:
     return units * np.random.default_rng(seed).normal(size=len(units))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("order", ["quintic", "spline-4"])
 def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) -> None:
@@ -72,6 +73,7 @@ def test_coefficients_are_counted_by_curves_and_spans(name: str, order: str) -> 
     assert problem.names[OWN[name]] == "hip_x_m[0]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_order_contains_the_one_before(name: str) -> None:
     coarse, fine = (load(name, trajectory=order, samples_per_interval=2) for order in ("spline-2", "spline-4"))
@@ -81,6 +83,7 @@ def test_each_order_contains_the_one_before(name: str) -> None:
     assert same[0] == pytest.approx(same[1], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
     problem = load(name, trajectory="spline-2").dense(100)
@@ -96,6 +99,7 @@ def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
         np.testing.assert_allclose(found, moved[rate][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("curve", "value", "row"),
     [
@@ -113,6 +117,7 @@ def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: 
     assert any(found.name.startswith(row) for found in row_violations(problem, x))
 
 
+@pytest.mark.slow
 def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
     cubic, quintic = (
         load("nao-dsp", trajectory=order, intervals=5, samples_per_interval=2) for order in ("cubic", "quintic")
@@ -123,6 +128,7 @@ def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
     assert second.objective < 0.9 * first.objective
 
 
+@pytest.mark.slow
 def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     power, jerk = (load("nao-dsp", objective=name) for name in ("power", "jerk"))
     assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
@@ -132,6 +138,7 @@ def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     assert at[1]["power_W"] > 1.01 * at[0]["power_W"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "signal"), [("jerk", "qdd"), ("torque-smoothness", "tau")])
 def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, signal: str) -> None:
     problem = load("nao-ssp", objective=name)

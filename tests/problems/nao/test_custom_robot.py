@@ -41,6 +41,7 @@ def gaits(path: str) -> dict[str, tuple[GaitProblem, Solution]]:
     return {name: (problem, solve(problem, starts=2)) for name, problem in problems.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_another_humanoid_is_solved_without_any_setting(
     gaits: dict[str, tuple[GaitProblem, Solution]], name: str
@@ -50,6 +51,7 @@ def test_another_humanoid_is_solved_without_any_setting(
     assert solution.starts[0].objective == pytest.approx(solution.starts[1].objective, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_its_feet_stand_below_its_hip_joints_and_its_torso_where_planned(
     gaits: dict[str, tuple[GaitProblem, Solution]], path: str, name: str
@@ -129,6 +131,7 @@ def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
         load(name, step_length_m=step)
 
 
+@pytest.mark.slow
 def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) -> None:
     pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
     raw = humanoid()
@@ -215,6 +218,7 @@ def test_a_robot_that_lacks_a_joint_is_answered_with_its_name(tmp_path: Path) ->
         load("nao-ssp", robot=written(tmp_path, text))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_feet_of_unequal_height_both_reach_the_ground(tmp_path: Path, name: str) -> None:
     raw = nao()

@@ -85,6 +85,7 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
     return np.array([JOINT_SIGNS[joint] * values[columns[partner(joint)]] for joint in signals.joints])
 
 
+@pytest.mark.slow
 def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
     for _, single, double in sampled:
         assert double.arrays["t"][0] == single.arrays["t"][-1]
@@ -92,6 +93,7 @@ def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sam
             np.testing.assert_allclose(double.arrays[name][0], single.arrays[name][-1], rtol=0, atol=CONTINUITY)
 
 
+@pytest.mark.slow
 def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
     at_speed: GaitProblem, sampled: list[Sampled]
 ) -> None:
@@ -104,6 +106,7 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
             np.testing.assert_allclose(double.arrays[end][-1], image, rtol=0, atol=CONTINUITY)
 
 
+@pytest.mark.slow
 def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed: GaitProblem) -> None:
     """By one-sided differences of second order on a dense grid, for the time histories hold no such velocities."""
     dense = at_speed.dense(100)
@@ -126,6 +129,7 @@ def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed
     np.testing.assert_allclose(rate(single, "hip", -1), expected, rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
     x = candidates(at_speed)[0]
     signals = at_speed.signals(x)
@@ -134,6 +138,7 @@ def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_sp
     assert signals.arrays["t"][-1] == pytest.approx(2.4)
 
 
+@pytest.mark.slow
 def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]) -> None:
     robot = load_robot("nao-v5")
     model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
@@ -145,6 +150,7 @@ def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]
             np.testing.assert_allclose(single.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> None:
     problem, robot = load("nao-cycle", torso_share=rule), load_robot("nao-v5")
@@ -175,6 +181,7 @@ def _state(signals: Signals, sample: int) -> tuple[dict[str, float], ...]:
     )
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     free = load("nao-cycle")
     for x, *halves in sampled:
@@ -193,6 +200,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     x, single, double = sampled[0]
     figures = evaluated(at_speed, x).indexes

@@ -58,6 +58,7 @@ def ankle_of(robot: Robot, side: str) -> Array:
     return np.array([*ANKLES_XY[side], robot.feet["left"].ankle_height_m])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_loop_closes_in_pinocchio(seed: int) -> None:
     """From the left sole outwards, the right one lies where it stands, flat and at rest, and the torso where it is planned."""
@@ -85,6 +86,7 @@ def test_the_loop_closes_in_pinocchio(seed: int) -> None:
             np.testing.assert_allclose(moved[0], moved[1], rtol=0, atol=POSE_TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", ["printed", "lever"])
 def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
     robot, signals = load_robot("nao-v5"), problem_of(share).signals(leaning(0))
@@ -102,6 +104,7 @@ def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
         np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
 
 
+@pytest.mark.slow
 def test_velocities_and_accelerations_are_derivatives_of_the_angles() -> None:
     problem = problem_of().dense(1000)
     assert problem is not None
@@ -112,6 +115,7 @@ def test_velocities_and_accelerations_are_derivatives_of_the_angles() -> None:
         np.testing.assert_allclose(differences, arrays[slope][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
     problem = problem_of()
     for seed in range(4):
@@ -121,6 +125,7 @@ def test_the_objective_is_the_power_of_the_signals() -> None:
         assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_without_a_lean_it_is_the_planned_motion() -> None:
     planned, free = load("nao-dsp", trajectory="spline-2", samples_per_interval=1), problem_of()
     x = leaning(1, lean=0.0)
@@ -132,6 +137,7 @@ def test_without_a_lean_it_is_the_planned_motion() -> None:
     assert cost == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_ends_are_the_papers() -> None:
     mine = problem_of().signals(leaning(2))
     theirs = load("nao-dsp").signals(np.array(PAPER))
@@ -140,6 +146,7 @@ def test_the_ends_are_the_papers() -> None:
             np.testing.assert_allclose(mine.arrays[signal][row], theirs.arrays[signal][row], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_where_the_loop_stays_open_a_row_says_so() -> None:
     problem, x = problem_of(), leaning(0)
     lean = [i for i, name in enumerate(problem.names) if name.startswith(LEAN)]

@@ -40,6 +40,7 @@ def leaning(seed: int) -> Array:
     return x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(seed: int) -> None:
     robot = load_robot("nao-v5")
@@ -57,6 +58,7 @@ def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(s
         np.testing.assert_allclose(signals.arrays["hip"][sample], oracle.torso, rtol=0, atol=POSITION_TOLERANCE_M)
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
     problem = problem_of()
     for seed in range(4):
@@ -66,6 +68,7 @@ def test_the_objective_is_the_power_of_the_signals() -> None:
         assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_both_yaw_pitch_joints_are_one_and_the_held_arm_joints_stay() -> None:
     signals = problem_of().signals(leaning(0))
     q = dict(zip(signals.joints, signals.arrays["q"].T, strict=True))
@@ -74,6 +77,7 @@ def test_both_yaw_pitch_joints_are_one_and_the_held_arm_joints_stay() -> None:
     assert all(np.ptp(q[name]) == 0.0 for name in ("LShoulderRoll", "RElbowYaw", "LWristYaw"))
 
 
+@pytest.mark.slow
 def test_the_ends_are_the_papers() -> None:
     free = problem_of().signals(leaning(0))
     planned = load("nao-ssp").signals(np.array(PAPER))
@@ -82,6 +86,7 @@ def test_the_ends_are_the_papers() -> None:
             np.testing.assert_allclose(free.arrays[signal][row], planned.arrays[signal][row], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_planned_motion_is_a_free_one_nearly() -> None:
     planned, free = load("nao-ssp"), problem_of("spline-8")
     x = fitted_start("spline-8", planned, np.array(PAPER))
@@ -91,6 +96,7 @@ def test_a_planned_motion_is_a_free_one_nearly() -> None:
     assert len(started) == len(free.names) and np.isfinite(started).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("joint", "value", "rows"),
     [

@@ -37,6 +37,7 @@ def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
     assert list(got.values()) == pytest.approx(row["values"], rel=0, abs=GOLDEN_TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
 def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> None:
     solution = solve(load(optimum["problem"], **optimum["options"]), starts=2, seed=1)
@@ -45,6 +46,7 @@ def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> 
         assert start.objective == pytest.approx(optimum["power_W"], rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
 def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: dict[str, Any]) -> None:
     power = evaluated(load(row["problem"], derivatives="finite-difference"), row["x"]).indexes["power_W"]
@@ -52,6 +54,7 @@ def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: d
     assert 1e-4 < abs(power / analytic - 1) < FINITE_DIFFERENCE_SHARE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", GOLDEN["rows"][::2], ids=LABELS[::2])
 def test_with_many_intervals_finite_differences_become_the_derivatives(row: dict[str, Any]) -> None:
     """One-sided differences at the ends err by the first power of the step: 1,000 intervals leave less than 1e-3."""
@@ -100,6 +103,7 @@ def test_only_single_support_smooths_its_jump(name: str) -> None:
     assert nlp_model(load(name)).smoothed == (name == "nao-ssp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     x = next(row["x"] for row in GOLDEN["rows"] if row["problem"] == name)

@@ -29,6 +29,7 @@ def test_without_features_it_is_the_same_problem() -> None:
     assert (one.cost, one.rows) == (other.cost, other.rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("features", ["free-braking", "regeneration", "heat", "heat,free-braking"])
 def test_power_is_that_of_the_time_histories(features: str) -> None:
     problem = load("nao-ssp", motors=features)
@@ -59,6 +60,7 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
     assert evaluated(problem, X).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_limits_are_those_of_the_data_sheet() -> None:
     problem = load("nao-ssp", motors="limits")
     signals = problem.signals(X)
@@ -77,6 +79,7 @@ def test_limits_are_those_of_the_data_sheet() -> None:
     assert rows["continuous_torque[LKneePitch]"] == pytest.approx(math.sqrt(mean(torque**2)))
 
 
+@pytest.mark.slow
 def test_a_flat_battery_binds() -> None:
     """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
     problem = load("nao-dsp", motors="limits")

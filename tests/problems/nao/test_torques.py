@@ -44,6 +44,7 @@ def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float
     return q, qd, qdd
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
 def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: str) -> None:
     problem, data = load("nao-ssp", robot=robot), load_robot(robot)
@@ -59,6 +60,7 @@ def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: s
             np.testing.assert_allclose(signals.arrays["com"][sample], oracle.com, rtol=0, atol=COM_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
     problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
@@ -92,6 +94,7 @@ def test_a_feasible_gait_puts_the_torso_where_it_is_planned(name: str) -> None:
             np.testing.assert_allclose(torso, signals.arrays["hip"][sample], rtol=0, atol=TORSO_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
     x = np.array(FEASIBLE[name])
@@ -105,6 +108,7 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: st
     assert np.abs(qdd).max() > 0.1  # there is something to compare
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_power_of_the_signals_is_the_objective(name: str) -> None:
     problem = load(name)
