@@ -1,8 +1,16 @@
 """Settings of every test."""
 
+import os
 import signal
+from collections.abc import Callable, Iterator
+from functools import cache, wraps
+from pathlib import Path
+from typing import Any
 
+import pytest
 from hypothesis import settings
+
+from nlp_gait.problem import GaitProblem, registry
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -10,3 +18,44 @@ settings.load_profile("reproducible")
 
 # A shell ignores Ctrl-C for what it runs in the background, and so would all that the tests of it start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
+SLOW_FOLDERS = tuple(Path(__file__).parent / "compare" / name for name in ("cli", "papers", "questions"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what lies in these folders."""
+    for item in items:
+        if any(folder in item.path.parents for folder in SLOW_FOLDERS):
+            item.add_marker(pytest.mark.slow)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def built_once() -> Iterator[None]:
+    """Every problem of the package is loaded once for all tests, with all that is built from it.
+
+    What is built from a problem's mathematics never changes, so that copies share it in use too. A robot from a file is read
+    anew: the file of another test may have the same name.
+    """
+    find = registry.problem_maker
+
+    @cache
+    def made(name: str, options: tuple[tuple[str, str, Any], ...]) -> GaitProblem:
+        return find(name)(**{option: value for option, _, value in options})
+
+    @cache
+    def shared_maker(name: str) -> Callable[..., GaitProblem]:
+        make = find(name)
+
+        @wraps(make)
+        def shared(**options: Any) -> GaitProblem:
+            if os.sep in str(options.get("robot", "")):
+                return make(**options)
+            registry.check(make, options)  # first, for what is not hashable
+            return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))
+
+        return shared
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "problem_maker", shared_maker)
+        yield

@@ -31,29 +31,30 @@ LARGEST_COUNT = 10_000
 Maker = Callable[..., GaitProblem]
 
 
-def maker(*later: tuple[str, ...]) -> Callable[[Maker], Maker]:
+def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
     """Makes a function of keyword options into a problem's maker: options are checked, and written into the problem.
 
     The function's signature is the only list of the options. One whose annotation is a ``Literal`` takes its values only. The
     problem is refined by the option that its grid names.
 
     Args:
-        later: groups of options that came after the first studies. A group whose options all have their defaults is left out
-            of what is recorded, so that records from before it stay valid.
+        later: groups of options that came after the first studies, with the values that these studies had. They are recorded
+            after the others; a group that has these values is left out, so that records from before it stay valid.
     """
 
     def decorate(make: Maker) -> Maker:
         @functools.wraps(make)
         def made(**options: Any) -> GaitProblem:
             check(made, options)
-            defaults = {name: option.default for name, option in inspect.signature(make).parameters.items()}
-            call = defaults | options
+            call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
             problem = make(**call)
-            grid = problem.grid
-            left_out = [name for group in later for name in group if all(call[n] == defaults[n] for n in group)]
-            recorded = {name: value for name, value in call.items() if name not in left_out}
-            if grid is not None and "samples_per_interval" in recorded:
-                recorded["samples_per_interval"] = grid.samples_per_interval  # as chosen where that was left to it
+            grid, values = problem.grid, dict(call)
+            if grid is not None and "samples_per_interval" in call:
+                values["samples_per_interval"] = grid.samples_per_interval  # as chosen where that was left to it
+            recorded = {name: value for name, value in values.items() if not any(name in group for group in later)}
+            for group in later:
+                if any(values[name] != value for name, value in group.items()):
+                    recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
             if refined_by is None:
                 return replace(problem, options=recorded)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import nlp_gait
 from benchmarks.by_hand import ByHand
@@ -11,6 +12,7 @@ from benchmarks.by_hand import ByHand
 TOLERANCE = 1e-11
 
 
+@pytest.mark.slow
 def test_numpy_and_pinocchio_give_the_package_s_values() -> None:
     by_hand = ByHand()
     X = np.random.default_rng(0).uniform(by_hand.lower, by_hand.upper, (10, 9))

@@ -11,6 +11,7 @@ from compare.judge import evaluate  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 
 
+@pytest.mark.slow
 def test_gaits_are_feasible_seeded_and_go_from_slow_to_fast():
     problem = nlp_gait.load("nao-dsp")
     cases = list(calibrate(problem, shortest_s=1.0, count=2, seed=3))

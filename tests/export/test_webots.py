@@ -43,6 +43,7 @@ def by_the_grammar(text):
     return names, times, np.array(poses)
 
 
+@pytest.mark.slow
 def test_a_gait_is_written_every_40_ms_and_read_back(points, tmp_path):
     path = tmp_path / "walk.motion"
     write_motion(path, points)
@@ -68,6 +69,7 @@ def test_the_last_pose_is_the_end_of_the_phase():
     assert found.times_ms[-3:] == (400, 440, 457)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.integers(0, 5_000_000), min_size=1, max_size=6, unique=True),
     st.lists(st.one_of(st.floats(-4, 4), st.just(float("nan"))), min_size=3, max_size=3),

@@ -25,6 +25,7 @@ def runs(folder: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
     """Mounted read-only, which stops the superuser too."""
     cache = tmp_path / "cache"
@@ -40,8 +41,9 @@ def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
     assert len(runs(tmp_path / "out")) == 6
 
 
+@pytest.mark.slow
 def test_two_processes_share_a_cache_and_an_output_folder(tmp_path: Path) -> None:
-    alone = start(*SEARCH, "--out", str(tmp_path / "alone"), NLP_GAIT_CACHE=str(tmp_path / "other-cache"))
+    alone = start(*SEARCH, "--out", str(tmp_path / "alone"))
     both = [start(*SEARCH, "--out", str(tmp_path / "both"), NLP_GAIT_CACHE=str(tmp_path / "cache")) for _ in range(2)]
     for process in (alone, *both):
         _, messages = process.communicate(timeout=120)

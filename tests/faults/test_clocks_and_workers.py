@@ -71,6 +71,7 @@ class DiesOnce:
         raise AssertionError("still alive")
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
     dying = tuple(
         Task(problem=WALK, algorithm=DiesOnce(marker=str(tmp_path / "dead")), run=run, stop=STOP) for run in range(6)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel import compiler as compiler_module
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
@@ -16,6 +15,7 @@ from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import CompilerError
 from tests.backends.toys import corner, toy
+from tests.evaluation import evaluated
 from tests.faults.processes import fake_compiler
 
 # The library's path follows -o; a working compiler stands behind the last ones.
@@ -46,6 +46,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(tmp_path / "cache"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_objective_is_interpreted_and_that_is_said(
     fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -61,7 +62,7 @@ def test_the_objective_is_interpreted_and_that_is_said(
     assert "interpreted, many times slower" in caplog.messages[0] and words in caplog.messages[0]
     X = np.array([[1.0, 1.0], [2.0, 0.25], [-2.5, 1.0]])
     f, violation = objective(X)
-    expected = [exact_model(problem).at(x, problem.p)[:2] for x in X]
+    expected = [[found.cost, found.violation] for found in (evaluated(problem, x) for x in X)]
     assert np.column_stack([f, violation]).tolist() == pytest.approx(np.array(expected))
     with pytest.raises(CompilerError):
         nlp_gait.compile_objective(toy(corner), require_compiler=True)

@@ -26,6 +26,7 @@ def test_every_adapter_is_among_them() -> None:
     assert {name.partition(":")[0] for name in ADAPTERS} <= {name.partition(":")[0] for name in NAMES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5), EpsilonLevel()], ids=lambda h: h.name)
 @pytest.mark.parametrize("name", NAMES)
 def test_failures_are_counted_and_never_win(name: str, handling: Deb | StaticPenalty | EpsilonLevel) -> None:

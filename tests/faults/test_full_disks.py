@@ -28,6 +28,7 @@ def limited(kilobytes: int, *arguments: str) -> subprocess.CompletedProcess[str]
     )
 
 
+@pytest.mark.slow
 def test_a_study_keeps_its_finished_runs_and_goes_on_when_there_is_room(tmp_path: Path) -> None:
     study = "walk12 --algorithms pso --runs 30 --evaluations 500 --starts 0 --jobs 1"
     script = (
@@ -51,6 +52,7 @@ def test_a_study_keeps_its_finished_runs_and_goes_on_when_there_is_room(tmp_path
     assert len(list(tmp_path.glob("kept/records/*/*.json"))) == 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "printed"),
     [
@@ -72,6 +74,7 @@ def test_what_was_computed_is_printed_though_it_cannot_be_written(
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("options", [(), ("--json",)])
 def test_output_that_cannot_be_written_is_said(options: tuple[str, ...]) -> None:

@@ -104,6 +104,7 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
         signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.slow
 def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     press_after(monkeypatch, IterationWatch, "eval", 60)
     over = ["--over", "step_length_m=0.05:0.12:30", "--starts", "1"]
@@ -113,6 +114,7 @@ def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest
     assert f"after {len(table) - 1} of 30 points; these are in {tmp_path}, not all of them solved from" in done.stderr
 
 
+@pytest.mark.slow
 def test_sweep_by_a_search_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     press_after(monkeypatch, CompiledObjective, "__call__", 30)
     over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
@@ -147,6 +149,7 @@ def test_search_before_the_first_run_has_ended(monkeypatch: pytest.MonkeyPatch) 
     assert done.stderr == "nlp-gait: interrupted after 0 of 9 runs\n" and done.stdout == ""
 
 
+@pytest.mark.slow
 def test_compare_with_worker_processes_is_continued_with_resume(tmp_path: Path) -> None:
     """As a terminal does it: the signal goes to the workers too."""
     study = ["compare", "walk12", "--algorithms", "pso", "--runs", "400", "--starts", "0", "--evaluations", "2000"]
@@ -187,6 +190,7 @@ def gait(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gait: str) -> None:
     pytest.importorskip("mujoco")
     from nlp_gait.simulation import robustness
@@ -198,6 +202,7 @@ def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
     from tests.faults.processes import fake_compiler
 

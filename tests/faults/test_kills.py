@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from compare.study.steps import Steps
 from tests.faults.processes import ROOT, start
 
@@ -27,6 +29,7 @@ for number in range(20):
 """
 
 
+@pytest.mark.slow
 def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path) -> None:
     moments, folder = random.Random(1), tmp_path / "steps"
     finished = 0
@@ -49,6 +52,7 @@ def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path)
     assert sum("kept from an earlier run" in note for note in notes) == finished > 0
 
 
+@pytest.mark.slow
 def test_the_result_of_an_earlier_solve_survives_a_killed_one(tmp_path: Path) -> None:
     out = tmp_path / "best.json"
     start("solve", "walk12", "--starts", "1", "--out", str(out)).communicate(timeout=60)

@@ -45,6 +45,7 @@ def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -
     assert (x >= problem.lower).all() and (x <= problem.upper).all() and np.isfinite(solution.objective)
 
 
+@pytest.mark.slow
 def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """A balance margin that jumps takes several stages; the time of the first counts for the second."""
     problem = nlp_gait.load("nao-ssp")
@@ -56,6 +57,7 @@ def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -
     assert 0 < solution.iterations < whole.iterations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = nlp_gait.load("walk12")

@@ -9,7 +9,7 @@ import pytest
 
 from tests.fuzz.commands import ended, mutated_line, workplace
 
-LINES = 80
+LINES = 40
 # Each once ended in a traceback, a hang, or an answer to another question.
 KEPT = (
     ("report", "9" * 400),
@@ -34,6 +34,7 @@ def test_lines_that_once_did_harm(line: tuple[str, ...], tmp_path: Path) -> None
         assert ended(line) == "refused"
 
 
+@pytest.mark.slow
 def test_mutated_lines(tmp_path: Path) -> None:
     rng = random.Random(0)
     with workplace(tmp_path):

@@ -25,6 +25,7 @@ def test_valid_files_are_accepted(form: Format, tmp_path: Path) -> None:
         assert outcome(lambda: form.read(path)) == "accepted"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 def test_mutated_files(form: Format, tmp_path: Path) -> None:
     tally = tried(form, INPUTS, 0, tmp_path)

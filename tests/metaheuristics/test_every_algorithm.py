@@ -19,7 +19,12 @@ ALL["ga-generational"] = GeneticAlgorithm(survival="generational", elites=2)
 ALL["ga-goswami"] = GeneticAlgorithm.goswami2008()
 BUDGET = 620  # not a multiple of any population, so that the last generation is cut short
 
-every_algorithm = pytest.mark.parametrize("algorithm", ALL.values(), ids=ALL.keys())
+OTHERS = ("cma", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")  # other packages' algorithms, which take ten times as long
+
+every_algorithm = pytest.mark.parametrize(
+    "algorithm",
+    [pytest.param(ALL[name], id=name, marks=[pytest.mark.slow] if name in OTHERS else []) for name in ALL],
+)
 
 
 def same(a: Result, b: Result) -> bool:
@@ -208,17 +213,20 @@ DISC = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("n", [1, 4])
 def test_sphere_converges(name: str, n: int) -> None:
     assert minimize(sphere(n), ALL[name], evaluations=5000, seed=1).objective < SPHERE[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_rosenbrock_converges(name: str) -> None:
     assert minimize(rosenbrock(), ALL[name], evaluations=5000, seed=1).objective < ROSENBROCK[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("handling", [Deb(), EpsilonLevel()], ids=lambda h: h.name)
 def test_constrained_optimum_is_found(name: str, handling: Deb | EpsilonLevel) -> None:

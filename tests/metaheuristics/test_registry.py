@@ -151,6 +151,7 @@ def test_every_strategy_of_differential_evolution_converges(strategy: str) -> No
     assert result.objective < 1e-3
 
 
+@pytest.mark.slow
 def test_cma_restarts_with_a_growing_population() -> None:
     sizes: list[int] = []
     minimize(sphere(2), CmaEs(), evaluations=6000, seed=2, observe=lambda X, f, v: sizes.append(len(X)))

@@ -124,6 +124,27 @@ def test_points_that_are_none_are_refused(x: Any, message: str) -> None:
         toy(corner).check_x(x)
 
 
+def test_a_point_may_be_given_by_name_in_any_order() -> None:
+    assert toy(corner).check_x({"y": 2.0, "x": 1.0}).tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("x", "message"),
+    [
+        ({"x": 1.0}, "x of toy must name every variable once; missing: y, unknown: none"),
+        ({"x": 1.0, "y": 2.0, "z": 3.0}, "missing: none, unknown: z"),
+        ({"x": 1.0, "Y": 2.0}, "missing: y, unknown: Y"),
+        ({}, "missing: x, y, unknown: none"),
+        ({"x": 1.0, "y": np.inf}, "x of toy: y must be finite, got inf"),
+        ({"x": 1.0, "y": "far"}, r"x must be 2 numbers, got \[1\.0, 'far'\]"),
+    ],
+)
+def test_a_point_by_name_says_what_is_missing_or_unknown(x: dict[str, Any], message: str) -> None:
+    for read in (toy(corner).check_x, toy(corner).at):
+        with pytest.raises(InputError, match=message):
+            read(x)
+
+
 def test_start_points_lie_within_the_current_bounds() -> None:
     problem = load("nao-ssp").with_values(**{"hip_height_m.lower": 0.30})
     points = np.array([problem.start_point(np.random.default_rng(seed)) for seed in range(20)])

@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY, upright_links
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
+from tests.evaluation import evaluated
 from tests.properties.mirror import JOINT_SIGNS, mirrored, partner
 from tests.robots.custom import Record, nao
 from tests.robots.files import written
@@ -37,13 +37,8 @@ def candidates(problem: GaitProblem) -> list[Array]:
 
 
 def signals_of(problem: GaitProblem, x: Array) -> dict[str, Array]:
-    assert problem.signals is not None
     signals: Signals = problem.signals(x)
     return dict(signals.arrays)
-
-
-def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    return exact_model(problem).at(x, problem.p).indexes
 
 
 def heavier(factor: float) -> Record:
@@ -68,6 +63,7 @@ def larger(factor: float) -> Record:
     return raw
 
 
+@pytest.mark.slow
 @of_both_phases
 def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -> None:
     """Mechanical power grows like the masses, heat like their square: with K / factor all power grows alike."""
@@ -78,13 +74,14 @@ def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -
         one, other = signals_of(plain, x), signals_of(heavy, x)
         np.testing.assert_allclose(other["tau"], factor * one["tau"], rtol=0, atol=ROUNDING * np.abs(one["tau"]).max())
         np.testing.assert_allclose(other["zmp"], one["zmp"], rtol=0, atol=ROUNDING * np.abs(one["zmp"]).max())
-        before, after = indexes(plain, x), indexes(cooler, x)
+        before, after = evaluated(plain, x).indexes, evaluated(cooler, x).indexes
         for index in ("power_W", "torque_change_Nm"):
             assert after[index] == pytest.approx(factor * before[index], rel=ROUNDING)
         for index in ("dbm_x_min_m", "dbm_y_mean_m"):
             assert after[index] == pytest.approx(before[index], rel=ROUNDING, abs=ROUNDING)
 
 
+@pytest.mark.slow
 @of_both_phases
 def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> None:
     """Froude's similarity with a robot twice as large: equal angles, lengths times 2, times and speeds times sqrt(2)."""
@@ -100,7 +97,7 @@ def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> No
         np.testing.assert_allclose(other["tau"], size * one["tau"], rtol=0, atol=ROUNDING * np.abs(one["tau"]).max())
         np.testing.assert_allclose(other["zmp"], size * one["zmp"], rtol=0, atol=ROUNDING * np.abs(one["zmp"]).max())
         np.testing.assert_allclose(other["com"], size * one["com"], rtol=0, atol=ROUNDING)
-        before, after = indexes(plain, x), indexes(large, factors * x)
+        before, after = evaluated(plain, x).indexes, evaluated(large, factors * x).indexes
         assert after["power_W"] == pytest.approx(size / root * before["power_W"], rel=ROUNDING)
         assert after["dbm_y_min_m"] == pytest.approx(size * before["dbm_y_min_m"], rel=ROUNDING, abs=ROUNDING)
 
@@ -114,12 +111,12 @@ def loads(robot: Robot, foot: str, arrays: dict[str, Array], sample: int) -> tup
     return {name: float(torque) for name, torque in torques.items()}, np.array([float(zmp[0]), float(zmp[1])])
 
 
+@pytest.mark.slow
 def test_a_gait_mirrored_left_to_right_needs_mirrored_torques() -> None:
     """Single support on the left foot against the mirrored robot on its right foot."""
     problem = load("nao-ssp")
     robot = load_robot("nao-v5")
     image = mirrored(robot)
-    assert problem.signals is not None
     for x in candidates(problem):
         signals = problem.signals(x)
         columns = {name: i for i, name in enumerate(signals.joints)}
@@ -176,7 +173,7 @@ def test_power_is_never_negative(name: str, data: st.DataObject, heat: float) ->
     problem = phase(name).with_values(heat_loss_W_per_Nm2=heat)
     n = len(problem.names)
     x = np.array(data.draw(st.lists(st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0), min_size=n, max_size=n)))
-    assert indexes(problem, x)["power_W"] >= 0.0
+    assert evaluated(problem, x).indexes["power_W"] >= 0.0
 
 
 @of_both_phases
@@ -186,7 +183,7 @@ def test_power_without_heat_is_that_of_the_moving_joints_alone(name: str) -> Non
     for x in candidates(problem):
         slow = copy.copy(x)
         slow[1:7], slow[-1] = 0.0, SLOW_S
-        assert 0.0 < indexes(cold, x)["power_W"] < indexes(problem, x)["power_W"]
+        assert 0.0 < evaluated(cold, x).indexes["power_W"] < evaluated(problem, x).indexes["power_W"]
         assert (
-            indexes(cold, slow)["power_W"] < 1e-3 < indexes(problem, slow)["power_W"]
+            evaluated(cold, slow).indexes["power_W"] < 1e-3 < evaluated(problem, slow).indexes["power_W"]
         )  # standing still costs heat only

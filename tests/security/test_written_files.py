@@ -34,7 +34,7 @@ def test_no_writer_follows_a_link(tmp_path: Path, suffix: str) -> None:
     theirs.write_text("untouched")
     link.symlink_to(theirs)
     if suffix == ".npz":
-        write_npz(link, Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}))
+        write_npz(link, Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}, columns={}))
     elif suffix == ".gif":
         write_video(link, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0)
     else:

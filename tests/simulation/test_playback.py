@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco")
+pytestmark = pytest.mark.slow  # each gait is played in the engine
 
 from nlp_gait.simulation.conditions import Conditions, Push  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402

@@ -17,6 +17,7 @@ ROBUST = (0.31, 0.0065405, -0.001548, 0.0061539, 0.066832, -0.05156, -0.037694, 
 CLOSE_M = 0.002
 
 
+@pytest.mark.slow
 def test_the_engine_sees_the_margins_of_the_model() -> None:
     spec = ProblemSpec(name="nao-dsp")
     names = spec.load().names

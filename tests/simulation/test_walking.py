@@ -17,6 +17,7 @@ from nlp_gait.problems.nao.body import nao
 from nlp_gait.simulation.steps import step_of, walk
 
 pytest.importorskip("mujoco")
+pytestmark = pytest.mark.slow  # each gait is played in the engine
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.plan import plan_of  # noqa: E402
@@ -124,6 +125,7 @@ def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int)
 
 def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(
-        InputError, match="only gaits of 'nao-cycle' can be played for several steps, got one of 'nao-ssp'"
+        InputError,
+        match="problem 'nao-ssp' is no cycle that can be repeated; several steps can be played of 'nao-cycle'",
     ):
         plan_of(gait("ssp optimum"), 2)

@@ -134,6 +134,7 @@ def test_free_fall_keeps_its_energy(dynamics: ca.Function) -> None:
     assert drift[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_drift_of_a_whipping_toe_falls_with_the_fourth_power_of_the_step(dynamics: ca.Function) -> None:
     falls = [fall(dynamics, step_s, WHIP_S) for step_s in (0.25e-3, 0.125e-3, 0.0625e-3)]
     drifts = [drift[-1] for drift, _ in falls]

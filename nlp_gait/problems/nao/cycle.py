@@ -42,7 +42,7 @@ OBJECTIVES = {
 }
 
 
-@maker(("samples_per_interval",))
+@maker({"samples_per_interval": 1})
 def nao_cycle(
     *,
     robot: str = "nao-v5",

@@ -50,7 +50,7 @@ Point2: TypeAlias = tuple[float, float]
 Side = TypeVar("Side", float, MX)
 
 
-@maker(("trajectory", "objective", "samples_per_interval"), ("motors",))
+@maker({"trajectory": "cubic", "objective": "power", "samples_per_interval": 1}, {"motors": ""})
 def nao_dsp(
     *,
     robot: str = "nao-v5",

@@ -50,7 +50,7 @@ OWN_VARIABLES = (
 )
 
 
-@maker(("trajectory", "objective", "samples_per_interval"), ("motors",))
+@maker({"trajectory": "cubic", "objective": "power", "samples_per_interval": 1}, {"motors": ""})
 def nao_ssp(
     *,
     robot: str = "nao-v5",

@@ -112,6 +112,7 @@ def test_a_flat_optimum_is_refused_with_the_reason() -> None:
         parameter_sensitivities(at)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [
@@ -160,6 +161,7 @@ def test_casadis_own_sensitivities_agree() -> None:
     np.testing.assert_allclose(parameter_sensitivities(at).x[:, :own], expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
     problem = load("nao-dsp")
     near, at = solved(problem)

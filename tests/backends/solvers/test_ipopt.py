@@ -40,6 +40,7 @@ def point(solution: Solution) -> np.ndarray:
     return np.array(list(solution.x.values()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["single_support", "double_support"])
 def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pytest.FixtureRequest) -> None:
     problem, solution = request.getfixturevalue(phase)
@@ -53,6 +54,7 @@ def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pyt
     assert (point(solution) <= problem.upper).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["single_support", "double_support"])
 def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.FixtureRequest) -> None:
     """Each bound moved by a little, and the problem solved again from the optimum."""
@@ -86,6 +88,7 @@ def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Sol
     assert [start["x0"] for start in written["starts"]] == [problem.by_name(start.x0) for start in solution.starts]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_start_and_the_same_end(double_support: tuple[GaitProblem, Solution]) -> None:
     problem, first = double_support
     second = solve(problem, starts=1, seed=0)
@@ -94,6 +97,7 @@ def test_the_same_seed_gives_the_same_start_and_the_same_end(double_support: tup
     assert first.starts[1].x0.tolist() != first.starts[0].x0.tolist()
 
 
+@pytest.mark.slow
 def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Solution]) -> None:
     problem, free = double_support
     held = solve(problem, x0=point(free), fix={"double_support_time_s": 1.0})
@@ -103,6 +107,7 @@ def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Sol
     assert held.parameters == {"double_support_time_s.lower": 1.0, "double_support_time_s.upper": 1.0}
 
 
+@pytest.mark.slow
 def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
     problem = load("nao-dsp").with_values(dbm_y_mean_limit_m=0.2)  # the box of both soles is 0.18 m wide
     solution = solve(problem, starts=1, solver=IpoptSettings(iterations=60))

@@ -33,6 +33,7 @@ def test_numbers_of_section_5_3(first: list[int], rank_sum: float, z: float, p_t
     assert test.p_less == pytest.approx(p_less, rel=1e-4)
 
 
+@pytest.mark.slow
 @given(a=SAMPLES, b=SAMPLES)
 def test_agrees_with_scipy_with_ties(a: list[int], b: list[int]) -> None:
     if len(set(a + b)) < 2:

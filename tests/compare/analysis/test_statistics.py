@@ -136,6 +136,7 @@ def test_a12_by_hand() -> None:
     assert a12([math.inf], [math.inf]) == 0.5
 
 
+@pytest.mark.slow
 @settings(derandomize=True, deadline=None)
 @given(a=costs, b=costs)
 def test_effect_size_and_tests_are_symmetric(a: list[float], b: list[float]) -> None:

@@ -45,6 +45,7 @@ def test_walk12_legs_reach_from_hip_to_ankle():
     assert walk.soles[0].supports[0] and not walk.soles[0].supports[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", problem_names())
 def test_every_problem_can_be_drawn(name):
     skeleton = drawn(name)
@@ -73,6 +74,7 @@ def test_stairs_are_drawn_under_the_feet():
     np.testing.assert_allclose(stance[:, 2:, 2], 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_frames_differ_and_a_sheet_is_written(nao, tmp_path):
     made = frames(nao)
     first, second = next(made), next(made)

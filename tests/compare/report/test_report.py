@@ -102,6 +102,7 @@ def test_summaries_by_hand() -> None:
     assert (colony.feasible, colony.claimed, colony.best, colony.median, colony.worst) == (3, 3, 10.005, 10.5, 13.0)
 
 
+@pytest.mark.slow
 def test_table_of_solvers(tables: Tables) -> None:
     assert tables.row("swarm") == [
         "swarm",
@@ -194,6 +195,7 @@ def test_page_loads_nothing(page: str, tables: Tables) -> None:
     assert len(ids) == len(set(ids))
 
 
+@pytest.mark.slow
 def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
     for r in study():
         path = tmp_path / RECORDS / r.problem / f"{r.algorithm}-{r.run:04d}.json"
@@ -206,12 +208,14 @@ def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
     assert Tables((tmp_path / "report.html").read_text(encoding="utf-8")).row("newton")[9] == "10"
 
 
+@pytest.mark.slow
 def test_two_problems_have_a_performance_profile(tmp_path: Path) -> None:
     other = [replace(r, problem="run") for r in study()]
     files = write_report(tmp_path, [*study(), *other], Manifest(settings=None, sessions=()))
     assert tmp_path / "performance-profile.svg" in files and all(path.stat().st_size for path in files)
 
 
+@pytest.mark.slow
 def test_nothing_feasible_is_said_plainly(tmp_path: Path) -> None:
     failed = [record("pso", run, [(10, None)], feasible=False, success=False) for run in range(2)]
     write_report(tmp_path, failed, Manifest(settings=None, sessions=()))

@@ -20,6 +20,7 @@ SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868
 
 
+@pytest.mark.slow
 def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
     record = run_task(Task(problem=SSP, algorithm="slsqp"))
     assert record.success and record.verdict.feasible
@@ -28,6 +29,7 @@ def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
     assert (np.diff(record.history.evaluations) > 0).all() and (np.diff(record.time_s.history) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
     record = run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=45)))
     assert record.status == "evaluation budget used" and not record.success
@@ -35,12 +37,14 @@ def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
     assert run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
 
 
+@pytest.mark.slow
 def test_slsqp_leaves_fixed_variables_alone() -> None:
     fixed = ProblemSpec(name="nao-ssp", values=dict(SSP.load().fix(swing_height_m=0.02).values))
     record = run_task(Task(problem=fixed, algorithm="slsqp", run=1))
     assert record.x["swing_height_m"] == 0.02 and record.verdict.feasible
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fatrop", "sqpmethod", "uno"])
 def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
     reason = nlpsol.probe(name)
@@ -53,6 +57,7 @@ def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
     assert record.evaluations["f"] > 0 and record.evaluations["gradient"] > 0
 
 
+@pytest.mark.slow
 def test_other_nlp_solvers_print_nothing() -> None:
     program = (
         "from compare.study.runner import run_task; from compare.study.task import ProblemSpec, Task\n"
@@ -77,6 +82,7 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
         solver("snop")
 
 
+@pytest.mark.slow
 def test_a_gradient_run_charges_all_its_calls() -> None:
     record = run_task(Task(problem=SSP, algorithm="ipopt"))
     assert record.history.evaluations == (record.evaluations["f"],) and record.active_constraints

@@ -57,6 +57,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_one_file_a_run(undisturbed: Path) -> None:
     names = [
         f"records/nao-ssp/{solver}-000{run}.json" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)
@@ -110,6 +111,7 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
             run_study(Study(tasks=(task,), folder=tmp_path))
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
@@ -153,6 +155,7 @@ class Broken:
         return ()
 
 
+@pytest.mark.slow
 def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
     tasks = (Task(problem=SSP, algorithm=Broken()), Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)))
     broken, good = run_study(Study(tasks=tasks, folder=tmp_path))
@@ -168,6 +171,7 @@ def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
     assert "has no point to polish: failed: RuntimeError" in polished.status
 
 
+@pytest.mark.slow
 def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
     tasks = tuple(Task(problem=SSP, algorithm=Broken(deadly=True), run=run) for run in range(2))
     with pytest.raises(GaitError, match="worker process died 3 times in a row"):

@@ -19,6 +19,7 @@ from nlp_gait.problem.solution import Solution
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.legs import LegGeometry, leg_geometry
 from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import floating_model, stand
 from tests.robots.custom import HEAVIER, HIP_OFFSET, THIGH, TIBIA, Record, as_urdf, humanoid, nao, partner
 from tests.robots.files import written
@@ -40,6 +41,7 @@ def gaits(path: str) -> dict[str, tuple[GaitProblem, Solution]]:
     return {name: (problem, solve(problem, starts=2)) for name, problem in problems.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_another_humanoid_is_solved_without_any_setting(
     gaits: dict[str, tuple[GaitProblem, Solution]], name: str
@@ -49,14 +51,14 @@ def test_another_humanoid_is_solved_without_any_setting(
     assert solution.starts[0].objective == pytest.approx(solution.starts[1].objective, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_its_feet_stand_below_its_hip_joints_and_its_torso_where_planned(
     gaits: dict[str, tuple[GaitProblem, Solution]], path: str, name: str
 ) -> None:
     """Pinocchio puts the torso from either foot where the plan wants it; in single support it gives the torques too."""
     problem, solution = gaits[name]
-    assert problem.signals is not None
-    signals = problem.signals(np.array(list(solution.x.values())), problem.p)
+    signals = problem.signals(solution.x)
     robot = load_robot(path)
     model = floating_model(robot)
     for sample in range(11):
@@ -92,7 +94,6 @@ def test_for_nao_the_papers_numbers_come_out_to_the_last_digit(name: str, x_m: f
     problem = load(name, robot=robot)
     assert (problem.lower[0], problem.upper[0]) == (0.25, 0.31)
     assert (problem.value("dbm_x_mean_limit_m"), problem.value("dbm_y_mean_limit_m")) == (x_m, y_m)
-    assert problem.signals is not None
     x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: len(problem.names)]
     arrays = problem.signals(x).arrays
     ends = {key: [tuple(arrays[key][k, :2]) for k in (0, -1)] for key in ("hip", "left_foot", "right_foot")}
@@ -116,8 +117,7 @@ def test_for_nao_the_papers_numbers_come_out_to_the_last_digit(name: str, x_m: f
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_may_be_longer(name: str) -> None:
     problem = load(name, step_length_m=0.08)
-    assert problem.signals is not None
-    arrays = problem.signals((problem.lower + problem.upper) / 2, problem.p).arrays
+    arrays = problem.signals((problem.lower + problem.upper) / 2).arrays
     assert arrays["left_foot"][-1, 0] == 0.08
     assert arrays["right_foot"][-1, 0] == pytest.approx(0.16)
     assert problem.dense(2) is not None
@@ -131,6 +131,7 @@ def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
         load(name, step_length_m=step)
 
 
+@pytest.mark.slow
 def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) -> None:
     pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
     raw = humanoid()
@@ -152,7 +153,7 @@ def test_joints_that_no_gait_moves_are_locked(tmp_path: Path) -> None:
         del raw["links"][link], raw["joints"][joint]
     problem = load("nao-ssp", robot=written(tmp_path, raw))
     x = (problem.lower + problem.upper) / 2
-    assert np.isfinite(exact_model(problem).at(x, problem.p).cost)
+    assert np.isfinite(evaluated(problem, x).cost)
 
 
 def changed(group: str, name: str, **values: object) -> Callable[[Record], None]:
@@ -217,12 +218,12 @@ def test_a_robot_that_lacks_a_joint_is_answered_with_its_name(tmp_path: Path) ->
         load("nao-ssp", robot=written(tmp_path, text))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_feet_of_unequal_height_both_reach_the_ground(tmp_path: Path, name: str) -> None:
     raw = nao()
     raw["feet"]["right"]["ankle_height_m"] = 0.05
     problem = load(name, robot=written(tmp_path, raw))
-    assert problem.signals is not None
     x: Array = (problem.lower + problem.upper) / 2
     soles = problem.signals(x).arrays
     assert soles["left_foot"][:, 2] == pytest.approx(0.0, abs=1e-15)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
-from nlp_gait.problems.nao.body import GRAVITY
+from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.properties.mirror import JOINT_SIGNS, partner
 
@@ -70,7 +70,11 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
-    found = walking_cycle(**problem.options).signals(problem.symbols(), x, problem.p)  # type: ignore[arg-type]
+    """Single and double support, both with their samples at the switch."""
+    model, share = nao("nao-v5", rotational_inertia=True), problem.options["torso_share"]
+    assert problem.grid is not None
+    cycle = walking_cycle(model, share, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 
 
@@ -81,10 +85,7 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
     return np.array([JOINT_SIGNS[joint] * values[columns[partner(joint)]] for joint in signals.joints])
 
 
-def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    return exact_model(problem).at(x, problem.p).indexes
-
-
+@pytest.mark.slow
 def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
     for _, single, double in sampled:
         assert double.arrays["t"][0] == single.arrays["t"][-1]
@@ -92,11 +93,12 @@ def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sam
             np.testing.assert_allclose(double.arrays[name][0], single.arrays[name][-1], rtol=0, atol=CONTINUITY)
 
 
+@pytest.mark.slow
 def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
     at_speed: GaitProblem, sampled: list[Sampled]
 ) -> None:
     for x, single, double in sampled:
-        step = indexes(at_speed, x)["step_length_m"]
+        step = evaluated(at_speed, x).indexes["step_length_m"]
         for name in ("q", "qd"):
             np.testing.assert_allclose(double.arrays[name][-1], mirrored_row(single, name, 0), rtol=0, atol=CONTINUITY)
         for end, start in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
@@ -104,13 +106,13 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
             np.testing.assert_allclose(double.arrays[end][-1], image, rtol=0, atol=CONTINUITY)
 
 
+@pytest.mark.slow
 def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed: GaitProblem) -> None:
     """By one-sided differences of second order on a dense grid, for the time histories hold no such velocities."""
     dense = at_speed.dense(100)
     assert dense is not None
     x = candidates(at_speed)[0]
-    cycle = walking_cycle(**dense.options, samples_per_interval=100)  # type: ignore[arg-type]
-    single, double = cycle.signals(dense.symbols(), x, dense.p).values()
+    single, double = phases(dense, x)
 
     def rate(signals: Signals, name: str, end: int) -> Array:
         t, y = signals.arrays["t"], signals.arrays[name]
@@ -127,8 +129,8 @@ def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed
     np.testing.assert_allclose(rate(single, "hip", -1), expected, rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
-    assert at_speed.signals is not None
     x = candidates(at_speed)[0]
     signals = at_speed.signals(x)
     assert (np.diff(signals.arrays["t"]) > 0.0).all()
@@ -136,6 +138,7 @@ def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_sp
     assert signals.arrays["t"][-1] == pytest.approx(2.4)
 
 
+@pytest.mark.slow
 def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]) -> None:
     robot = load_robot("nao-v5")
     model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
@@ -147,6 +150,7 @@ def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]
             np.testing.assert_allclose(single.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> None:
     problem, robot = load("nao-cycle", torso_share=rule), load_robot("nao-v5")
@@ -177,6 +181,7 @@ def _state(signals: Signals, sample: int) -> tuple[dict[str, float], ...]:
     )
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     free = load("nao-cycle")
     for x, *halves in sampled:
@@ -185,19 +190,20 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         for signals in halves:
             tau, qd, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
             energy += float(np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
-        power = exact_model(at_speed).at(x, at_speed.p).cost
+        power = evaluated(at_speed, x).cost
         assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
-        per_metre = exact_model(free).at(np.append(x, step), free.p).cost
+        per_metre = evaluated(free, np.append(x, step)).cost
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
-        figures = indexes(at_speed, x)
+        figures = evaluated(at_speed, x).indexes
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
         weight = load_robot("nao-v5").mass_kg * GRAVITY
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     x, single, double = sampled[0]
-    figures = indexes(at_speed, x)
+    figures = evaluated(at_speed, x).indexes
     touch_down = double.arrays["tau"][0] - single.arrays["tau"][-1]
     lift_off = mirrored_row(single, "tau", 0) - double.arrays["tau"][-1]
     assert figures["touch_down_torque_jump_Nm"] == pytest.approx(np.abs(touch_down).max(), rel=ROUNDING)
@@ -207,10 +213,9 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
 def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
     x = candidates(at_speed)[0]
     fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
-    model = exact_model(fast)
-    values = model.at(x, fast.p)
-    row = model.row_names.index("step_length")
-    assert values.g[row] == pytest.approx(0.144) and values.upper[row] == pytest.approx(0.122)
+    found = evaluated(fast, x)
+    row = found.row_names.index("step_length")
+    assert found.g[row] == pytest.approx(0.144) and found.upper[row] == pytest.approx(0.122)
 
 
 def test_the_published_limits_are_the_defaults() -> None:

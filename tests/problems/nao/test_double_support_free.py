@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.closed_chain import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
@@ -47,11 +47,6 @@ def leaning(seed: int, lean: float = 0.2) -> Array:
     return x
 
 
-def signals_of(problem: GaitProblem, x: Array) -> Signals:
-    assert problem.signals is not None
-    return problem.signals(x)
-
-
 def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     q, qd, qdd = (
         dict(zip(signals.joints, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")
@@ -63,10 +58,11 @@ def ankle_of(robot: Robot, side: str) -> Array:
     return np.array([*ANKLES_XY[side], robot.feet["left"].ankle_height_m])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_loop_closes_in_pinocchio(seed: int) -> None:
     """From the left sole outwards, the right one lies where it stands, flat and at rest, and the torso where it is planned."""
-    robot, signals = load_robot("nao-v5"), signals_of(problem_of(), leaning(seed))
+    robot, signals = load_robot("nao-v5"), problem_of().signals(leaning(seed))
     model = floating_model(robot)
     data = model.createData()
     assert np.abs(signals.arrays["q"][:, signals.joints.index("LHipYawPitch")]).max() > 1e-4
@@ -90,9 +86,10 @@ def test_the_loop_closes_in_pinocchio(seed: int) -> None:
             np.testing.assert_allclose(moved[0], moved[1], rtol=0, atol=POSE_TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", ["printed", "lever"])
 def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
-    robot, signals = load_robot("nao-v5"), signals_of(problem_of(share), leaning(0))
+    robot, signals = load_robot("nao-v5"), problem_of(share).signals(leaning(0))
     for sample in range(11):
         near_left = (signals.arrays["hip"][sample, 1] + 0.05) / 0.1
         left_share = near_left if share == "lever" else 1.0 - near_left
@@ -107,44 +104,49 @@ def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
         np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
 
 
+@pytest.mark.slow
 def test_velocities_and_accelerations_are_derivatives_of_the_angles() -> None:
     problem = problem_of().dense(1000)
     assert problem is not None
-    arrays = signals_of(problem, leaning(0)).arrays
+    arrays = problem.signals(leaning(0)).arrays
     step = (arrays["t"][2:] - arrays["t"][:-2])[:, None]
     for value, slope in (("q", "qd"), ("qd", "qdd")):
         differences = (arrays[value][2:] - arrays[value][:-2]) / step
         np.testing.assert_allclose(differences, arrays[slope][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
     problem = problem_of()
     for seed in range(4):
-        arrays = signals_of(problem, leaning(seed)).arrays
+        arrays = problem.signals(leaning(seed)).arrays
         tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert exact_model(problem).at(leaning(seed), problem.p).cost == pytest.approx(power, rel=ROUNDING)
+        assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_without_a_lean_it_is_the_planned_motion() -> None:
     planned, free = load("nao-dsp", trajectory="spline-2", samples_per_interval=1), problem_of()
     x = leaning(1, lean=0.0)
     assert free.names[: len(planned.names)] == planned.names
-    mine, theirs = signals_of(free, x), signals_of(planned, x[: len(planned.names)])
+    mine, theirs = free.signals(x), planned.signals(x[: len(planned.names)])
     for signal, values in theirs.arrays.items():
         np.testing.assert_allclose(mine.arrays[signal], values, rtol=0, atol=1e-9, err_msg=signal)
-    cost, expected = (exact_model(p).at(x[: len(p.names)], p.p).cost for p in (free, planned))
+    cost, expected = (evaluated(p, x[: len(p.names)]).cost for p in (free, planned))
     assert cost == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_ends_are_the_papers() -> None:
-    mine = signals_of(problem_of(), leaning(2))
-    theirs = signals_of(load("nao-dsp"), np.array(PAPER))
+    mine = problem_of().signals(leaning(2))
+    theirs = load("nao-dsp").signals(np.array(PAPER))
     for signal in ("q", "qd", "hip", "com"):
         for row in (0, -1):
             np.testing.assert_allclose(mine.arrays[signal][row], theirs.arrays[signal][row], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_where_the_loop_stays_open_a_row_says_so() -> None:
     problem, x = problem_of(), leaning(0)
     lean = [i for i, name in enumerate(problem.names) if name.startswith(LEAN)]

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, Signals, load
+from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.robots import load_robot
 from tests.backends.toys import row_violations
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
@@ -40,15 +40,11 @@ def leaning(seed: int) -> Array:
     return x
 
 
-def signals_of(problem: GaitProblem, x: Array) -> Signals:
-    assert problem.signals is not None
-    return problem.signals(x)
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(seed: int) -> None:
     robot = load_robot("nao-v5")
-    model, signals = floating_model(robot), signals_of(problem_of(), leaning(seed))
+    model, signals = floating_model(robot), problem_of().signals(leaning(seed))
     ankle = np.array([0.06, 0.05, robot.feet["left"].ankle_height_m])
     for sample in range(11):
         motion = [
@@ -62,40 +58,45 @@ def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(s
         np.testing.assert_allclose(signals.arrays["hip"][sample], oracle.torso, rtol=0, atol=POSITION_TOLERANCE_M)
 
 
+@pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
     problem = problem_of()
     for seed in range(4):
-        arrays = signals_of(problem, leaning(seed)).arrays
+        arrays = problem.signals(leaning(seed)).arrays
         tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert exact_model(problem).at(leaning(seed), problem.p).cost == pytest.approx(power, rel=ROUNDING)
+        assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_both_yaw_pitch_joints_are_one_and_the_held_arm_joints_stay() -> None:
-    signals = signals_of(problem_of(), leaning(0))
+    signals = problem_of().signals(leaning(0))
     q = dict(zip(signals.joints, signals.arrays["q"].T, strict=True))
     np.testing.assert_array_equal(q["LHipYawPitch"], q["RHipYawPitch"])
     assert np.abs(q["LHipYawPitch"]).max() > 0.01
     assert all(np.ptp(q[name]) == 0.0 for name in ("LShoulderRoll", "RElbowYaw", "LWristYaw"))
 
 
+@pytest.mark.slow
 def test_the_ends_are_the_papers() -> None:
-    free = signals_of(problem_of(), leaning(0))
-    planned = signals_of(load("nao-ssp"), np.array(PAPER))
+    free = problem_of().signals(leaning(0))
+    planned = load("nao-ssp").signals(np.array(PAPER))
     for signal in ("q", "qd", "hip", "right_foot", "com"):
         for row in (0, -1):
             np.testing.assert_allclose(free.arrays[signal][row], planned.arrays[signal][row], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_planned_motion_is_a_free_one_nearly() -> None:
     planned, free = load("nao-ssp"), problem_of("spline-8")
     x = fitted_start("spline-8", planned, np.array(PAPER))
-    power, expected = (exact_model(p).at(v, p.p).cost for p, v in ((free, x), (planned, PAPER)))
+    power, expected = (evaluated(p, v).cost for p, v in ((free, x), (planned, PAPER)))
     assert power == pytest.approx(expected, rel=FIT_SHARE)
     started = free.start_point(np.random.default_rng(0))
     assert len(started) == len(free.names) and np.isfinite(started).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("joint", "value", "rows"),
     [

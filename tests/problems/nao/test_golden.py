@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from casadi import SX
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem, load
+from nlp_gait.problem import load
 from nlp_gait.problems.nao.double_support import TorsoShare, torso_shares
+from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 LABELS = [row["label"] for row in GOLDEN["rows"]]
@@ -31,17 +30,14 @@ MOST_INSTRUCTIONS = 5000
 NAMES = ("nao-ssp", "nao-dsp")
 
 
-def indexes(problem: GaitProblem, x: Array | list[float]) -> dict[str, float]:
-    return exact_model(problem).at(x, problem.p).indexes
-
-
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
 def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
-    got = indexes(load(row["problem"]), row["x"])
+    got = evaluated(load(row["problem"]), row["x"]).indexes
     assert list(got) == GOLDEN["indexes"]
     assert list(got.values()) == pytest.approx(row["values"], rel=0, abs=GOLDEN_TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
 def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> None:
     solution = solve(load(optimum["problem"], **optimum["options"]), starts=2, seed=1)
@@ -50,18 +46,20 @@ def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> 
         assert start.objective == pytest.approx(optimum["power_W"], rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
 def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: dict[str, Any]) -> None:
-    power = indexes(load(row["problem"], derivatives="finite-difference"), row["x"])["power_W"]
+    power = evaluated(load(row["problem"], derivatives="finite-difference"), row["x"]).indexes["power_W"]
     analytic = row["values"][0]
     assert 1e-4 < abs(power / analytic - 1) < FINITE_DIFFERENCE_SHARE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", GOLDEN["rows"][::2], ids=LABELS[::2])
 def test_with_many_intervals_finite_differences_become_the_derivatives(row: dict[str, Any]) -> None:
     """One-sided differences at the ends err by the first power of the step: 1,000 intervals leave less than 1e-3."""
     powers = [
-        indexes(load(row["problem"], derivatives=kind, intervals=1000), row["x"])["power_W"]
+        evaluated(load(row["problem"], derivatives=kind, intervals=1000), row["x"]).indexes["power_W"]
         for kind in ("analytic", "finite-difference")
     ]
     assert powers[0] == pytest.approx(powers[1], rel=1e-3)
@@ -77,14 +75,14 @@ def test_the_function_of_one_sample_stays_small(name: str) -> None:
 @pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
 def test_other_versions_of_the_robot_give_a_similar_but_other_gait(name: str, robot: str) -> None:
     row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
-    power = indexes(load(name, robot=robot), row["x"])["power_W"]
+    power = evaluated(load(name, robot=robot), row["x"]).indexes["power_W"]
     assert 1e-5 < abs(power / row["values"][0] - 1) < 0.1  # masses differ by at most 2 %
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_point_masses_change_torques_a_little(name: str) -> None:
     row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
-    power = indexes(load(name, rotational_inertia=False), row["x"])["power_W"]
+    power = evaluated(load(name, rotational_inertia=False), row["x"]).indexes["power_W"]
     assert 1e-6 < abs(power / row["values"][0] - 1) < 0.02  # the gaits are slow: gravity rules
 
 
@@ -105,6 +103,7 @@ def test_only_single_support_smooths_its_jump(name: str) -> None:
     assert nlp_model(load(name)).smoothed == (name == "nao-ssp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     x = next(row["x"] for row in GOLDEN["rows"] if row["problem"] == name)
@@ -112,38 +111,31 @@ def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     dense = coarse.dense(100)
     assert dense is not None
     assert dense.value("torque_change_limit_Nm") == 0.9
-    few, many = indexes(coarse, x), indexes(dense, x)
+    few, many = evaluated(coarse, x).indexes, evaluated(dense, x).indexes
     assert many["power_W"] == pytest.approx(few["power_W"], rel=0.02)
     assert many["dbm_y_min_m"] <= few["dbm_y_min_m"] + 1e-12  # the dense grid contains the coarse one
     assert many["torque_change_Nm"] >= few["torque_change_Nm"] - 1e-12  # still over a tenth of the phase
 
 
-wild = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 1e-300, -1.0, 1e6])
-
-
-@given(x=st.lists(wild, min_size=9, max_size=9))
-@example(x=[0.0] * 9)
-@example(x=[0.31, 0, 0, 0.01, 0.01, 0, 0, 0.02, 0.0])  # no time
-@example(x=[0.04519 + 0.085, 0, 0, 0, 0, 0, 0, 0.02, 1.0])  # hip joints at ankle height
-@example(x=[1e6] * 9)
-def test_the_exact_functions_are_finite_for_every_finite_x(x: list[float]) -> None:
-    for problem in EVALUATED:
-        at = exact_model(problem).at(x[: len(problem.names)], problem.p)
-        assert np.isfinite([at.cost, at.violation, *at.g]).all()
-
-
-EVALUATED = [load(name, derivatives=kind) for name in NAMES for kind in ("analytic", "finite-difference")]
+@pytest.mark.parametrize("kind", ["analytic", "finite-difference"])
+@pytest.mark.parametrize("name", NAMES)
+def test_the_exact_functions_are_finite_where_a_motion_degenerates(name: str, kind: str) -> None:
+    """Random points: ``tests/properties/test_every_problem.py``."""
+    problem = load(name, derivatives=kind)
+    no_time = [0.31, 0, 0, 0.01, 0.01, 0, 0, 0.02, 0.0]
+    hip_joints_at_ankle_height = [0.04519 + 0.085, 0, 0, 0, 0, 0, 0, 0.02, 1.0]
+    for x in ([0.0] * 9, no_time, hip_joints_at_ankle_height, [1e6] * 9):
+        duration = x[-1:]
+        found = evaluated(problem, [*x[: len(problem.names) - 1], *duration])
+        assert np.isfinite([found.cost, found.violation, *found.g]).all()
 
 
 def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
     problem = load("nao-ssp")
-    exact = exact_model(problem)
-    x = np.array([0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
-    at = exact.at(x, problem.p)
-    assert np.isfinite(at.cost)
-    assert at.violation > 0
-    broken = {name for name, bad in zip(exact.row_names, (at.g < at.lower) | (at.g > at.upper), strict=True) if bad}
-    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in broken)
+    found = evaluated(problem, [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
+    assert np.isfinite(found.cost)
+    assert found.violation > 0
+    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in found.broken)
 
 
 @pytest.mark.parametrize(

@@ -10,20 +10,12 @@ from casadi import MX, Function
 from scipy.integrate import trapezoid
 
 from nlp_gait import load, solve
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.nao.motors import ANKLE_ROLL, ankle_roll
 from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
 
 X = np.array([0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0])
-
-
-def exact(problem: GaitProblem, x: np.ndarray) -> tuple[float, dict[str, float]]:
-    """Objective, and values of all rows by name."""
-    model = exact_model(problem)
-    at = model.at(x, problem.p)
-    return at.cost, dict(zip(model.row_names, at.g.tolist(), strict=True))
 
 
 def mean(samples: np.ndarray) -> np.ndarray:
@@ -33,13 +25,14 @@ def mean(samples: np.ndarray) -> np.ndarray:
 def test_without_features_it_is_the_same_problem() -> None:
     plain, empty = load("nao-ssp"), load("nao-ssp", motors="")
     assert plain.options == empty.options and "motors" not in plain.options
-    assert exact(plain, X) == exact(empty, X)
+    one, other = evaluated(plain, X), evaluated(empty, X)
+    assert (one.cost, one.rows) == (other.cost, other.rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("features", ["free-braking", "regeneration", "heat", "heat,free-braking"])
 def test_power_is_that_of_the_time_histories(features: str) -> None:
     problem = load("nao-ssp", motors=features)
-    assert problem.signals is not None
     signals = problem.signals(X)
     torque, rate = signals.arrays["tau"], signals.arrays["qd"]
     driven = torque * rate
@@ -64,13 +57,12 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
             heat += resistance * (at_motor / k_t) ** 2
     else:
         heat = 0.025 * (torque**2).sum(axis=1)
-    power, _ = exact(problem, X)
-    assert power == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
+    assert evaluated(problem, X).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_limits_are_those_of_the_data_sheet() -> None:
     problem = load("nao-ssp", motors="limits")
-    assert problem.signals is not None
     signals = problem.signals(X)
     knee = signals.joints.index("LKneePitch")
     torque, rate = signals.arrays["tau"][:, knee], signals.arrays["qd"][:, knee]
@@ -78,7 +70,7 @@ def test_limits_are_those_of_the_data_sheet() -> None:
     assert motor is not None
     assert motor.stall_torque_Nm == pytest.approx(8.5053, abs=1e-4)
     assert motor.no_load_rad_s == pytest.approx(6.9626, abs=1e-4)
-    _, rows = exact(problem, X)
+    rows = evaluated(problem, X).rows
     slope = motor.stall_torque_Nm / motor.no_load_rad_s
     for k in (0, 5, 10):
         assert rows[f"joint_speed[LKneePitch, {k}]"] == pytest.approx(rate[k], abs=1e-12)
@@ -87,6 +79,7 @@ def test_limits_are_those_of_the_data_sheet() -> None:
     assert rows["continuous_torque[LKneePitch]"] == pytest.approx(math.sqrt(mean(torque**2)))
 
 
+@pytest.mark.slow
 def test_a_flat_battery_binds() -> None:
     """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
     problem = load("nao-dsp", motors="limits")
@@ -109,7 +102,7 @@ def test_the_ankles_roll_follows_the_table() -> None:
 
 
 def test_ankle_rows_mirror() -> None:
-    _, rows = exact(load("nao-ssp", motors="ankle"), X)
+    rows = evaluated(load("nao-ssp", motors="ankle"), X).rows
     for side in "LR":
         assert all(rows[f"{side}AnkleRoll_least[{k}]"] > 0.0 for k in range(11))
         assert all(rows[f"{side}AnkleRoll_greatest[{k}]"] < 0.0 for k in range(11))
@@ -117,10 +110,9 @@ def test_ankle_rows_mirror() -> None:
 
 def test_an_index_keeps_the_papers_power() -> None:
     problem = load("nao-ssp", motors="heat")
-    model = exact_model(problem)
-    indexes = model.at(X, problem.p).indexes
-    assert indexes["paper_power_W"] == pytest.approx(exact(load("nao-ssp"), X)[0])
-    assert indexes["power_W"] == exact(problem, X)[0]
+    found = evaluated(problem, X)
+    assert found.indexes["paper_power_W"] == pytest.approx(evaluated(load("nao-ssp"), X).cost)
+    assert found.indexes["power_W"] == found.cost
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 # Two double-precision algorithms on torques of up to some hundred Nm.
@@ -44,18 +44,14 @@ def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float
     return q, qd, qdd
 
 
-def signals_of(problem: GaitProblem, x: Array) -> Signals:
-    assert problem.signals is not None
-    return problem.signals(x)
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
 def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: str) -> None:
     problem, data = load("nao-ssp", robot=robot), load_robot(robot)
     model = floating_model(data)
     ankle = np.array([0.06, 0.05, data.feet["left"].ankle_height_m])
     for x in motions(problem):
-        signals = signals_of(problem, x)
+        signals = problem.signals(x)
         for sample in range(11):
             oracle = stand(model, "LAnkleRoll", ankle, *at(signals, sample), GRAVITY)
             expected = [oracle.torques[joint] for joint in signals.joints]
@@ -64,11 +60,12 @@ def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: s
             np.testing.assert_allclose(signals.arrays["com"][sample], oracle.com, rtol=0, atol=COM_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
     problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
     for x in motions(problem):
-        signals = signals_of(problem, x)
+        signals = problem.signals(x)
         for sample in range(11):
             y = signals.arrays["hip"][sample, 1]
             near_left = (y + 0.05) / 0.1  # 1 above the left foot, 0 above the right one
@@ -88,7 +85,7 @@ def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_a_feasible_gait_puts_the_torso_where_it_is_planned(name: str) -> None:
     problem, data = load(name), load_robot("nao-v5")
-    signals = signals_of(problem, np.array(FEASIBLE[name]))
+    signals = problem.signals(np.array(FEASIBLE[name]))
     for sample in range(11):
         for side, foot in (("L", "left"), ("R", "right")):
             height = np.array([0.0, 0.0, data.feet[foot].ankle_height_m])
@@ -97,12 +94,13 @@ def test_a_feasible_gait_puts_the_torso_where_it_is_planned(name: str) -> None:
             np.testing.assert_allclose(torso, signals.arrays["hip"][sample], rtol=0, atol=TORSO_TOLERANCE_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
     x = np.array(FEASIBLE[name])
     problem = load(name).dense(1000)
     assert problem is not None
-    signals = signals_of(problem, x)
+    signals = problem.signals(x)
     q, qd, qdd, t = (signals.arrays[key] for key in ("q", "qd", "qdd", "t"))
     step = t[2:, None] - t[:-2, None]
     np.testing.assert_allclose((q[2:] - q[:-2]) / step, qd[1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
@@ -110,12 +108,13 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: st
     assert np.abs(qdd).max() > 0.1  # there is something to compare
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_power_of_the_signals_is_the_objective(name: str) -> None:
     problem = load(name)
     for x in motions(problem):
-        signals = signals_of(problem, x)
+        signals = problem.signals(x)
         tau, qd, t = (signals.arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        cost = exact_model(problem).at(x, problem.p).cost
+        cost = evaluated(problem, x).cost
         assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order

@@ -28,6 +28,7 @@ def solution(problem: GaitProblem) -> nlp_gait.Solution:
     return nlp_gait.solve(problem, starts=1, seed=1)
 
 
+@pytest.mark.slow
 def test_case_2_meets_the_known_optimum(solution: nlp_gait.Solution) -> None:
     assert solution.success, solution.status
     assert solution.objective == pytest.approx(KNOWN[2], rel=KNOWN_TOLERANCE)

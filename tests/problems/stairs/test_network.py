@@ -26,6 +26,7 @@ def path() -> tuple[Array, Array]:
     return np.column_stack([hip, both]), ankle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [NetworkSettings(), NetworkSettings(rule="gradient", rate=0.3)])
 def test_every_pose_is_learned(path: tuple[Array, Array], settings: NetworkSettings) -> None:
     angles, ankle = path

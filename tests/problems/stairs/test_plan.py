@@ -27,6 +27,7 @@ def solution(problem: GaitProblem) -> nlp_gait.Solution:
     return nlp_gait.solve(problem, x0=NEAR_BEST)
 
 
+@pytest.mark.slow
 def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     assert solution.success, solution.status
     assert solution.objective == pytest.approx(BEST_ENERGY_J, rel=1e-4)
@@ -43,6 +44,7 @@ def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait
     assert found.objective >= solution.objective - 1e-6
 
 
+@pytest.mark.slow
 def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
     steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
     refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=nlp_gait.IpoptSettings(iterations=40))

@@ -48,6 +48,7 @@ def test_doing_nothing_is_rejected_by_the_tolerance(problem: GaitProblem) -> Non
     assert indexes["largest_error_rad"] > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
     """However little holds the robot up; what falls undamped costs more than any robot could spend, and is infeasible."""
@@ -66,6 +67,7 @@ def test_the_printed_explicit_scheme_diverges_and_says_when(problem: GaitProblem
     assert values(problem, [23.3027, 86.2633, 1.25847])[2]["quanta_before_divergence"] == 350
 
 
+@pytest.mark.slow
 def test_multiple_shooting_meets_the_ants() -> None:
     """On the first 0.08 s, which solve in seconds."""
     short = nlp_gait.load("stairs-track", duration_s=0.08)
@@ -84,6 +86,7 @@ def test_signals(problem: GaitProblem) -> None:
     assert error == pytest.approx(values(problem, [100.0, 100.0, 1.45])[2]["largest_error_rad"])
 
 
+@pytest.mark.slow
 def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
     (cost, *_), (known, *_) = values(learned, x), values(problem, x)
@@ -96,6 +99,7 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     assert error[~legs].max() == 0.0
 
 
+@pytest.mark.slow
 def test_ipopt_solves_with_the_network() -> None:
     short = nlp_gait.load("stairs-track", duration_s=0.04, inverse_kinematics="network")
     assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).success
@@ -109,6 +113,7 @@ def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -
         assert 1.1 < torso < 1.7
 
 
+@pytest.mark.slow
 def test_one_gain_for_each_link() -> None:
     each = nlp_gait.load("stairs-track", gains="per-link")
     assert len(each.names) == 19

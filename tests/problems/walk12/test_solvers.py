@@ -21,6 +21,7 @@ F1MAX = 470.7
 PROBLEM = nlp_gait.load("walk12")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", TABLE_3, ids=lambda row: f"lambda={row[0]}")
 def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     solution = solve(PROBLEM.with_values(**{"lambda": row[0]}), starts=STARTS, seed=1)
@@ -43,6 +44,7 @@ def test_the_corner_is_no_trap(hessian: str) -> None:
     assert solution.objective == pytest.approx(0.9708, abs=OPTIMUM_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_largest_f1_of_the_model() -> None:
     assert model_f1max(PROBLEM) == pytest.approx(F1MAX, rel=1e-3)
     # Whatever the normalisation that the problem carries.
