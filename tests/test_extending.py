@@ -135,7 +135,7 @@ def test_a_part_of_a_gait_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
 
     paper = single_support.paper_parts
     monkeypatch.setattr(single_support, "paper_parts", lambda *a: (*paper(*a), MostHipSpeed()))
-    problem = nlp_gait.load("nao-ssp")
+    problem = single_support.nao_ssp()
     solution = nlp_gait.solve(problem, starts=2)
     fastest = np.abs(problem.signals(solution.x).arrays["qd"]).max(axis=0)
     own = float(fastest[problem.signals(solution.x).joints.index("LHipPitch")])
