@@ -163,7 +163,7 @@ class GaitProblem:
 
     def value(self, name: str) -> float:
         """Current value of a parameter."""
-        return float(self.p[self._parameter_index(name)])
+        return self.parameter_values[self._parameter(name).name]
 
     def with_values(self, /, **values: float) -> GaitProblem:
         """The same problem with other parameter values; nothing is rebuilt. Names with a dot go in as ``**{...}``.
@@ -173,7 +173,7 @@ class GaitProblem:
             InputError: not finite, outside what the parameter allows, or bounds inverted.
         """
         for name, value in values.items():
-            parameter = self.parameters[self._parameter_index(name)]
+            parameter = self._parameter(name)
             if not is_number(value):
                 raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
             if not parameter.minimum <= value <= parameter.maximum:
@@ -274,7 +274,7 @@ class GaitProblem:
         """The point x (n,) with the current parameter values, in numbers."""
         return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
 
-    @property
+    @cached_property
     def parameter_values(self) -> dict[str, float]:
         """Current values by name."""
         return dict(zip((q.name for q in self.parameters), self.p.tolist(), strict=True))
@@ -330,26 +330,25 @@ class GaitProblem:
             self._built[key] = build()
         return self._built[key]
 
-    def _parameter_index(self, name: str) -> int:
-        for i, parameter in enumerate(self.parameters):
+    def _parameter(self, name: str) -> Parameter:
+        for parameter in self.parameters:
             if parameter.name == name:
-                return i
+                return parameter
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
     def _check_pairs(self) -> None:
-        values = {q.name: float(v) for q, v in zip(self.parameters, self.p, strict=True)}
+        values = self.parameter_values
         for name, low in values.items():
-            if name.endswith(".lower"):
-                stem = name.removesuffix(".lower")
-                if low > values[f"{stem}.upper"]:
-                    raise InputError(
-                        f"bounds of {stem!r} are inverted: lower {low:g} is above upper {values[f'{stem}.upper']:g}; "
-                        f"set {name} and {stem}.upper so that lower <= upper"
-                    )
+            stem = name.removesuffix(".lower")
+            if stem != name and low > (high := values[f"{stem}.upper"]):
+                raise InputError(
+                    f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
+                    f"set {name} and {stem}.upper so that lower <= upper"
+                )
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number; a truth value is none."""
+    """Whether a value is a finite number; True and False are not."""
     try:
         return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # a whole number beyond every float
