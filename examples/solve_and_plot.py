@@ -16,7 +16,7 @@ print(f"{solution.objective_name} {solution.objective:.6f} {solution.objective_u
 for bound in solution.active_constraints:
     print(f"  held back by {bound.name} at {bound.bound:g} {bound.unit}: {bound.price:.4g} {bound.price_unit}")
 
-signals = problem.signals(list(solution.x.values()))
+signals = problem.signals(solution.x)
 with style():
     figure = new_figure()
     axes = figure.subplots()
