@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -49,6 +49,10 @@ class ProblemSpec:
     def title(self) -> str:
         """Label, or name without one."""
         return self.label or self.name
+
+    def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
+        """The same with other options beside those that it has."""
+        return replace(self, options={**self.options, **options})
 
     def load(self) -> GaitProblem:
         """The problem, built once in each process."""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-import nlp_gait
 from compare.papers.nao import runs as nao_runs
 from compare.papers.nao.findings import Findings, PhaseFindings, Points, sweep_values
 from compare.papers.nao.paper import PHASES, PrintedPhase
@@ -23,6 +22,7 @@ from compare.papers.nao.runs import (
     points_file,
     read_points,
     run_keeping_points,
+    spec_of,
     special_sweeps,
     sweep_step,
     tasks,
@@ -64,9 +64,9 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     ]
     results = Steps(folder, progress, code=(nao_runs,)).side_by_side(sweeps)
     held = {step.name: [Held(**row) for row in rows] for step, rows in zip(sweeps, results, strict=True)}
-    ssp, dsp = (_phase(phase, runs, held, points[phase.problem]) for phase in PHASES)
+    ssp, dsp = (_phase(phase, effort, runs, held, points[phase.problem]) for phase in PHASES)
     findings = Findings(
-        ssp=ssp, dsp=dsp, swing=held[SWING_SWEEP], durations=held[DURATION_SWEEP], lever=runs[LEVER.title, IPOPT]
+        ssp=ssp, dsp=dsp, swing=held[SWING_SWEEP], durations=held[DURATION_SWEEP], lever=runs[LEVER, IPOPT]
     )
     progress("figures, tables and report")
     write_document(folder, document(findings))
@@ -78,7 +78,7 @@ def _variable_sweeps(phase: PrintedPhase, runs: Runs, points: Mapping[str, Point
     return [
         sweep_step(
             _sweep_name(phase, i),
-            phase.problem,
+            spec_of(phase.problem, effort),
             i,
             sweep_values(points, i, value, effort.sweep_points),
             effort.sweep_starts,
@@ -106,9 +106,13 @@ def _points(folder: Path, phase: PrintedPhase, searches: Sequence[Task]) -> dict
 
 
 def _phase(
-    paper: PrintedPhase, runs: Runs, held: Mapping[str, Sequence[Held]], points: Mapping[str, Points]
+    paper: PrintedPhase,
+    effort: Effort,
+    runs: Runs,
+    held: Mapping[str, Sequence[Held]],
+    points: Mapping[str, Points],
 ) -> PhaseFindings:
-    problem = nlp_gait.load(paper.problem)
+    problem = spec_of(paper.problem, effort).load()
     return PhaseFindings(
         paper=paper,
         problem=problem,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.nao.body import PLANNED_JOINTS
 
 ALGORITHMS = ("pso", "ga")
-LEVER = ProblemSpec(name="nao-dsp", options={"torso_share": "lever"}, label="nao-dsp-lever")
+LEVER = "nao-dsp-lever"
 SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
 
 
@@ -37,6 +37,7 @@ class Effort:
         evaluations: of a search, as in the paper.
         starts: of IPOPT.
         lever_starts: of IPOPT with the lever rule for the torso's share.
+        intervals: between the samples of a phase, as in the paper.
         sweep_starts: random starts at both ends of a sweep.
         sweep_points: of a sweep over the range of all feasible solutions, and over that of the cheap ones.
     """
@@ -45,6 +46,7 @@ class Effort:
     evaluations: int = 10_000
     starts: int = 20
     lever_starts: int = 5
+    intervals: int = 10
     sweep_starts: int = 2
     sweep_points: tuple[int, int] = (13, 10)
 
@@ -67,16 +69,22 @@ class Held:
 def tasks(effort: Effort) -> list[Task]:
     """Searches and starts of IPOPT; equal runs of the searches start from the same population."""
     stop = Stop(evaluations=effort.evaluations)
-    specs = [ProblemSpec(name=phase.problem) for phase in PHASES]
+    specs = [spec_of(phase.problem, effort) for phase in PHASES]
+    lever = replace(specs[1].with_options(torso_share="lever"), label=LEVER)
     found = [
         Task(problem=spec, algorithm=name, stop=stop, run=k)
         for spec in specs
         for name in ALGORITHMS
         for k in range(effort.runs)
     ]
-    for spec, starts in (*((spec, effort.starts) for spec in specs), (LEVER, effort.lever_starts)):
+    for spec, starts in (*((spec, effort.starts) for spec in specs), (lever, effort.lever_starts)):
         found += [Task(problem=spec, algorithm=IPOPT, run=k) for k in range(starts)]
     return found
+
+
+def spec_of(problem: str, effort: Effort) -> ProblemSpec:
+    """A phase of the paper."""
+    return ProblemSpec(name=problem, options={"intervals": effort.intervals})
 
 
 def run_keeping_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
@@ -120,29 +128,29 @@ def special_sweeps(effort: Effort) -> list[Step]:
     """IPOPT over the paper's swing heights, and over durations of single support."""
     values = {SWING_SWEEP: (SWING_HEIGHT, SWING_POWER_W["pso"]), DURATION_SWEEP: (SSP.duration, DURATIONS_S)}
     return [
-        sweep_step(name, SSP.problem, position, list(at), effort.sweep_starts)
+        sweep_step(name, spec_of(SSP.problem, effort), position, list(at), effort.sweep_starts)
         for name, (position, at) in values.items()
     ]
 
 
-def sweep_step(name: str, problem: str, position: int, values: Sequence[float], starts: int) -> Step:
+def sweep_step(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Step:
     """Sweep over a variable, kept as a step: its optima lead to each other and are no runs of their own."""
-    model = ProblemSpec(name=problem).load()
-    variable = model.names[position]
+    problem = spec.load()
+    variable = problem.names[position]
     return Step(
         name=name,
         inputs={
-            **fingerprint(model),
+            **fingerprint(problem),
             **{"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts},
         },
-        compute=partial(sweep, problem, variable, values, starts),
+        compute=partial(sweep, spec, variable, values, starts),
     )
 
 
-def sweep(problem: str, variable: str, values: Sequence[float], starts: int) -> list[dict[str, float | bool]]:
+def sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int) -> list[dict[str, float | bool]]:
     """Fields of ``Held`` for each of some values, ascending; infeasible points are kept."""
-    model = ProblemSpec(name=problem).load()
-    solutions = solve_both_ways([model.fix(**{variable: value}) for value in values], starts=starts)
+    problem = spec.load()
+    solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
     return [
         {"at": value, "power_W": solution.objective, "feasible": solution.success}
         for value, solution in zip(values, solutions, strict=True)

@@ -31,7 +31,7 @@ def all_figures(findings: Findings) -> dict[str, Figure]:
     """By the stem of their files."""
     plans = {case: complete(case, findings.plan(case)) for case in findings.cases}
     followed = {case: tracked(case, plans[case], point(findings.best_track(case))) for case in findings.cases}
-    plan, arrays = plans[DRAWN_CASE], _planned(DRAWN_CASE, plans[DRAWN_CASE])
+    plan, arrays = plans[DRAWN_CASE], _planned(DRAWN_CASE, findings.plan(DRAWN_CASE))
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
     step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
     first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
