@@ -29,9 +29,9 @@ TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 def all_figures(findings: Findings) -> dict[str, Figure]:
     """By the stem of their files."""
-    plans = {case: complete(case, findings.plan(case)) for case in findings.cases}
+    plans = {case: complete(findings.effort, case, findings.plan(case)) for case in findings.cases}
     followed = {case: tracked(case, plans[case], point(findings.best_track(case))) for case in findings.cases}
-    plan, arrays = plans[DRAWN_CASE], _planned(DRAWN_CASE, findings.plan(DRAWN_CASE))
+    plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
     step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
     first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
@@ -51,11 +51,11 @@ def all_figures(findings: Findings) -> dict[str, Figure]:
         }
 
 
-def _planned(case: int, plan: Mapping[str, float]) -> Mapping[str, Array]:
-    problem = plan_spec(case).load().dense(DENSITY)
+def _planned(findings: Findings, case: int) -> Mapping[str, Array]:
+    problem = plan_spec(findings.effort, case).load().dense(DENSITY)
     if problem is None:
         raise TypeError("the planner has samples and signals")
-    return problem.signals(plan).arrays
+    return problem.signals(findings.plan(case)).arrays
 
 
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:

@@ -62,6 +62,8 @@ class Effort:
         other_stairs: tread and rise of one step that the paper did not try [m]; a rise of ``IMPOSSIBLE_RISE_M`` is impossible.
         other_starts: of IPOPT on the plan there.
         poses: of the swing leg for which the network is trained.
+        plan_intervals: between the samples of a plan.
+        ideal_intervals: between those of the ideal.
     """
 
     cases: tuple[int, ...] = tuple(TABLE_4)
@@ -71,7 +73,7 @@ class Effort:
     runs: int = 3
     plan_evaluations: int = 10_000
     track_evaluations: int = ANTS * ITERATIONS
-    track_settings: Mapping[str, float] = field(default_factory=lambda: {"time_limit_s": 1200.0})
+    track_settings: Mapping[str, float | str] = field(default_factory=lambda: {"time_limit_s": 1200.0})
     other_stairs: tuple[tuple[float, float], ...] = (
         (0.30, 0.10),
         (0.30, 0.13),
@@ -81,6 +83,8 @@ class Effort:
     )
     other_starts: int = 8
     poses: int = 351
+    plan_intervals: int = 40
+    ideal_intervals: int = 70
 
     @property
     def steps(self) -> int:
@@ -91,15 +95,17 @@ class Effort:
         return len(self.cases) * case + others + 2
 
 
-def plan_spec(case: int, minimise: str = "energy") -> ProblemSpec:
+def plan_spec(effort: Effort, case: int, minimise: str = "energy") -> ProblemSpec:
     """Planner of a case."""
     label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
-    return ProblemSpec(name="stairs-plan", options={"minimise": minimise}, values=stair_of(case), label=label)
+    options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
+    return ProblemSpec(name="stairs-plan", options=options, values=stair_of(case), label=label)
 
 
-def ideal_spec(case: int) -> ProblemSpec:
+def ideal_spec(effort: Effort, case: int) -> ProblemSpec:
     """Full trajectory optimisation of a case."""
-    return ProblemSpec(name="stairs-ideal", values=stair_of(case), label=f"ideal-{case}")
+    options = {"intervals": effort.ideal_intervals}
+    return ProblemSpec(name="stairs-ideal", options=options, values=stair_of(case), label=f"ideal-{case}")
 
 
 def track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemSpec:
@@ -108,10 +114,11 @@ def track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemS
     return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
 
 
-def other_spec(name: str, tread: float, rise: float) -> ProblemSpec:
+def other_spec(effort: Effort, name: str, tread: float, rise: float) -> ProblemSpec:
     """The planner or the ideal on a stair that the paper did not try."""
     values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
-    return ProblemSpec(name=name, values=values, label=f"{name}-{tread:g}-{rise:g}")
+    intervals = {"stairs-plan": effort.plan_intervals, "stairs-ideal": effort.ideal_intervals}[name]
+    return ProblemSpec(name=name, options={"intervals": intervals}, values=values, label=f"{name}-{tread:g}-{rise:g}")
 
 
 def stair_of(case: int) -> dict[str, float]:
@@ -123,15 +130,15 @@ def stair_of(case: int) -> dict[str, float]:
 def first_tasks(effort: Effort) -> Iterator[Task]:
     """Ideals and plans, on the paper's stairs and on others."""
     for case in effort.cases:
-        yield from starts(ideal_spec(case), effort.ideal_starts, seed=case)
-        yield from starts(plan_spec(case), effort.plan_starts)
-        yield from starts(plan_spec(case, "jerk"), effort.jerk_starts)
+        yield from starts(ideal_spec(effort, case), effort.ideal_starts, seed=case)
+        yield from starts(plan_spec(effort, case), effort.plan_starts)
+        yield from starts(plan_spec(effort, case, "jerk"), effort.jerk_starts)
         for name, algorithm in ALGORITHMS.items():
-            yield from searches(plan_spec(case), name, algorithm, effort.runs, effort.plan_evaluations)
+            yield from searches(plan_spec(effort, case), name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
         settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
         for name, count in (("stairs-plan", _other_starts(effort, rise)), ("stairs-ideal", 1)):
-            yield from starts(other_spec(name, tread, rise), count, settings=settings)
+            yield from starts(other_spec(effort, name, tread, rise), count, settings=settings)
 
 
 def _other_starts(effort: Effort, rise: float) -> int:
@@ -149,7 +156,7 @@ def track_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
 
 def plan_of(runs: Runs, case: int, minimise: str = "energy") -> dict[str, float]:
     """Best plan that IPOPT found in a case."""
-    return dict(best(runs[plan_spec(case, minimise).title, IPOPT]).x)
+    return dict(best(runs[f"{'plan' if minimise == 'energy' else minimise}-{case}", IPOPT]).x)
 
 
 def best_track(runs: Runs, case: int) -> RunRecord:
@@ -158,9 +165,9 @@ def best_track(runs: Runs, case: int) -> RunRecord:
     return min(found, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
 
 
-def complete(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+def complete(effort: Effort, case: int, plan: Mapping[str, float]) -> dict[str, float]:
     """A plan with the parameters that are not its variables."""
-    problem = plan_spec(case).load()
+    problem = plan_spec(effort, case).load()
     given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
     return {**plan, **given}
 
@@ -168,30 +175,31 @@ def complete(case: int, plan: Mapping[str, float]) -> dict[str, float]:
 def other_steps(effort: Effort, runs: Runs) -> list[Step]:
     """What is computed from the runs and is no run of a solver, so that it is kept as steps."""
     first = effort.cases[0]
-    plan = complete(first, plan_of(runs, first))
+    plan = complete(effort, first, plan_of(runs, first))
     trained = Step(
         name="network",
-        inputs={**fingerprint(plan_spec(first).load()), "plan": plan, "poses": effort.poses},
+        inputs={**fingerprint(plan_spec(effort, first).load()), "plan": plan, "poses": effort.poses},
         compute=partial(network, first, plan, effort.poses),
     )
-    return [trained, *(step for case in effort.cases for step in case_steps(case, runs))]
+    return [trained, *(step for case in effort.cases for step in case_steps(effort, case, runs))]
 
 
-def case_steps(case: int, runs: Runs) -> Iterator[Step]:
+def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Step]:
     """Replay of the ideal, the printed scheme, differences of both plans, and the network in the loop."""
     ideal, plan = point(best(runs[f"ideal-{case}", IPOPT])), plan_of(runs, case)
-    yield _step("replay", case, ideal_spec(case), replayed, x=ideal)
-    yield _step("printed", case, track_spec(case, plan), printed_scheme, plan=plan)
+    spec = ideal_spec(effort, case)
+    yield _step("replay", case, spec, partial(replayed, spec), x=ideal)
+    yield _step("printed", case, track_spec(case, plan), partial(printed_scheme, case), plan=plan)
     for name in ("energy", "jerk"):
         used = plan_of(runs, case, name)
-        yield _step(f"differences-{name}", case, track_spec(case, used), differences, plan=used)
+        yield _step(f"differences-{name}", case, track_spec(case, used), partial(differences, case), plan=used)
     x = point(best_track(runs, case))
-    yield _step("learned", case, track_spec(case, plan), with_network, plan=plan, x=x)
+    yield _step("learned", case, track_spec(case, plan), partial(with_network, case), plan=plan, x=x)
 
 
 def _step(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Step:
     inputs = {**fingerprint(spec.load()), **arguments}
-    return Step(name=f"{name}-{case}", inputs=inputs, compute=partial(compute, case, **arguments))
+    return Step(name=f"{name}-{case}", inputs=inputs, compute=partial(compute, **arguments))
 
 
 def network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
@@ -247,9 +255,9 @@ def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[s
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
 
 
-def replayed(case: int, x: list[float]) -> dict[str, float]:
+def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float]:
     """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
-    arrays = ideal_spec(case).load().signals(np.array(x)).arrays
+    arrays = ideal.load().signals(np.array(x)).arrays
     _, followed = replay(arrays, FEEDBACK)
     time, fallen = replay(arrays, OPEN_LOOP)
     off = np.maximum.accumulate(np.abs(fallen).max(axis=1))

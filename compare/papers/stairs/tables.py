@@ -267,7 +267,7 @@ def _other(findings: Findings) -> Table:
     for tread, rise in findings.effort.other_stairs:
         cells: list[Value] = [tread, rise]
         for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
-            run = best(findings.runs[other_spec(name, tread, rise).title, IPOPT])
+            run = best(findings.runs[other_spec(findings.effort, name, tread, rise).title, IPOPT])
             worst = ", ".join(run.verdict.violated[:3])
             cells.append(f"{run.verdict.objective:.3f}{unit}" if run.success else f"none; in the way: {worst}")
         rows.append(cells)
