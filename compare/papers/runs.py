@@ -1,4 +1,4 @@
-"""Runs of a reproduction: the same tasks, records and study as everybody's, and what a table asks of several records."""
+"""Runs of a reproduction as tasks and records of a study, and what its tables need to know of several records."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def searches(problem: ProblemSpec, label: str, algorithm: Algorithm, runs: int, 
 
 
 def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = run_task) -> Runs:
-    """Records of all tasks; what an earlier call has finished is read from its file.
+    """Run all tasks and return their records; a run that an earlier call has finished is read from its file.
 
     Args:
         folder: of the reproduction.
@@ -65,7 +65,7 @@ def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = 
 
 
 def best(records: Iterable[RunRecord]) -> RunRecord:
-    """What succeeded by the objective, then what is feasible by the objective, then the rest by violation."""
+    """The best run: successful ones come first, then feasible ones, both by objective, then the others by violation."""
     return min(records, key=_rank)
 
 

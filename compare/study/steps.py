@@ -22,7 +22,7 @@ from nlp_gait.problem import GaitProblem
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One of several steps that may run side by side; arguments as those of ``Steps``, ``compute`` crosses process borders."""
+    """One of several steps that may run side by side: what ``Steps`` takes; ``compute`` must be picklable."""
 
     name: str
     inputs: Mapping[str, Any]

@@ -18,5 +18,10 @@ def document(findings: Findings) -> Document:
         "plan_evaluations": effort.plan_evaluations,
         "track_evaluations": effort.track_evaluations,
         "network_case": effort.cases[0],
+        "cases": " | ".join(f"case {case}" for case in effort.cases),
+        "papers": " | ".join(f"paper {case}" for case in effort.cases),
+        "ours": " | ".join(f"ours {case}" for case in effort.cases),
+        "cases_4f": " | ".join(".4f" for _ in effort.cases),
+        "cases_6g": " | ".join(".6g" for _ in effort.cases),
     }
     return document_from(text, values=values, tables=all_tables(findings), figures=all_figures(findings))

@@ -23,13 +23,12 @@ from compare.papers.walk12.runs import (
     title,
     title_of_table_4,
 )
-from compare.report.document import Table, Value
+from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 
 SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
 SEARCHES = ("ga", "pso")
-Rows = list[list[Value]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,22 +81,19 @@ def f_of_runs(records: Sequence[RunRecord]) -> list[float]:
     return [r.verdict.objective if r.verdict.feasible else -math.inf for r in records]
 
 
-def all_tables(findings: Findings) -> dict[str, Table]:
-    """By the name of their place in the report."""
+def all_tables(findings: Findings) -> dict[str, Rows]:
+    """Rows by name; headings and formats stand in ``report.md``."""
     return {
-        "table_3_paper": _table_3(findings, PAPER),
-        "table_3_model": _table_3(findings, MODEL),
+        "table3-paper": _table_3(findings, PAPER),
+        "table3-model": _table_3(findings, MODEL),
         "gaits": _gaits(findings),
-        "table_4": _table_4(findings),
+        "table4": _table_4(findings),
     }
 
 
-def _table_3(findings: Findings, label: str) -> Table:
+def _table_3(findings: Findings, label: str) -> Rows:
     """f of the paper's gait and of every solver under one normalisation."""
-    columns = {"lambda": ".2f", "paper: f as printed": ".3f", "model: f of the paper's gait": ".4f"}
-    columns |= {f"{name.upper()} {which}": ".4f" for name in SEARCHES for which in ("best", "median", "worst")}
-    columns |= {"IPOPT": ".4f", "IPOPT, dense grid": ".4f", "starts that agree": "d", "time of a start [s]": ".3f"}
-    rows: Rows = []
+    rows = []
     for row, of_papers_gait in zip(TABLE_3, findings.f_of_papers_gaits(label), strict=True):
         cells: list[Value] = [row.weight, row.f, of_papers_gait]
         for name in SEARCHES:
@@ -108,29 +104,24 @@ def _table_3(findings: Findings, label: str) -> Table:
         agreeing = sum(r.success and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
         time_s = float(np.median([r.time_s.solve for r in begun]))
         rows.append([*cells, f_best, dense(optimum)["f"], agreeing, time_s])
-    return Table(name=f"table3-{label}", columns=columns, rows=rows)
+    return rows
 
 
-def _gaits(findings: Findings) -> Table:
+def _gaits(findings: Findings) -> Rows:
     """Gaits behind Table III under the paper's normalisation, and how long each is statically stable."""
-    columns = {"lambda": ".2f", "by": ""} | {f"{name} [m]": ".4f" for name in "snHh"}
-    columns |= {"f1 [1/(m^2 s)]": ".1f", "share of the step with (8)": ".3f"}
-    rows: Rows = []
+    rows: list[Sequence[Value]] = []
     for row, f1, stable in zip(TABLE_3, findings.f1_of_table_3, findings.stable, strict=True):
         rows.append([row.weight, "paper", *row.x, f1, stable.share])
         for solver in (*SEARCHES, IPOPT):
             found = best(findings.of(PAPER, row.weight, solver))
             figures = dense(found)
             rows.append([row.weight, solver.upper(), *point(found), figures["f1_per_m2s"], figures["stable_share"]])
-    return Table(name="gaits", columns=columns, rows=rows)
+    return rows
 
 
-def _table_4(findings: Findings) -> Table:
+def _table_4(findings: Findings) -> Rows:
     """The paper's step times under both horizons of Q."""
-    columns = {"T [s]": ".1f", "horizon of Q": "", "paper: f1max": ".1f", "paper: f": ".4f"}
-    columns |= {"paper: f1 implied": ".0f", "model: f1 of the paper's gait": ".0f"}
-    columns |= {"model: f1max": ".1f", "IPOPT: f": ".4f"} | {f"{name} [m]": ".4f" for name in "snHh"}
-    rows: Rows = []
+    rows: list[Sequence[Value]] = []
     for row in TABLE_4:
         for horizon in HORIZONS:
             optimum = best(findings.runs[title_of_table_4(row, horizon), IPOPT])
@@ -138,4 +129,4 @@ def _table_4(findings: Findings) -> Table:
             ours = [f1_of_gait(row, horizon=horizon), f1max_of_table_4(findings.runs, row, horizon)]
             ours += [optimum.verdict.objective, *point(optimum)]
             rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
-    return Table(name="table4", columns=columns, rows=rows)
+    return rows
