@@ -35,7 +35,7 @@ class Table:
     """A table of values with all their digits, and how people read them.
 
     Attributes:
-        columns: heading, with its unit, to the format of its numbers on a page, for example ``".4f"``; an empty one shows all digits.
+        columns: heading, with its unit, to the format of its numbers on a page, such as ``".4f"``; an empty one shows all digits.
         rows: one value for each column.
         name: stem of its CSV file; empty for a table that stands on the page only.
         caption: what it shows.
