@@ -54,7 +54,7 @@ def formulations(starts: int) -> list[Row]:
         solver(x0=rng.uniform(0.0, 1.0, len(problem.names)), **arguments)
         converged += solver.stats()["return_status"] == "Solve_Succeeded"
         iterations.append(solver.stats()["iter_count"])
-    solution = nlp_gait.solve(problem, starts=starts, seed=0, settings=IpoptSettings())
+    solution = nlp_gait.solve(problem, starts=starts, seed=0, solver=IpoptSettings())
     lifted = [start.iterations for start in solution.starts]
     return [
         Row(

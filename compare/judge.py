@@ -1,7 +1,7 @@
 """The one judge: whatever a solver claims about x, these are the exact functions' values.
 
-A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, where
-violations between the samples show.
+A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, which shows
+violations between the samples.
 """
 
 from __future__ import annotations
@@ -11,24 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 
 DENSE_INTERVALS = 1000  # at least this many equal parts on the dense grid
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConstraintValue:
-    """One constraint row at a point; a missing bound is None."""
-
-    name: str
-    value: float
-    lower: float | None
-    upper: float | None
-    violation: float
-    unit: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +53,7 @@ class Evaluation:
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:
         """Violated rows, worst first."""
-        return _worst(self.constraints)
+        return violated_rows(self.constraints)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers; the robot stands beside the problem's name."""
@@ -85,47 +72,29 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
         InputError: x has the wrong length or is not finite.
     """
     point = problem.check_x(x)
-    cost, violation, rows, indexes = _values(problem, point)
+    values, rows = _at(problem, point)
     parts = DENSE_INTERVALS if problem.grid is None else problem.grid.parts
     factor = math.ceil(DENSE_INTERVALS / parts)
     dense = problem.dense(factor)
-    dense_rows, dense_indexes = _values(dense, point)[2:] if dense is not None else ((), None)
+    dense_values, dense_rows = (None, ()) if dense is None else _at(dense, point)
     objective = problem.objective
     return Evaluation(
         problem=problem.name,
         options=dict(problem.options),
         parameters=dict(problem.values),
         x=problem.by_name(point),
-        objective={"name": objective.name, "value": objective.sign * cost, "unit": objective.unit},
-        indexes=indexes,
+        objective={"name": objective.name, "value": objective.sign * values.cost, "unit": objective.unit},
+        indexes=values.indexes,
         constraints=rows,
-        violation=violation,
-        feasible=violation <= FEASIBILITY_TOLERANCE,
-        dense=dense_indexes,
-        dense_violations=_worst(dense_rows),
+        violation=values.violation,
+        feasible=values.violation <= FEASIBILITY_TOLERANCE,
+        dense=None if dense_values is None else dense_values.indexes,
+        dense_violations=violated_rows(dense_rows),
         dense_intervals=None if dense is None else factor * parts,
     )
 
 
-def _values(problem: GaitProblem, x: Array) -> tuple[float, float, tuple[ConstraintValue, ...], dict[str, float]]:
-    """Cost, total violation, rows and indexes."""
+def _at(problem: GaitProblem, x: Array) -> tuple[ExactValues, tuple[ConstraintValue, ...]]:
     exact = exact_model(problem)
-    cost, violation, g, lower, upper, indexes = (np.array(v).ravel() for v in exact.function(x, problem.p))
-    excess = np.maximum(np.maximum(lower - g, g - upper), 0.0)
-    rows = tuple(
-        ConstraintValue(name=name, value=value, lower=_bound(low), upper=_bound(high), violation=amount, unit=unit)
-        for name, value, low, high, amount, unit in zip(
-            exact.row_names, g.tolist(), lower.tolist(), upper.tolist(), excess.tolist(), exact.row_units, strict=True
-        )
-    )
-    named = dict(zip(exact.index_names, indexes.tolist(), strict=True))
-    return float(cost[0]), float(violation[0]), rows, named
-
-
-def _bound(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _worst(rows: Sequence[ConstraintValue]) -> tuple[ConstraintValue, ...]:
-    violated = [row for row in rows if not row.violation <= FEASIBILITY_TOLERANCE]
-    return tuple(sorted(violated, key=lambda row: -row.violation))
+    values = exact.at(x, problem.p)
+    return values, exact.rows(values)

@@ -6,7 +6,7 @@ python examples/sweep.py [FOLDER]
 import sys
 from pathlib import Path
 
-from compare.questions.sweep.report import write_sweep
+from compare.questions.sweep.report import sweep_answer
 from compare.questions.sweep.study import parse_axis, sweep
 from compare.study.task import ProblemSpec
 
@@ -15,4 +15,4 @@ spec = ProblemSpec(name="nao-ssp")
 points = sweep(spec, [parse_axis("swing_height_m=0.015:0.028:3")], starts=2)
 for point in points:
     print(f"{point.at['swing_height_m'] * 1000:.1f} mm: {point.objective:.5f} W, {point.status}")
-print("wrote", *write_sweep(folder, points, spec.load(), "ipopt"))
+print("wrote", *sweep_answer(points, spec.load(), "ipopt").write(folder))

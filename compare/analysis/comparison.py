@@ -9,7 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from compare.analysis.statistics.run_length import Curve, Weighting, best_known, curve, expected_running_time
+from compare.analysis.statistics.run_length import (
+    Curve,
+    Weighting,
+    best_known,
+    curve,
+    expected_running_time,
+    relative_gap,
+)
 from compare.study.record import RunRecord
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Objective
@@ -89,6 +96,10 @@ class Comparison:
     def value(self, cost: float) -> float:
         """Objective in the problem's sense."""
         return self.objective.sign * cost
+
+    def gap(self, cost: float) -> float:
+        """Relative distance of a cost from the best objective known."""
+        return relative_gap(self.value(cost), self.reference, self.objective)
 
 
 def compare_problems(records: Sequence[RunRecord], weighting: Weighting = DEFAULT_WEIGHTING) -> list[Comparison]:

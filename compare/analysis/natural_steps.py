@@ -35,8 +35,6 @@ def natural_step(parameter: Parameter, value: float) -> NaturalStep:
     """Step of a parameter at its current value."""
     if parameter.unit in BY_UNIT:
         return BY_UNIT[parameter.unit]
-    return (
-        NaturalStep(SHARE * abs(value), f"{100 * SHARE:g} %")
-        if value
-        else NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")
-    )
+    if value:
+        return NaturalStep(SHARE * abs(value), MASS.words)
+    return NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")

@@ -9,7 +9,8 @@ from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.intervals import bootstrap_interval
-from compare.analysis.statistics.run_length import TARGETS, relative_gap
+from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.units import with_unit
 
 HEADER = (
     "solver",
@@ -74,7 +75,6 @@ def summarise(comparison: Comparison) -> list[SolverSummary]:
 
 def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     costs, records, sign = solver.feasible, solver.records, comparison.objective.sign
-    middle = comparison.value(median(costs)) if costs else None
     claims = [sign * r.objective for r in records if r.success and r.objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
     dense = [r.verdict.dense_feasible for r in records]
@@ -86,10 +86,10 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
         best_claim=sign * min(claims) if claims else None,
         best=comparison.value(costs[0]) if costs else None,
-        median=middle,
+        median=comparison.value(median(costs)) if costs else None,
         worst=comparison.value(costs[-1]) if costs else None,
         median_interval=(interval[0], interval[1]) if interval else None,
-        gap=None if middle is None else relative_gap(middle, comparison.reference, comparison.objective),
+        gap=comparison.gap(median(costs)) if costs else None,
         evaluations=median(c.total() for c in solver.curves),
         time_s=median(r.time_s.solve for r in records),
         build_s=max(r.time_s.build for r in records),
@@ -101,20 +101,13 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
 
 def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
     """One row of text under ``HEADER``."""
-    unit = "" if comparison.objective.unit == "1" else f" {comparison.objective.unit}"
-
-    def value(v: float | None) -> str:
-        return "-" if v is None else f"{v:.6f}{unit}"
-
+    values = (summary.best_claim, summary.best, summary.median, summary.worst)
     return (
         summary.algorithm,
         str(summary.runs),
         f"{summary.claimed}/{summary.runs}",
         f"{summary.feasible}/{summary.runs}",
-        value(summary.best_claim),
-        value(summary.best),
-        value(summary.median),
-        value(summary.worst),
+        *(with_unit(value, comparison.objective.unit) for value in values),
         percent(summary.gap),
         count(summary.evaluations),
         f"{summary.time_s:.3f} s",

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from compare.analysis.comparison import Comparison
 from compare.analysis.significance import compare_pairs
 from compare.analysis.table import count, percent
+from compare.analysis.units import with_unit
 
 # A run whose gap is at most this has found the best known.
 FOUND = 1e-6
@@ -32,19 +33,16 @@ def verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
 
 
 def _found(comparison: Comparison) -> str:
-    unit = "" if comparison.objective.unit == "1" else f" {comparison.objective.unit}"
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
-    best = f"{comparison.reference:.6f}{unit}"
+    best = with_unit(comparison.reference, comparison.objective.unit)
     return f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {_listed(finders) or 'one run'}"
 
 
 def _distance(comparison: Comparison) -> str:
     parts = []
     for solver in comparison.solvers:
-        gap = (solver.median_cost - comparison.objective.sign * comparison.reference) / (
-            abs(comparison.reference) or 1.0
-        )
+        gap = comparison.gap(solver.median_cost)
         parts.append(f"{solver.name} {percent(gap) if math.isfinite(gap) else 'mostly infeasible'}")
     pairs = compare_pairs(comparison)
     different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)

@@ -31,6 +31,10 @@ from compare.cli.search import search
 from compare.cli.simulate import simulate
 from compare.cli.solve import solve
 
+COMPARISON = (evaluate, solve, search, compare, report, sweep, reproduce)
+QUESTIONS = (prices, pareto, certainty, motions, motors, robust, walk)
+ROBOT = (simulate, export, animate)
+
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
     no_args_is_help=True,
@@ -39,23 +43,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.command("list")(list_problems)
-app.command("evaluate")(evaluate)
-app.command("solve")(solve)
-app.command("search")(search)
-app.command("compare")(compare)
-app.command("report")(report)
-app.command("sweep")(sweep)
-app.command("reproduce")(reproduce)
-app.command("prices")(prices)
-app.command("pareto")(pareto)
-app.command("certainty")(certainty)
-app.command("motions")(motions)
-app.command("motors")(motors)
-app.command("robust")(robust)
-app.command("walk")(walk)
-app.command("simulate")(simulate)
-app.command("export")(export)
-app.command("animate")(animate)
+for function in (*COMPARISON, *QUESTIONS, *ROBOT):
+    app.command(function.__name__)(function)
 
 
 def main() -> None:

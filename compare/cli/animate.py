@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import ResultFile, command, output_file, stdout
+from compare.cli.command import command
+from compare.cli.common import output_file, print_written
+from compare.cli.options import ResultFile
 
 SHEET = ".png"
 
@@ -19,8 +21,8 @@ def animate(
         Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
     ] = None,
     frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second.")] = 12.5,
-    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="1 is real time.")] = 1.0,
-    poses: Annotated[int, typer.Option(min=2, max=20, help="Of a contact sheet.")] = 6,
+    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
+    poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
 
@@ -41,4 +43,4 @@ def animate(
     else:
         played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
         write_video(target, frames(skeleton), (len(skeleton.t) - 1) / played_s)
-    stdout.print(f"wrote {target}", soft_wrap=True, markup=False)
+    print_written(target)

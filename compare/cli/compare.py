@@ -5,46 +5,23 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Jobs,
-    Options,
-    Robot,
-    Seed,
-    Set,
-    command,
-    end_interrupted,
-    print_json,
-    print_table,
-    problem_spec,
-    progress_bar,
-    stdout,
-)
-from compare.cli.study_options import (
-    Handle,
-    PenaltyWeight,
-    Scheduler,
-    Stagnation,
-    Target,
-    TimeLimit,
-    handling_of,
-    stop_of,
-)
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar
+from compare.cli.options import RESULTS, AsJson, Jobs, ProblemOptions, SearchOptions, names_in
+from compare.study.settings import SolverSpec, read_settings
+from compare.study.task import GRADIENT_SOLVERS, IPOPT
+from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError
+from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord
-    from compare.study.settings import StudySettings
-    from compare.study.task import ProblemSpec
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
@@ -53,6 +30,7 @@ OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "as_json")
 
 @command
 def compare(
+    *,
     context: typer.Context,
     problems: Annotated[
         list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
@@ -60,33 +38,20 @@ def compare(
     algorithms: Annotated[
         str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
     ] = "pso,ga,aco",
-    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search algorithm.")] = 11,
     starts: Annotated[
         int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
     ] = 20,
-    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")] = 10_000,
-    handling: Handle = "deb",
-    penalty_weight: PenaltyWeight = None,
-    target: Target = None,
-    stagnation: Stagnation = None,
-    time_limit: TimeLimit = None,
-    polish: Annotated[
-        bool, typer.Option("--polish", help="IPOPT from each search's result, as solvers of their own.")
-    ] = False,
-    seed: Seed = 0,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
+    searches: SearchOptions,
+    options: ProblemOptions,
     config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
     out: Annotated[
         Path, typer.Option(help="Folder for records, report and figures; finished runs in it are kept.")
-    ] = Path("results"),
+    ] = RESULTS,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out, whatever it was.")] = False,
     jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
@@ -98,10 +63,7 @@ def compare(
     """
     from compare.report import write_report
     from compare.study.manifest import Session, read_manifest, write_manifest
-    from compare.study.settings import read_settings
     from compare.study.study import Study, check_study, default_jobs, run_study
-    from nlp_gait.backends.interrupts import Interrupted
-    from nlp_gait.files import writable_folder
 
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
@@ -113,17 +75,9 @@ def compare(
             raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
         settings = known
     else:
-        specs = [
-            problem_spec(name, robot, intervals, derivatives, option, values, fix)
-            for name in problems or DEFAULT_PROBLEMS
-        ]
-        settings = _settings(algorithms, specs, runs, starts, polish)
-        settings = replace(
-            settings,
-            handling=handling_of(handling, penalty_weight),
-            stop=stop_of(evaluations, target, stagnation, time_limit),
-            seed=seed,
-        )
+        specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
+        solvers = _solvers(algorithms, starts, searches.polish)
+        settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
     check_study(study)
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
@@ -140,12 +94,8 @@ def compare(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
     written = write_report(out, records, read_manifest(out))
-    if as_json:
-        print_json({"problems": summaries_of(records), "files": [str(path) for path in written]})
-        return
-    print_summaries(records)
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)
+    data = {"problems": summaries_of(records)} if as_json else {}
+    print_result(as_json, data, written, lambda: print_summaries(records))
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:
@@ -161,28 +111,24 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
-def print_summaries(records: Sequence[RunRecord]) -> None:
-    """Table of solvers for each problem."""
+def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
+    """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.table import HEADER, cells, summarise
 
     for comparison in compare_problems(records):
         rows = [cells(summary, comparison) for summary in summarise(comparison)]
-        print_table(f"{comparison.problem}: judged by the exact functions", HEADER, rows)
+        print_table(title or f"{comparison.problem}: judged by the exact functions", HEADER, rows)
 
 
-def _settings(algorithms: str, problems: Sequence[ProblemSpec], runs: int, starts: int, polish: bool) -> StudySettings:
-    """Study of IPOPT, unless it has no starts, and the named solvers."""
-    from compare.study.settings import SolverSpec, StudySettings
-    from compare.study.task import GRADIENT_SOLVERS, IPOPT
-
-    names = [name.strip() for name in algorithms.split(",") if name.strip()]
-    if starts > 0 and IPOPT not in names:
-        names.insert(0, IPOPT)
+def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:
+    """The named solvers with IPOPT before them; without starts, those that need none."""
+    names = names_in(algorithms)
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]
-    solvers = tuple(SolverSpec(algorithm=name, polish=polish and name not in GRADIENT_SOLVERS) for name in names)
-    return StudySettings(problems=tuple(problems), solvers=solvers, runs=runs, starts=max(starts, 1))
+    elif IPOPT not in names:
+        names.insert(0, IPOPT)
+    return [SolverSpec(algorithm=name, polish=polish and name not in GRADIENT_SOLVERS) for name in names]
 
 
 def _refuse_others(context: typer.Context, flag: str) -> None:

@@ -7,24 +7,10 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Intervals,
-    Options,
-    ProblemName,
-    Robot,
-    Set,
-    command,
-    fail,
-    output_file,
-    parse_numbers,
-    print_json,
-    print_table,
-    problem_spec,
-    quantity,
-    stdout,
-)
+from compare.analysis.units import with_unit
+from compare.cli.command import command
+from compare.cli.common import fail, output_file, print_json, print_rows, print_table, stdout
+from compare.cli.options import AsJson, NamedProblem, numbers_in
 from compare.judge import Evaluation
 
 SHOWN_VIOLATIONS = 10
@@ -32,13 +18,8 @@ SHOWN_VIOLATIONS = 10
 
 @command
 def evaluate(
-    problem: ProblemName,
     x: Annotated[str, typer.Option("--x", help="Decision variables in order, separated by commas.")],
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
+    problem: NamedProblem,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -48,11 +29,11 @@ def evaluate(
     """
     from compare.judge import evaluate as judge
 
-    loaded = problem_spec(problem, robot, intervals, derivatives, option, values).load()
-    point = loaded.check_x(parse_numbers(x))
+    loaded = problem.spec().load()
+    point = loaded.check_x(numbers_in(x))
     if signals is not None:
         if loaded.motion is None:
-            fail(f"problem {problem!r} has no signals")
+            fail(f"problem {problem.name!r} has no signals")
         from nlp_gait.export.signals import write_npz
 
         target = output_file(signals)
@@ -66,24 +47,23 @@ def evaluate(
 
 def _print(evaluation: Evaluation) -> None:
     objective = evaluation.objective
-    stdout.print(f"{evaluation.problem}: {objective['name']} {quantity(objective['value'], objective['unit'])}")
+    stdout.print(f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}")
     dense = evaluation.dense or {}
-    rows = [
-        (name, f"{v:.6f}", f"{dense[name]:.6f}" if name in dense else "-") for name, v in evaluation.indexes.items()
-    ]
+    rows = [(name, f"{value:.6f}", with_unit(dense.get(name), "1")) for name, value in evaluation.indexes.items()]
     grid = f"{evaluation.dense_intervals} intervals" if evaluation.dense else "no dense grid"
     print_table("Indexes", ("index", "own samples", grid), rows)
     for title, violated in (("own samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
         if not violated:
             stdout.print(f"feasible on the {title}" if title == "own samples" or evaluation.dense else "")
             continue
-        table = [
-            (v.name, f"{v.value:.6g}", _bound(v.lower), _bound(v.upper), quantity(v.violation, v.unit, ".3g"))
-            for v in violated[:SHOWN_VIOLATIONS]
-        ]
-        title = f"Infeasible on the {title}: {len(violated)} rows, worst first"
-        print_table(title, ("row", "value", "lower", "upper", "violation"), table)
-
-
-def _bound(value: float | None) -> str:
-    return "-" if value is None else f"{value:.6g}"
+        print_rows(
+            f"Infeasible on the {title}: {len(violated)} rows, worst first",
+            violated[:SHOWN_VIOLATIONS],
+            {
+                "row": lambda v: v.name,
+                "value": lambda v: f"{v.value:.6g}",
+                "lower": lambda v: with_unit(v.lower, "1", ".6g"),
+                "upper": lambda v: with_unit(v.upper, "1", ".6g"),
+                "violation": lambda v: with_unit(v.violation, v.unit, ".3g"),
+            },
+        )

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import ResultFile, command, output_file, stdout
+from compare.cli.command import command
+from compare.cli.common import output_file, print_written
+from compare.cli.options import ResultFile
 from nlp_gait.errors import unknown
 from nlp_gait.export.setpoints import PERIOD_MS
 
@@ -19,7 +21,7 @@ def export(
     out: Annotated[
         Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
     ] = None,
-    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows.")] = PERIOD_MS,
+    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows [ms].")] = PERIOD_MS,
 ) -> None:
     """Write a gait in a format that other tools read.
 
@@ -33,4 +35,4 @@ def export(
     loaded = load_result(result)
     target = output_file(out if out is not None else result.with_name(result.stem + FORMATS[format_]))
     write_as(format_, target, loaded, period_ms)
-    stdout.print(f"wrote {target}", soft_wrap=True, markup=False)
+    print_written(target)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterable
+from typing import Annotated, Any
 
 import typer
 
-from compare.cli.common import AsJson, command, print_json, print_table, problem_spec, stdout
+from compare.cli.command import command
+from compare.cli.common import print_json, print_table, stdout
+from compare.cli.options import AsJson, ProblemOptions
 from nlp_gait.problem import problem_names
 
 
 @command
 def list_problems(
     problem: Annotated[
-        str | None, typer.Argument(metavar="[PROBLEM]", help="Show its variables and parameters.")
+        str | None, typer.Argument(metavar="[PROBLEM]", help="Show its variables, parameters and options.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List problems, algorithms and robots; or the variables and parameters of one problem.
+    """List problems, algorithms and robots; or the variables, parameters and options of one problem.
 
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`
     """
@@ -28,10 +31,10 @@ def list_problems(
 
 
 def _overview(as_json: bool) -> None:
-    from compare.study.runner import solver_names
+    from compare.study.task import solver_names
     from nlp_gait.robots import robot_names
 
-    problems = {name: problem_spec(name, None, None, None, None, None).load() for name in problem_names()}
+    problems = {name: ProblemOptions().spec_of(name).load() for name in problem_names()}
     if as_json:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
@@ -45,18 +48,15 @@ def _overview(as_json: bool) -> None:
 
 
 def _details(name: str, as_json: bool) -> None:
-    problem = problem_spec(name, None, None, None, None, None).load()
+    problem = ProblemOptions().spec_of(name).load()
     if as_json:
-        variables = [
-            {"name": v.name, "unit": v.unit, "lower": v.lower, "upper": v.upper, "description": v.description}
-            for v in problem.variables
-        ]
-        parameters = [
-            {"name": q.name, "unit": q.unit, "default": q.default, "description": q.description}
-            for q in problem.own_parameters
-        ]
         print_json(
-            {"problem": name, "options": dict(problem.options), "variables": variables, "parameters": parameters}
+            {
+                "problem": name,
+                "options": dict(problem.options),
+                "variables": _chosen(problem.variables, "name", "unit", "lower", "upper", "description"),
+                "parameters": _chosen(problem.own_parameters, "name", "unit", "default", "description"),
+            }
         )
         return
     rows = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
@@ -65,3 +65,7 @@ def _details(name: str, as_json: bool) -> None:
     print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "what"), limits)
     options = ", ".join(f"{key}={value}" for key, value in problem.options.items())
     stdout.print(f"options: {options}\na variable's bounds are parameters too: --set {problem.names[0]}.lower=...")
+
+
+def _chosen(items: Iterable[object], *attributes: str) -> list[dict[str, Any]]:
+    return [{name: getattr(item, name) for name in attributes} for item in items]

@@ -8,18 +8,20 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import AsJson, command, print_json, stdout
+from compare.cli.command import command
+from compare.cli.common import print_result
+from compare.cli.options import AsJson
 from nlp_gait.errors import InputError
 
 
 @command
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: what --out was.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     gradient_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts (default n + 1).")
+        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts as (default n + 1).")
     ] = None,
     hessian_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts (default (n + 1)(n + 2)/2).")
+        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts as (default (n + 1)(n + 2)/2).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -35,8 +37,4 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     written = rebuild_report(folder, weighting)
-    if as_json:
-        print_json({"files": [str(path) for path in written]})
-        return
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)
+    print_result(as_json, {}, written, lambda: None)

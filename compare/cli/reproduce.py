@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.common import command, progress_bar, stdout
-from compare.cli.resumable import resumable
+from compare.cli.command import command
+from compare.cli.common import print_written, progress_bar
+from compare.cli.interrupts import resumable
 from nlp_gait.errors import unknown
 
 # Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
@@ -36,4 +37,4 @@ def reproduce(
     module = import_module(REPRODUCTIONS[paper])
     with resumable(out, "**/*.json"), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
         module.reproduce(out, progress=advance)
-    stdout.print(f"wrote {out / 'report.md'}", soft_wrap=True)
+    print_written(out / "report.md")

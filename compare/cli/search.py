@@ -3,40 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    Derivatives,
-    Fix,
-    Intervals,
-    Jobs,
-    Options,
-    ProblemName,
-    Robot,
-    Seed,
-    Set,
-    command,
-    end_interrupted,
-    fail,
-    print_json,
-    print_table,
-    problem_spec,
-    progress_bar,
-    quantity,
-    stdout,
-)
-from compare.cli.study_options import (
-    Handle,
-    PenaltyWeight,
-    Stagnation,
-    Target,
-    TimeLimit,
-    handling_of,
-    stop_of,
-)
+from compare.analysis.units import with_unit
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, fail, print_json, print_rows, progress_bar, stdout
+from compare.cli.compare import print_summaries
+from compare.cli.interrupts import until_interrupted
+from compare.cli.options import AsJson, Jobs, NamedProblem, SearchOptions
+from compare.study.settings import SolverSpec
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord
@@ -44,23 +21,10 @@ if TYPE_CHECKING:
 
 @command
 def search(
-    problem: ProblemName,
+    *,
     algorithm: Annotated[str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...")] = "pso",
-    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Independent runs.")] = 11,
-    seed: Seed = 0,
-    evaluations: Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one run.")] = 10_000,
-    handling: Handle = "deb",
-    penalty_weight: PenaltyWeight = None,
-    target: Target = None,
-    stagnation: Stagnation = None,
-    time_limit: TimeLimit = None,
-    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each run's result.")] = False,
-    robot: Robot = None,
-    intervals: Intervals = None,
-    derivatives: Derivatives = None,
-    option: Options = None,
-    values: Set = None,
-    fix: Fix = None,
+    searches: SearchOptions,
+    problem: NamedProblem,
     out: Annotated[
         Path | None, typer.Option(help="Keep one record file a run in this folder; continue from it.")
     ] = None,
@@ -74,60 +38,40 @@ def search(
     Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
     `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
     """
-    from compare.analysis.comparison import compare_problems
-    from compare.analysis.table import HEADER, cells, summarise
-    from compare.study.settings import SolverSpec, StudySettings
     from compare.study.study import Study, default_jobs, run_study
-    from nlp_gait.backends.interrupts import Interrupted
 
-    spec = problem_spec(problem, robot, intervals, derivatives, option, values, fix)
-    settings = StudySettings(
-        problems=(spec,),
-        solvers=(SolverSpec(algorithm=algorithm, runs=runs, polish=polish),),
-        handling=handling_of(handling, penalty_weight),
-        stop=stop_of(evaluations, target, stagnation, time_limit),
-        seed=seed,
-    )
-    tasks = settings.tasks()
-    stopped = ""
+    spec = problem.spec()
+    solver = SolverSpec(algorithm=algorithm, runs=searches.runs, polish=searches.polish)
+    tasks = searches.study([spec], [solver]).tasks()
     with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
-        try:
-            records = run_study(
+        records, stopped = until_interrupted(
+            lambda: run_study(
                 Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
                 progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
-            )
-        except Interrupted as interrupt:
-            records, stopped = cast("list[RunRecord]", interrupt.partial), interrupt.sentence
-            if not records:
-                end_interrupted(stopped)
+            ),
+            nothing="",
+        )
     loaded = spec.load()
     if as_json:
-        print_json(
-            {
-                "problem": problem,
-                "algorithm": algorithm,
-                "options": dict(loaded.options),
-                "runs": [_run(r) for r in records if not _is_polish(r)],
-                **({"polished": [_run(r) for r in records if _is_polish(r)]} if polish else {}),
-            }
-        )
+        data: dict[str, Any] = {"problem": problem.name, "algorithm": algorithm, "options": dict(loaded.options)}
+        data["runs"] = [_run(record) for record in records if not _is_polish(record)]
+        if searches.polish:
+            data["polished"] = [_run(record) for record in records if _is_polish(record)]
+        print_json(data)
     else:
-        unit = loaded.objective.unit
-        rows = [
-            (
-                r.algorithm,
-                str(r.run),
-                str(r.seed),
-                quantity(r.verdict.objective, unit),
-                f"{r.verdict.violation:.3g}",
-                r.status,
-            )
-            for r in records
-        ]
-        header = ("solver", "run", "seed", loaded.objective.name, "violation", "why it ended")
-        print_table(f"{problem}, {algorithm}", header, rows)
-        for comparison in compare_problems(records):
-            print_table("All runs", HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
+        print_rows(
+            f"{problem.name}, {algorithm}",
+            records,
+            {
+                "solver": lambda r: r.algorithm,
+                "run": lambda r: str(r.run),
+                "seed": lambda r: str(r.seed),
+                loaded.objective.name: lambda r: with_unit(r.verdict.objective, loaded.objective.unit),
+                "violation": lambda r: f"{r.verdict.violation:.3g}",
+                "why it ended": lambda r: r.status,
+            },
+        )
+        print_summaries(records, "All runs")
         stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
     if stopped:
         kept = "printed, but kept nowhere: name a folder with --out" if out is None else f"kept in {out}"

@@ -7,17 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compare.cli.common import (
-    AsJson,
-    ResultFile,
-    command,
-    end_interrupted,
-    fail,
-    output_file,
-    print_json,
-    print_table,
-    stdout,
-)
+from compare.analysis.units import millimetres, with_unit
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, fail, output_file, print_json, print_rows, print_table, stdout
+from compare.cli.options import AsJson, ResultFile
 from nlp_gait.simulation.mjcf import FRICTION
 
 if TYPE_CHECKING:
@@ -30,7 +23,7 @@ if TYPE_CHECKING:
 def simulate(
     result: ResultFile,
     steps: Annotated[
-        int | None, typer.Option(help="Play so many steps of a nao-cycle, every second one mirrored.")
+        int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
     ] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
@@ -111,11 +104,16 @@ def simulate(
 def _print(report: Measurements, survival: Robustness | None) -> None:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
     stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
-    rows = [
-        (label, f"{p.mechanical_W:.3f}", f"{p.heat_W:.3f}", f"{p.total_W:.3f}")
-        for label, p in (("model", report.predicted), ("engine", report.measured))
-    ]
-    print_table("Mean power [W]", ("", "mechanical", "heat", "total"), rows)
+    print_rows(
+        "Mean power [W]",
+        {"model": report.predicted, "engine": report.measured}.items(),
+        {
+            "": lambda row: row[0],
+            "mechanical": lambda row: f"{row[1].mechanical_W:.3f}",
+            "heat": lambda row: f"{row[1].heat_W:.3f}",
+            "total": lambda row: f"{row[1].total_W:.3f}",
+        },
+    )
     lengths = {
         "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
         "- largest": report.pressure_max_m,
@@ -124,9 +122,9 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
         "slip of a supporting foot": report.slip_m,
         **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
     }
-    rows_mm = [(name, "-" if value is None else f"{1000 * value:.1f} mm") for name, value in lengths.items()]
+    rows = [(name, millimetres(value)) for name, value in lengths.items()]
     tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
-    print_table("Against the plan", ("", "measured"), [*rows_mm, ("tracking error of the joints", tracking)])
+    print_table("Against the plan", ("", "measured"), [*rows, ("tracking error of the joints", tracking)])
     for joint, share in report.saturated.items():
         stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
     for joint in report.joint_limits:
@@ -144,8 +142,8 @@ def _print_course(walk: Walk) -> None:
     if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
         stdout.print(f"{walk.steps_done} of {walk.steps} steps done before it fell")
         return
-    energy = "-" if walk.energy_J_per_m is None else f"{walk.energy_J_per_m:.1f} J/m"
     stdout.print(
-        f"{walk.steps} steps: walked {1000 * walk.walked_m:.0f} mm of {1000 * walk.planned_m:.0f} mm, "
-        f"{1000 * walk.drift_m:.0f} mm to the left, heading {walk.heading_deg:.1f} degrees to the left; {energy}"
+        f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "
+        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:.1f} degrees to the left; "
+        f"{with_unit(walk.energy_J_per_m, 'J/m', '.1f')}"
     )

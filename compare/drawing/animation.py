@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from compare.drawing.figures import new_figure, style
 from nlp_gait.files import new_file
-from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Skeleton
+from nlp_gait.problem import Array
+from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.simulation.video import Frame
 
 if TYPE_CHECKING:
@@ -96,16 +97,7 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
         axis.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
     else:
         axis.axhline(0.0, color=GROUND, lw=1.0)
-    for sole in skeleton.soles:
-        ring = np.concatenate([sole.corners[k], sole.corners[k, :1]])
-        axis.plot(ring[:, across], ring[:, up], color=COLOURS[sole.side], lw=1.0)
-    for limb in skeleton.limbs:
-        line = limb.points[k]
-        faint = 0.25 if view == "above" else 1.0
-        axis.plot(line[:, across], line[:, up], color=COLOURS[limb.side], marker="o", ms=2.5, alpha=faint)
-    for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
-        if points is not None:
-            axis.plot(points[k, across], points[k, up], color=colour, marker=marker, ms=5, ls="none", zorder=5)
+    _draw_pose(axis, skeleton, k, (across, up), 0.25 if view == "above" else 1.0)
     low, high = skeleton.box()
     ground_low = min(float(low[2]), 0.0 if not skeleton.planar else float(skeleton.ground[:, 1].min()))
     low = np.array([low[0], low[1], ground_low])
@@ -118,6 +110,22 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
     axis.set_ylabel(AXIS_NAMES[up])
 
 
+def _draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opacity: float = 1.0) -> None:
+    """Soles, limbs, centre of mass and ZMP at sample k, in axes of two or three dimensions that show these coordinates."""
+    for sole in skeleton.soles:
+        axis.plot(*outline(sole, k)[:, seen].T, color=COLOURS[sole.side], lw=1.0)
+    for limb in skeleton.limbs:
+        axis.plot(*limb.points[k][:, seen].T, color=COLOURS[limb.side], marker="o", ms=2.5, alpha=opacity)
+    for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
+        if points is not None:
+            axis.plot(*points[k : k + 1, seen].T, color=colour, marker=marker, ms=5, ls="none", zorder=5)
+
+
+def outline(sole: Sole, k: int) -> Array:
+    """Corners of a sole at sample k, the first one again at the end, (N, 3) [m]."""
+    return np.concatenate([sole.corners[k], sole.corners[k, :1]])
+
+
 def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -125,13 +133,7 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     if support is not None:
         corners = np.column_stack([support, np.zeros(len(support))])
         axis.add_collection3d(Poly3DCollection([corners], color=SUPPORT, alpha=0.3, lw=0))
-    for sole in skeleton.soles:
-        axis.plot(*np.concatenate([sole.corners[k], sole.corners[k, :1]]).T, color=COLOURS[sole.side], lw=1.0)
-    for limb in skeleton.limbs:
-        axis.plot(*limb.points[k].T, color=COLOURS[limb.side], marker="o", ms=2.5)
-    for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
-        if points is not None:
-            axis.plot(*points[k : k + 1].T, color=colour, marker=marker, ms=5, ls="none")
+    _draw_pose(axis, skeleton, k, (0, 1, 2))
     low, high = skeleton.box()
     low = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN
     high = high + MARGIN

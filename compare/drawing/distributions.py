@@ -7,36 +7,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.analysis.comparison import Comparison
+from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.distribution import ECDF_TARGETS, ecdf, performance_profile
 from compare.analysis.statistics.run_length import TARGETS
-from compare.drawing.convergence import AXES, SMALLEST_GAP
-from compare.drawing.figures import legend_below, logarithmic, looks, new_figure, style
+from compare.drawing.convergence import cost_figure, shown_percent
+from compare.drawing.figures import Look, legend_below, logarithmic, looks, new_figure, style
+from nlp_gait.problem import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def ecdf_figure(comparison: Comparison) -> Figure:
     """Share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
-    with style():
-        figure = new_figure(7.4, 2.8)
-        names = [solver.name for solver in comparison.solvers]
-        for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
-            ends = [c.total(axis) for s in comparison.solvers for c in s.curves]
-            last = max([*ends, 1e-3])
-            for solver, look in zip(comparison.solvers, looks(names), strict=True):
-                costs = np.array([c.reached(target, axis) for c in solver.curves for target in ECDF_TARGETS])
-                at, share = ecdf(costs)
-                if at.size:
-                    at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
-                axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=solver.name)
-            logarithmic(axes)
-            axes.set_xlabel(AXES[axis])
-            axes.set_ylim(0.0, 1.02)
-        figure.axes[0].set_ylabel("share of runs and targets")
-        legend_below(figure)
-    return figure
+
+    def draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
+        last = max([c.total(axis) for s in comparison.solvers for c in s.curves] + [1e-3])
+        costs = np.array([c.reached(target, axis) for c in solver.curves for target in ECDF_TARGETS])
+        at, share = ecdf(costs)
+        if at.size:
+            at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
+        _draw_share(axes, at, share, solver.name, look)
+
+    return cost_figure(comparison, draw, "share of runs and targets")
 
 
 def final_gap_figure(comparison: Comparison) -> Figure:
@@ -45,12 +39,10 @@ def final_gap_figure(comparison: Comparison) -> Figure:
         figure = new_figure(7.4, 0.8 + 0.28 * len(comparison.solvers))
         axes = figure.subplots()
         names = [solver.name for solver in comparison.solvers]
-        reference = comparison.objective.sign * comparison.reference
-        unit = abs(reference) or 1.0
-        for row, (solver, look) in enumerate(zip(comparison.solvers, looks(names), strict=True)):
-            gaps = np.array([(cost - reference) / unit for cost in solver.costs])
+        for row, (solver, look) in enumerate(zip(comparison.solvers, looks(names).values(), strict=True)):
+            gaps = np.array([comparison.gap(cost) for cost in solver.costs])
             known = np.isfinite(gaps)
-            shown = 100.0 * np.maximum(gaps[known], SMALLEST_GAP)
+            shown = shown_percent(gaps[known])
             axes.plot(
                 shown, np.full(shown.size, row), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8
             )
@@ -81,16 +73,21 @@ def profile_figure(comparisons: Sequence[Comparison]) -> Figure:
         axes = figure.subplots()
         profile = performance_profile(costs)
         last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
-        for (name, (factor, share)), look in zip(profile.items(), looks(list(profile)), strict=True):
-            at, height = np.append(factor, last), np.append(share, share[-1] if share.size else 0.0)
-            axes.step(at, height, where="post", color=look.colour, linestyle=look.line, label=name)
+        for name, look in looks(profile).items():
+            factor, share = profile[name]
+            height = np.append(share, share[-1] if share.size else 0.0)
+            _draw_share(axes, np.append(factor, last), height, name, look)
         logarithmic(axes)
         axes.set_xlim(left=1.0)
-        axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("factor of the cheapest solver's expected evaluations")
         axes.set_ylabel("share of problems and targets")
         legend_below(figure)
     return figure
+
+
+def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look) -> None:
+    axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=name)
+    axes.set_ylim(0.0, 1.02)
 
 
 def expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:

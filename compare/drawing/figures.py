@@ -6,7 +6,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,8 +44,8 @@ class Look:
     marker: str
 
 
-def looks(names: Sequence[str]) -> list[Look]:
-    """A look for each solver, different for all: known ones first have their colour, a colour's second user another line."""
+def looks(names: Collection[str]) -> dict[str, Look]:
+    """By solver, a look of its own: known solvers have their colours; where two share one, their lines differ."""
     used: Counter[str] = Counter()
     found: dict[str, Look] = {}
     for name in sorted(names, key=lambda name: name not in COLOURS):
@@ -55,7 +55,7 @@ def looks(names: Sequence[str]) -> list[Look]:
         kind = used[colour]
         used[colour] += 1
         found[name] = Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)])
-    return [found[name] for name in names]
+    return {name: found[name] for name in names}
 
 
 @contextmanager

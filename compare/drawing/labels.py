@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from compare.analysis.units import heading, with_unit
+from nlp_gait.problem import GaitProblem
+
 
 def axis_label(name: str, unit: str) -> str:
     """Label of an axis, for example ``hip height [m]``."""
-    words = name_in_words(name, unit)
-    return words if unit == "1" else f"{words} [{unit}]"
+    return heading(name_in_words(name, unit), unit)
 
 
 def quantity(name: str, unit: str, value: float) -> str:
     """For example ``hip height = 0.31 m``."""
-    return f"{name_in_words(name, unit)} = {value:g}" + ("" if unit == "1" else f" {unit}")
+    return f"{name_in_words(name, unit)} = {with_unit(value, unit, 'g')}"
 
 
 def name_in_words(name: str, unit: str) -> str:
@@ -20,3 +22,9 @@ def name_in_words(name: str, unit: str) -> str:
         if name.endswith(f".{end}"):
             return f"{end} bound of {name_in_words(name.removesuffix(f'.{end}'), unit)}"
     return name.removesuffix("_" + unit.replace("/", "_").replace("^", "")).replace("_", " ")
+
+
+def units_of(problem: GaitProblem) -> dict[str, str]:
+    """Units of a problem's variables and parameters, by name."""
+    variables = {variable.name: variable.unit for variable in problem.variables}
+    return variables | {parameter.name: parameter.unit for parameter in problem.parameters}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.animation import COLOURS
+from compare.drawing.animation import COLOURS, outline
 from compare.drawing.figures import new_figure, style
 from nlp_gait.problem.skeleton import LEFT, RIGHT, Skeleton
 
@@ -55,7 +55,7 @@ def stick_figure(skeleton: Skeleton, times_s: Sequence[float]) -> Figure:
 def _draw(axes: Axes, skeleton: Skeleton, k: int, across: int) -> None:
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     for sole in skeleton.soles:
-        ring = np.concatenate([sole.corners[k], sole.corners[k, :1]])
+        ring = outline(sole, k)
         axes.plot(ring[:, across], ring[:, 2], color=COLOURS[sole.side], linewidth=1.8)
     for limb in skeleton.limbs:
         line = limb.points[k]

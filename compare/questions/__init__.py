@@ -1,1 +1,1 @@
-"""Questions past the papers, which one differentiable model can answer."""
+"""Questions that go beyond the papers and that one differentiable model can answer."""

@@ -8,6 +8,7 @@ from compare.analysis.published import published_rows
 from compare.analysis.significance import compare_pairs
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
+from compare.analysis.units import heading
 from compare.drawing.convergence import convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, text_table
@@ -21,7 +22,6 @@ def problem_section(comparison: Comparison) -> Section:
     """Tables, figures and lists on one problem."""
     summaries = summarise(comparison)
     objective = comparison.objective
-    unit = "" if objective.unit == "1" else f" [{objective.unit}]"
     stem = file_stem(comparison.problem)
     figures = (
         Figure(
@@ -44,7 +44,7 @@ def problem_section(comparison: Comparison) -> Section:
         _between(comparison),
     )
     return Section(
-        title=f"{comparison.problem}: {objective.name}{unit}, to {objective.sense}",
+        title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
             "Claims are the solvers' own. Everything else is the judge's: the exact functions at the reported point, on the "
             "problem's own samples. Gaps are measured from the best feasible value known here; evaluations are equivalent ones.",

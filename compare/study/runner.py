@@ -7,11 +7,7 @@ from collections.abc import Callable
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.runs.gradient_run import gradient_run
 from compare.study.runs.search_run import search_run
-from compare.study.runs.slsqp_run import slsqp_run
-from compare.study.task import IPOPT, SLSQP, ProblemSpec, Task, check_task, solver_names
-
-__all__ = ["IPOPT", "ProblemSpec", "Run", "Task", "attempt", "check_task", "run_task", "solver_names"]
-
+from compare.study.task import Task
 
 Run = Callable[[Task, RunRecord | None], RunRecord]
 """Does one run of a task, from the run that it polishes if it does; it crosses process borders."""
@@ -25,8 +21,6 @@ def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., 
         start: the run that this one polishes, if it does.
         observe: called with X, f, violation of every generation (search algorithms only).
     """
-    if task.algorithm == SLSQP:
-        return slsqp_run(task)
     return search_run(task, observe) if task.is_search else gradient_run(task, start)
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
-from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, read_text
 
-SCHEMA = 1  # of study files, which need not state it
-LARGEST_FILE = 2**17  # bytes; a study has some hundred
+SCHEMA = 1  # of study files; they may leave it out
+LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
 MOST_RUNS = 100_000
 
 
@@ -59,20 +60,20 @@ class StudySettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what no machine can hold."""
-        for count in (self.runs, self.starts, *(s.runs for s in self.solvers if s.runs is not None)):
-            if not 1 <= count <= MOST_RUNS:
-                raise InputError(f"runs and starts must be from 1 to {MOST_RUNS}, got {count}")
+        """Refuse counts and seeds that no study can have."""
+        solvers = ((f"runs of {solver.label or solver.algorithm}", solver.runs) for solver in self.solvers)
+        for name, count in (("runs", self.runs), ("starts", self.starts), *solvers):
+            if count is not None and not 1 <= count <= MOST_RUNS:
+                raise InputError(f"{name} must be a whole number from 1 to {MOST_RUNS}, got {count}")
+        if self.seed < 0:
+            raise InputError(f"seed must be a whole number of at least 0, got {self.seed}")
 
     def tasks(self) -> tuple[Task, ...]:
-        """Every run of the study."""
-        return tuple(
-            task
-            for problem in self.problems
-            for solver in self.solvers
-            for title in (solver.label or solver.algorithm,)
-            for first in (
-                Task(
+        """Every run of the study: for each problem and solver its runs, then those that polish them."""
+        found: list[Task] = []
+        for problem in self.problems:
+            for solver in self.solvers:
+                task = Task(
                     problem=problem,
                     algorithm=solver.algorithm,
                     settings=solver.settings,
@@ -80,16 +81,14 @@ class StudySettings:
                     stop=self.stop,
                     seed=self.seed,
                     label=solver.label,
-                ),
-            )
-            for single in (
-                (first, replace(first, algorithm=IPOPT, settings={}, label=f"{title}+{IPOPT}", polishes=title))
-                if solver.polish
-                else (first,)
-            )
-            for run in range(self._runs(solver))
-            for task in (replace(single, run=run),)
-        )
+                )
+                runs = range(self._runs(solver))
+                found += [replace(task, run=run) for run in runs]
+                if solver.polish:
+                    title = solver.label or solver.algorithm
+                    polish = replace(task, algorithm=IPOPT, settings={}, label=f"{title}+{IPOPT}", polishes=title)
+                    found += [replace(polish, run=run) for run in runs]
+        return tuple(found)
 
     def to_json(self) -> dict[str, Any]:
         """As ``settings_from`` reads it."""
@@ -134,116 +133,61 @@ def settings_from(raw: Any, source: str) -> StudySettings:
         source: where it comes from, for messages.
 
     Raises:
-        InputError: a value of the wrong kind or that is not allowed.
-        UnknownNameError: a key that does not exist.
+        InputError: a key that does not exist, or a value of the wrong kind or that is not allowed.
+        UnknownNameError: a problem, or a variable to fix, that does not exist.
     """
     try:
         check_plain(raw)
     except ValueError as error:
         raise InputError(f"{source} may hold finite numbers, texts, lists and tables only: {error}") from error
-    read = _Reader(source, "the study", raw)
-    stop = {name: read.take(name, kind, None) for name, kind in STOP_KINDS.items()}
-    handling = _Reader(source, "handling", read.table("handling", {"name": "deb"}))
-    schema = read.take("schema", int, SCHEMA)
-    if schema != SCHEMA:
-        raise InputError(f"{source}: schema must be {SCHEMA}, got {schema}; a newer version of nlp-gait may read it")
-    settings = StudySettings(
-        problems=tuple(_problem(item, source) for item in read.tables("problem")),
-        solvers=tuple(_solver(item, source) for item in read.tables("solver")),
-        runs=read.take("runs", int, 11, at_least=1),
-        starts=read.take("starts", int, 20, at_least=1),
-        seed=read.take("seed", int, 0, at_least=0),
-        handling=Handling(name=handling.take("name", str, "deb"), settings=handling.rest()),
-        stop=Stop(**{name: value for name, value in stop.items() if value is not None}),
+    for name in ("problem", "solver"):
+        if isinstance(raw, Mapping) and not (isinstance(raw.get(name), list) and raw[name]):
+            raise InputError(f"{source} needs at least one [[{name}]]")
+    try:
+        study = decoded(_Study, raw)
+    except ValueError as error:
+        raise InputError(f"{source}: {error}") from error
+    if study.schema != SCHEMA:
+        raise InputError(
+            f"{source}: schema must be {SCHEMA}, got {study.schema}; a newer version of nlp-gait may read it"
+        )
+    handling: dict[str, Any] = (
+        {"name": study.handling} if isinstance(study.handling, str) else {"name": "deb", **study.handling}
     )
-    read.done()
-    return settings
-
-
-STOP_KINDS: Mapping[str, type] = {"evaluations": int, "target": float, "stagnation": int, "time_limit_s": float}
-
-
-def _problem(raw: Any, source: str) -> ProblemSpec:
-    read = _Reader(source, "[[problem]]", raw)
-    name = read.take("name", str)
-    label, options = read.take("label", str, ""), read.table("options", {})
-    values, fixed = read.table("set", {}), read.table("fix", {})
-    read.done()
-    for key, value in options.items():
-        if not isinstance(value, (str, int, float)):
-            raise InputError(f"{source}: [[problem]]: option {key} must be a text or a number, got {value!r}")
-    spec = ProblemSpec(name=name, options=options, label=label, values=values)
-    return replace(spec, values=dict(spec.load().fix(**fixed).values)) if fixed else spec
-
-
-def _solver(raw: Any, source: str) -> SolverSpec:
-    read = _Reader(source, "[[solver]]", raw)
-    spec = SolverSpec(
-        algorithm=read.take("algorithm", str),
-        label=read.take("label", str, ""),
-        runs=read.take("runs", int, None, at_least=1),
-        settings=read.table("settings", {}),
-        polish=read.take("polish", bool, False),
+    return StudySettings(
+        problems=tuple(problem.spec() for problem in study.problem),
+        solvers=study.solver,
+        runs=study.runs,
+        starts=study.starts,
+        seed=study.seed,
+        handling=Handling(name=str(handling.pop("name")), settings=handling),
+        stop=Stop(**{criterion.name: getattr(study, criterion.name) for criterion in fields(Stop)}),
     )
-    read.done()
-    return spec
 
 
-REQUIRED: Any = object()
+@dataclass(frozen=True, kw_only=True)
+class _Problem:
+    """A table ``problem`` of a study."""
+
+    name: str
+    label: str = ""
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
+    set: Mapping[str, Any] = field(default_factory=dict)
+    fix: Mapping[str, Any] = field(default_factory=dict)
+
+    def spec(self) -> ProblemSpec:
+        spec = ProblemSpec(name=self.name, options=self.options, label=self.label, values=self.set)
+        return replace(spec, values=dict(spec.load().fix(**self.fix).values)) if self.fix else spec
 
 
-class _Reader:
-    """Takes values out of a table; what is wrong or left over is an error that names it."""
+@dataclass(frozen=True, kw_only=True)
+class _Study(Stop):
+    """A whole study as files hold it."""
 
-    def __init__(self, source: str, where: str, raw: Any) -> None:
-        self._where = f"{source}: {where}"
-        if not isinstance(raw, Mapping):
-            raise InputError(f"{self._where} must be a table, got {type(raw).__name__}")
-        self._raw = dict(raw)
-        self._known: list[str] = []
-
-    def take(self, name: str, kind: type[Any], default: Any = REQUIRED, at_least: int | None = None) -> Any:
-        """Value of a key; without a default it is needed."""
-        self._known.append(name)
-        if name not in self._raw:
-            if default is REQUIRED:
-                raise InputError(f"{self._where} needs {name!r}")
-            return default
-        value: Any = self._raw.pop(name)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if (
-            not isinstance(value, kind)
-            or isinstance(value, bool) != (kind is bool)
-            or (at_least is not None and value < at_least)
-        ):
-            limit = "" if at_least is None else f" of at least {at_least}"
-            raise InputError(f"{self._where}: {name} must be {kind_name(kind)}{limit}, got {value!r}")
-        return value
-
-    def table(self, name: str, default: Mapping[str, Any]) -> dict[str, Any]:
-        """Sub-table; a text stands for a table with that name alone."""
-        self._known.append(name)
-        value = self._raw.pop(name, default)
-        if isinstance(value, str) and "name" in default:
-            return {"name": value}
-        if not isinstance(value, Mapping):
-            raise InputError(f"{self._where}: {name} must be a table, got {value!r}")
-        return dict(value)
-
-    def tables(self, name: str) -> Sequence[Any]:
-        """List of sub-tables, at least one."""
-        self._known.append(name)
-        value = self._raw.pop(name, [])
-        if not isinstance(value, list) or not value:
-            raise InputError(f"{self._where} needs at least one [[{name}]]")
-        return value
-
-    def rest(self) -> dict[str, Any]:
-        """What has not been taken."""
-        return self._raw
-
-    def done(self) -> None:
-        """Raise if anything is left."""
-        for name in self._raw:
-            raise unknown(f"key of {self._where}", name, self._known)
+    problem: tuple[_Problem, ...]
+    solver: tuple[SolverSpec, ...]
+    runs: int = 11
+    starts: int = 20
+    seed: int = 0
+    handling: str | Mapping[str, Any] = "deb"
+    schema: int = SCHEMA

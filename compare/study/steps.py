@@ -14,7 +14,7 @@ from typing import Any
 from compare.study.progress import Progress
 from compare.study.workers import default_jobs
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.interrupts import deaf_children
+from nlp_gait.backends.interrupts import children_ignore_interrupts
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
 from nlp_gait.problem import GaitProblem
@@ -112,7 +112,7 @@ def _computed(steps: Sequence[tuple[int, Step]], workers: int, progress: Progres
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-    with deaf_children():
+    with children_ignore_interrupts():
         results = parallel(delayed(_numbered)(number, step) for number, step in steps)
     names = dict(steps)
     for number, result in results:

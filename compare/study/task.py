@@ -12,15 +12,14 @@ from typing import Any
 import metaheuristics
 import nlp_gait
 from metaheuristics.interface import Algorithm
-from nlp_gait.backends.solvers import nlpsol
-from nlp_gait.decoding import decoded
+from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.registry import check_options
 
 IPOPT = "ipopt"
-SLSQP = "slsqp"
-GRADIENT_SOLVERS = (IPOPT, SLSQP, *nlpsol.OPTIONS)
+GRADIENT_SOLVERS = tuple(SOLVERS)
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+:-]{0,63}")
 
 
@@ -146,7 +145,7 @@ class Task:
         }
         if self.is_search:
             parts |= {"handling": asdict(self.handling), "stop": asdict(self.stop)}
-        elif self.algorithm == SLSQP:
+        elif "evaluations" in setting_names(str(self.algorithm)):
             parts["stop"] = asdict(self.stop)
         elif self.stop.time_limit_s is not None:
             parts["stop"] = {"time_limit_s": self.stop.time_limit_s}
@@ -165,6 +164,20 @@ class Task:
             return metaheuristics.algorithm(self.algorithm, **self.settings)
         return self.algorithm
 
+    def solver(self) -> Solver:
+        """NLP solver with its settings and the limits that it heeds.
+
+        Raises:
+            InputError: a time limit that it cannot heed, or a setting that is not allowed.
+        """
+        name = str(self.algorithm)
+        known = setting_names(name)
+        if self.stop.time_limit_s is not None and "time_limit_s" not in known:
+            raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
+        limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
+        heeded = {limit: value for limit, value in limits.items() if limit in known and value is not None}
+        return solver(name, **{**heeded, **self.settings})
+
 
 def check_task(task: Task) -> None:
     """Raise now what would fail later: unknown problem, option, parameter, algorithm or setting; a bad label or limit."""
@@ -176,47 +189,26 @@ def check_task(task: Task) -> None:
             )
     if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
         raise unknown("algorithm", task.algorithm, solver_names())
-    if task.algorithm == IPOPT:
-        _checked_names(task.settings, nlp_gait.IpoptSettings, IPOPT)
-        try:
-            decoded(nlp_gait.IpoptSettings, task.settings)
-        except ValueError as error:
-            raise InputError(f"setting of {IPOPT}: {error}") from error
-    elif task.algorithm in nlpsol.OPTIONS:
-        _checked_names(task.settings, None, str(task.algorithm))
-        nlpsol.check_time_limit(str(task.algorithm), task.stop.time_limit_s)
-        reason = nlpsol.probe(str(task.algorithm))
-        if reason is not None:
-            raise InputError(f"NLP solver {task.algorithm!r} does not run in this installation: {reason}")
-    elif task.algorithm == SLSQP:
-        _checked_names(task.settings, None, SLSQP)
-        if task.stop.evaluations <= len(problem.names):
-            raise InputError(f"slsqp needs at least {len(problem.names) + 1} evaluations for one gradient")
+    if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
+        raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
+    if not task.is_search:
+        task.solver().check(problem)
     else:
         metaheuristics.handling(task.handling.name, **task.handling.settings)
         metaheuristics.check_limits(
             task.search(), task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s
         )
     if task.start:
-        if task.is_search or task.algorithm == SLSQP:
+        if task.is_search:
             raise InputError(f"{task.title!r} takes no start point; NLP solvers do")
         problem.check_x(task.start)
-    if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
-        raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
+
+
+def plain_problem(problem: GaitProblem) -> dict[str, Any]:
+    """Name, options and changed parameter values of a problem, as plain data from which ``load_result`` makes it again."""
+    return {"problem": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)}
 
 
 def plain_settings(settings: Any) -> dict[str, Any]:
     """Settings with their class name, as plain data."""
     return {"kind": type(settings).__name__, **asdict(settings)}
-
-
-def _checked_names(settings: Mapping[str, Any], known: Any, solver: str) -> Mapping[str, Any]:
-    names = tuple(known.__dataclass_fields__) if known is not None else ()
-    for name in settings:
-        if name not in names:
-            raise (
-                unknown(f"setting of {solver}", name, names)
-                if names
-                else InputError(f"{solver} has no settings, got {name!r}")
-            )
-    return settings

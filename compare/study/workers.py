@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, ExitStack
 from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
-from nlp_gait.backends.interrupts import deaf_children, remembered_interrupts
+from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
@@ -73,7 +73,7 @@ def _parallel(jobs: list[tuple[int, Job]], workers: int | None, run: Run) -> Ite
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers if workers is not None else -1, return_as="generator_unordered", batch_size=1)
-    with deaf_children():
+    with children_ignore_interrupts():
         results = parallel(delayed(_numbered)(position, job, run) for position, job in jobs)
     yield from results
 

@@ -13,7 +13,7 @@ from types import FrameType
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C, with what was found until then.
 
-    It propagates as any KeyboardInterrupt does; who wants the partial result catches it and reads ``partial``.
+    It propagates as any KeyboardInterrupt does; a caller that wants the partial result catches it and reads ``partial``.
 
     Attributes:
         sentence: how far it came.
@@ -30,13 +30,13 @@ class Interrupted(KeyboardInterrupt):
 
 
 def never() -> bool:
-    """Nobody has asked to stop."""
+    """Nobody asks to stop."""
     return False
 
 
 @contextmanager
 def deferred_interrupts() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C raises nothing inside, and the function yielded tells of it; who presses again is not kept waiting."""
+    """Ctrl-C raises nothing inside, but the function yielded says that it was pressed; pressed again, it raises at once."""
     presses = 0
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -51,7 +51,7 @@ def deferred_interrupts() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def remembered_interrupts() -> Iterator[Callable[[], None]]:
-    """Ctrl-C is raised as ever, and once more by the function yielded if something inside swallowed it."""
+    """Ctrl-C is raised as usual, and once more by the function yielded, in case something inside swallowed it."""
     pressed = False
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -68,12 +68,12 @@ def remembered_interrupts() -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def deaf_children() -> Iterator[None]:
-    """Processes and threads begun inside never get Ctrl-C, which a terminal sends to all: their parent ends them."""
+def children_ignore_interrupts() -> Iterator[None]:
+    """Processes and threads started inside never get Ctrl-C, which a terminal sends to all: their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # begun inside, with the first worker, it would let Ctrl-C through again
+    resource_tracker.ensure_running()  # started inside, with the first worker, it would let Ctrl-C through again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -83,7 +83,7 @@ def deaf_children() -> Iterator[None]:
 
 @contextmanager
 def _handler(note: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Another handler of Ctrl-C inside, where there can be one and Ctrl-C is not ignored, as it is under nohup."""
+    """Another handler of Ctrl-C inside: in the main thread only, and not where Ctrl-C is ignored, as under nohup."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before in (signal.SIG_IGN, None):
         yield

@@ -20,6 +20,8 @@ from nlp_gait.errors import LiftedSenseError
 from nlp_gait.problem import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
+# Sigmoid widths of the stages in which a jump is approached, in units of the switch (metres for a balance margin).
+WIDTHS = (1e-2, 5e-4)
 # A derivative below this is zero for the check of the lifting's sense.
 SENSE_TOLERANCE = 1e-12
 # Points at which that check is made: fixed fractions of the default ranges, away from the bounds.
@@ -34,7 +36,6 @@ class NlpModel:
         nlp: CasADi's dictionary: x = (z, s), p = (problem parameters, sigmoid width), f, g.
         variables: n, the number of problem variables.
         row_names: names of the problem's rows, the first rows of g.
-        row_units: their units.
         offset: (n,) x at z = 0.
         scale: (n,) range of x.
         row_bounds: function p -> (lower, upper) of the problem's rows.
@@ -48,7 +49,6 @@ class NlpModel:
     nlp: dict[str, MX]
     variables: int
     row_names: tuple[str, ...]
-    row_units: tuple[str, ...]
     offset: Array
     scale: Array
     row_bounds: ca.Function
@@ -57,6 +57,20 @@ class NlpModel:
     tie_upper: Array
     smoothed: bool
     build_s: float
+
+    @property
+    def widths(self) -> tuple[float, ...]:
+        """Sigmoid widths of a solver's stages, each of which starts from the last one; without a jump one stage is enough."""
+        return WIDTHS if self.smoothed else WIDTHS[-1:]
+
+    def start(self, problem: GaitProblem, x: Array, width: float) -> Array:
+        """(z, s) of a point x (n,), with s at the exact values for a sigmoid width."""
+        z = (x - self.offset) / self.scale
+        return np.concatenate([z, np.array(self.lift_start(z, problem.p, width)).ravel()])
+
+    def point(self, w: Array) -> Array:
+        """Decision variables (n,) of (z, s)."""
+        return np.asarray(self.offset + self.scale * w[: self.variables])
 
     def bounds(self, problem: GaitProblem) -> dict[str, Array]:
         """Bounds of (z, s) and of g for a problem's parameter values, as CasADi's solvers take them."""
@@ -103,7 +117,6 @@ def _build(problem: GaitProblem) -> NlpModel:
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
         row_names=row_names,
-        row_units=tuple(c.unit for c in assembly.constraints for _ in range(c.value.shape[0])),
         offset=offset,
         scale=problem.scale,
         row_bounds=bounds,

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlp_gait.backends.exact import row_violations
+from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
-from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Solution, SolveTime, StartOutcome
+from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 
-# A bound whose price, times the bound's scale, is below this is numerical dust and not reported.
+# A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
 
 
@@ -26,8 +26,8 @@ def solve(
     seed: int = 0,
     x0: Sequence[float] | Array | None = None,
     fix: Mapping[str, float] | None = None,
-    settings: IpoptSettings | None = None,
-    progress: Callable[[StartOutcome], None] | None = None,
+    solver: Solver | None = None,
+    progress: Callable[[Outcome], None] | None = None,
 ) -> Solution:
     """Best local optimum from several starts.
 
@@ -37,7 +37,7 @@ def solve(
         seed: of the start points.
         x0: first start point (n,); the remaining ``starts - 1`` are random.
         fix: variables held at a value.
-        settings: of IPOPT.
+        solver: with its settings; None for IPOPT with its defaults.
         progress: called after each start.
 
     Returns:
@@ -45,28 +45,25 @@ def solve(
         if there is none, the least infeasible one with the rows that stand in the way.
 
     Raises:
-        InputError: no start, x0 or a fixed value that is not allowed, or a linear solver that does not run here.
+        InputError: no start, x0 or a fixed value that is not allowed, or a solver that does not run here.
         Interrupted: Ctrl-C; carries the solution from the starts until then, the one in progress where it was.
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
     problem = problem.fix(**(fix or {}))
-    settings = settings or IpoptSettings()
     points = _start_points(problem, starts, seed, x0)
-    ipopt = ipopt_for(problem, settings, starts)
-    ends: list[End] = []
-    outcomes: list[StartOutcome] = []
+    ready = (solver or IpoptSettings()).ready_for(problem, starts)
+    outcomes: list[Outcome] = []
     with deferred_interrupts() as interrupted:
-        for index, point in enumerate(points):
-            ends.append(ipopt.run(problem, point, interrupted))
-            outcomes.append(outcome_of(index, problem, point, ends[-1]))
+        for point in points:
+            outcomes.append(ready.run(problem, point, interrupted))
             if progress is not None:
                 progress(outcomes[-1])
             if interrupted():
                 break
-    solution = solution_of(problem, ipopt, ends, outcomes, seed)
+    solution = solution_of(problem, outcomes, seed)
     if interrupted():
-        sentence = f"interrupted in start {len(ends)} of {starts}"
+        sentence = f"interrupted in start {len(outcomes)} of {starts}"
         raise Interrupted(sentence, replace(solution, status=f"{sentence}; {solution.status}"))
     return solution
 
@@ -79,27 +76,12 @@ def _start_points(problem: GaitProblem, starts: int, seed: int, x0: Sequence[flo
     return points
 
 
-def outcome_of(index: int, problem: GaitProblem, x0: Array, end: End) -> StartOutcome:
-    """Plain account of one start."""
-    return StartOutcome(
-        index=index,
-        success=end.success,
-        status=end.status,
-        objective=problem.objective.sign * end.cost,
-        violation=end.violation,
-        iterations=end.iterations,
-        time_s=end.time_s,
-        x0=problem.by_name(x0),
-        x=problem.by_name(end.x),
-    )
-
-
-def solution_of(
-    problem: GaitProblem, ipopt: Ipopt, ends: Sequence[End], outcomes: Sequence[StartOutcome], seed: int
-) -> Solution:
-    """Solution from the ends of all starts: the cheapest that succeeded, else that is feasible, else the least infeasible."""
-    best = min(ends, key=lambda end: end.rank)
-    violations = row_violations(problem, best.x)
+def solution_of(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:
+    """Solution from all starts: the cheapest that succeeded, else the cheapest feasible, else the least infeasible one."""
+    best = min(outcomes, key=lambda outcome: outcome.rank)
+    exact = exact_model(problem)
+    values = exact.at(best.x, problem.p)
+    violations = violated_rows(exact.rows(values))
     status = best.status
     if not best.success:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
@@ -114,52 +96,48 @@ def solution_of(
         parameters=dict(problem.values),
         success=best.success,
         status=status,
-        objective=problem.objective.sign * best.cost,
+        objective=best.objective,
         objective_name=problem.objective.name,
         objective_unit=problem.objective.unit,
         x=problem.by_name(best.x),
         violation=best.violation,
-        worst_violations=tuple(violations[:10]),
+        worst_violations=violations[:10],
         iterations=best.iterations,
-        evaluations=sum((end.evaluations for end in ends), Evaluations()),
-        time_s=SolveTime(build=ipopt.model.build_s, compile=ipopt.create_s, solve=sum(end.time_s for end in ends)),
-        solver="ipopt",
-        linear_solver=ipopt.linear_solver,
-        functions="compiled" if ipopt.compiled else "interpreted",
-        active_constraints=_active(problem, ipopt, best) if best.success else (),
+        evaluations=sum((outcome.evaluations for outcome in outcomes), Evaluations()),
+        time_s=SolveTime(build=best.build_s, compile=best.compile_s, solve=sum(outcome.time_s for outcome in outcomes)),
+        solver=best.solver,
+        linear_solver=best.linear_solver,
+        functions=best.functions,
+        active_constraints=_active(problem, values, best.guess) if best.success and best.guess is not None else (),
         starts=tuple(outcomes),
         seed=seed,
     )
 
 
-def _active(problem: GaitProblem, ipopt: Ipopt, end: End) -> tuple[ActiveConstraint, ...]:
+def _active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[ActiveConstraint, ...]:
     """Bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
 
     Equations of the problem always hold and are left out; a variable that is fixed has a price.
     """
-    model = ipopt.model
-    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    names = (*model.row_names, *(f"bounds[{name}]" for name in problem.names))
-    units = (*model.row_units, *(variable.unit for variable in problem.variables))
-    lowers, uppers = np.concatenate([lower, problem.lower]), np.concatenate([upper, problem.upper])
-    slopes = -np.concatenate([end.row_multipliers, end.bound_multipliers / model.scale])
-    weights = np.abs(slopes) * np.concatenate([np.ones(len(lower)), model.scale])
-    unit = problem.objective.unit
+    exact, unit = exact_model(problem), problem.objective.unit
+    rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
+    slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
+    weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])
     found = []
     for i in np.argsort(-weights, kind="stable"):
         if weights[i] < PRICE_TOLERANCE:
             break
-        if i < len(lower) and lower[i] == upper[i]:
+        if i < rows and values.lower[i] == values.upper[i]:
             continue
         at_upper = slopes[i] < 0  # a higher upper bound lowers the cost, a higher lower bound raises it
         found.append(
             ActiveConstraint(
-                name=names[i],
+                name=exact.row_names[i],
                 side="upper" if at_upper else "lower",
-                bound=float(uppers[i] if at_upper else lowers[i]),
-                unit=units[i],
+                bound=float(values.upper[i] if at_upper else values.lower[i]),
+                unit=exact.row_units[i],
                 price=float(problem.objective.sign * slopes[i]),
-                price_unit=f"{unit} per {units[i]}" if unit != "1" else f"per {units[i]}",
+                price_unit=f"{'' if unit == '1' else f'{unit} '}per {exact.row_units[i]}",
             )
         )
     return tuple(found)

@@ -1,9 +1,15 @@
-"""What a solver hands back: plain numbers and names, no solver objects."""
+"""What a solver hands back: numbers and names, no solver objects."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+from nlp_gait.problem.signals import Array
+
+# A total violation below this counts as feasible (each row in units of its scale).
+FEASIBILITY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,43 +33,16 @@ class ActiveConstraint:
     price_unit: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class RowViolation:
-    """A violated row at the point that is reported."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstraintValue:
+    """One constraint row at a point; a missing bound is None."""
 
     name: str
     value: float
-    lower: float
-    upper: float
+    lower: float | None
+    upper: float | None
     violation: float
     unit: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class StartOutcome:
-    """How one start ended.
-
-    Attributes:
-        index: number of the start.
-        success: converged, and feasible for the exact functions.
-        status: in words.
-        objective: exact value at the end point, in the problem's sense.
-        violation: exact total violation there.
-        iterations: over all stages.
-        time_s: wall time of the solver.
-        x0: start point by variable name.
-        x: end point by variable name.
-    """
-
-    index: int
-    success: bool
-    status: str
-    objective: float
-    violation: float
-    iterations: int
-    time_s: float
-    x0: dict[str, float]
-    x: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +59,10 @@ class Evaluations:
         """Sum by kind."""
         return Evaluations(**{kind: getattr(self, kind) + getattr(other, kind) for kind in asdict(self)})
 
+    def by_kind(self) -> dict[str, int]:
+        """Counts by kind; of f alone for a solver that calls nothing else."""
+        return {"f": self.f} if self == Evaluations(f=self.f) else asdict(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class SolveTime:
@@ -88,6 +71,93 @@ class SolveTime:
     build: float
     compile: float
     solve: float
+
+
+class Best(NamedTuple):
+    """Best point after a number of calls: its objective, None if nothing was feasible until then, and the time [s]."""
+
+    calls: int
+    objective: float | None
+    time_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Guess:
+    """Primal and dual point of the lifted NLP, from which a neighbouring problem can be started warm.
+
+    Attributes:
+        primal: scaled variables, then the lifted ones.
+        bounds: multipliers of their bounds, positive at an upper bound.
+        rows: multipliers of all rows, the problem's first.
+        width: sigmoid width at which they were found.
+    """
+
+    primal: Array
+    bounds: Array
+    rows: Array
+    width: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """One run of an NLP solver from one start point.
+
+    Attributes:
+        solver: its name.
+        x0: (n,) start point.
+        x: (n,) end point, within the bounds.
+        claimed: the solver claims success.
+        status: how it ended, in words.
+        objective: exact value at x, in the problem's sense.
+        cost: the same as it is minimised: negated if the problem maximises it.
+        violation: exact total violation at x.
+        iterations: over all stages, where the solver counts them.
+        evaluations: over all stages.
+        build_s: time to build the symbolic NLP, whenever that was [s].
+        compile_s: time to make the solver, with derivatives and their compilation, whenever that was [s].
+        time_s: wall time of the run itself [s].
+        functions: ``"compiled"`` or ``"interpreted"``.
+        linear_solver: that was really used, where the solver says it.
+        guess: warm start with multipliers, where the solver has one.
+        history: best so far, where the solver keeps it.
+        objective_s: part of the time in the exact functions, NaN where it is not known [s].
+    """
+
+    solver: str
+    x0: Array
+    x: Array
+    claimed: bool
+    status: str
+    objective: float
+    cost: float
+    violation: float
+    iterations: int
+    evaluations: Evaluations
+    build_s: float
+    compile_s: float
+    time_s: float
+    functions: str = "interpreted"
+    linear_solver: str = ""
+    guess: Guess | None = None
+    history: tuple[Best, ...] = ()
+    objective_s: float = math.nan
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the exact functions find it feasible, with a finite cost."""
+        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
+
+    @property
+    def success(self) -> bool:
+        """Success is claimed, and the exact functions find it feasible."""
+        return self.claimed and self.feasible
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
+        if self.feasible:
+            return (0.0 if self.success else 1.0), self.cost
+        return 2.0, math.inf if math.isnan(self.violation) else self.violation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,9 +177,10 @@ class Solution:
         iterations: of the start that is reported.
         evaluations: over all starts.
         time_s: over all starts.
-        solver: for example ``"ipopt"``, with the linear solver that it really used.
+        solver: for example ``"ipopt"``.
+        linear_solver: that it really used; empty if it does not say.
         functions: ``"compiled"`` or ``"interpreted"``.
-        active_constraints: bounds with a price, dearest first.
+        active_constraints: bounds with a price, highest first.
         starts: outcome of every start.
         seed: of the start points.
     """
@@ -124,7 +195,7 @@ class Solution:
     objective_unit: str
     x: dict[str, float]
     violation: float
-    worst_violations: tuple[RowViolation, ...]
+    worst_violations: tuple[ConstraintValue, ...]
     iterations: int
     evaluations: Evaluations
     time_s: SolveTime
@@ -132,9 +203,23 @@ class Solution:
     linear_solver: str
     functions: str
     active_constraints: tuple[ActiveConstraint, ...]
-    starts: tuple[StartOutcome, ...]
+    starts: tuple[Outcome, ...]
     seed: int
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with the schema version of results."""
-        return {"schema": 1, **asdict(self)}
+        starts = [
+            {
+                "index": index,
+                "success": start.success,
+                "status": start.status,
+                "objective": start.objective,
+                "violation": start.violation,
+                "iterations": start.iterations,
+                "time_s": start.time_s,
+                "x0": dict(zip(self.x, start.x0.tolist(), strict=True)),
+                "x": dict(zip(self.x, start.x.tolist(), strict=True)),
+            }
+            for index, start in enumerate(self.starts)
+        ]
+        return {"schema": 1, **asdict(replace(self, starts=())), "starts": starts}

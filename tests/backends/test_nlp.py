@@ -8,10 +8,10 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem import Array, Constraint, load
+from nlp_gait.problem import Constraint, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, corner, row, toy
 
@@ -23,10 +23,6 @@ DIFFERENCE_STEP, DIFFERENCE_TOLERANCE = 1e-6, 1e-5
 ROUNDING = 1e-9
 
 
-def start_of(model: NlpModel, z: Array, p: Array, width: float = WIDTH) -> Array:
-    return np.concatenate([z, np.array(model.lift_start(z, p, width)).ravel()])
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
     """Along random directions, at a start point whose knees are bent."""
@@ -36,8 +32,7 @@ def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
     values = ca.Function("values", [x, model.nlp["p"]], [f, g])
     slopes = ca.Function("slopes", [x, model.nlp["p"]], [ca.gradient(f, x), ca.jacobian(g, x)])
     rng = np.random.default_rng(0)
-    z = np.full(model.variables, 0.45)
-    w, p = start_of(model, z, problem.p), np.append(problem.p, WIDTH)
+    w, p = model.start(problem, model.offset + 0.45 * model.scale, WIDTH), np.append(problem.p, WIDTH)
     gradient, jacobian = (np.array(ca.DM(part)) for part in slopes(w, p))
     for _ in range(5):
         direction = rng.normal(size=w.size)
@@ -58,19 +53,19 @@ def test_with_lifted_variables_at_their_exact_values_the_nlp_is_the_exact_proble
     x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: model.variables]
     if name == "nao-dsp":
         x[-1] = 1.0
-    w = start_of(model, (x - model.offset) / model.scale, problem.p)
+    w = model.start(problem, x, WIDTH)
     values = ca.Function("values", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"], model.nlp["g"]])
     f, g = (np.array(value).ravel() for value in values(w, np.append(problem.p, WIDTH)))
-    cost, _, rows, *_ = (np.array(value).ravel() for value in exact.function(x, problem.p))
-    assert f[0] == pytest.approx(cost[0], rel=ROUNDING)
+    values_at = exact.at(x, problem.p)
+    assert f[0] == pytest.approx(values_at.cost, rel=ROUNDING)
     smoothed = np.array([name.startswith("dbm_x") for name in model.row_names]) & model.smoothed
     count = len(model.row_names)
-    np.testing.assert_allclose(g[:count][~smoothed], rows[:count][~smoothed], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(g[:count][~smoothed], values_at.g[:count][~smoothed], rtol=0, atol=ROUNDING)
     assert g[count:].min() == pytest.approx(0.0, abs=ROUNDING)  # the rows of the lifts hold, some tightly
     assert exact.row_names[:count] == model.row_names
     lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    np.testing.assert_array_equal(lower, np.array(exact.function(x, problem.p)[3]).ravel()[:count])
-    np.testing.assert_array_equal(upper, np.array(exact.function(x, problem.p)[4]).ravel()[:count])
+    np.testing.assert_array_equal(lower, values_at.lower[:count])
+    np.testing.assert_array_equal(upper, values_at.upper[:count])
 
 
 GOOD: dict[str, Mathematics] = {
@@ -99,8 +94,8 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
     exact = np.array([start.objective for start in solution.starts if start.success])
     grid = np.array(np.meshgrid(np.linspace(-2, 2, 81), np.linspace(-1, 3, 81))).reshape(2, -1).T
     problem = toy(mathematics)
-    function = exact_model(problem).function
-    searched = [float(f) for f, v in ((function(x, problem.p)[:2]) for x in grid) if float(v) <= ROUNDING]
+    at = [exact_model(problem).at(x, problem.p) for x in grid]
+    searched = [values.cost for values in at if values.violation <= ROUNDING]
     assert exact.min() == pytest.approx(min(searched), abs=1e-6)  # every optimum here lies on the grid
 
 

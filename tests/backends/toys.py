@@ -7,7 +7,9 @@ from typing import Literal
 
 from casadi import MX
 
-from nlp_gait.problem import Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
+from nlp_gait.backends.exact import exact_model, violated_rows
+from nlp_gait.problem import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
+from nlp_gait.problem.solution import ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # From the two variables, the parameter "limit" and an interpretation, to the objective and the constraints.
@@ -37,6 +39,12 @@ def toy(
         objective=Objective(name="cost", unit="J", sense=sense),
         assemble=assemble,
     )
+
+
+def row_violations(problem: GaitProblem, x: Array) -> tuple[ConstraintValue, ...]:
+    """Rows that the exact functions find violated at x, worst first."""
+    exact = exact_model(problem)
+    return violated_rows(exact.rows(exact.at(x, problem.p)))
 
 
 def row(value: MX, lower: MX | None = None, upper: MX | None = None) -> Constraint:

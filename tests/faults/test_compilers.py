@@ -61,7 +61,7 @@ def test_the_objective_is_interpreted_and_that_is_said(
     assert "interpreted, many times slower" in caplog.messages[0] and words in caplog.messages[0]
     X = np.array([[1.0, 1.0], [2.0, 0.25], [-2.5, 1.0]])
     f, violation = objective(X)
-    expected = [[float(v) for v in exact_model(problem).function(x, problem.p)[:2]] for x in X]
+    expected = [exact_model(problem).at(x, problem.p)[:2] for x in X]
     assert np.column_stack([f, violation]).tolist() == pytest.approx(np.array(expected))
     with pytest.raises(CompilerError):
         nlp_gait.compile_objective(toy(corner), require_compiler=True)
@@ -73,9 +73,9 @@ def test_ipopt_goes_on_with_interpreted_functions_and_that_is_said(
 ) -> None:
     monkeypatch.setenv("CXX", fake_compiler(tmp_path, FAULTS[fault][0]))
     monkeypatch.setattr(compiler_module, "TIME_LIMIT_S", 0.5)
-    monkeypatch.setattr(ipopt, "WORTHWHILE_STARTS", 2)
+    monkeypatch.setattr(ipopt, "WORTHWHILE_SOLVES", 2)
     solution = nlp_gait.solve(toy(corner), starts=2)
     assert solution.success and solution.functions == "interpreted"
     assert len(caplog.messages) == 1 and "IPOPT's functions are interpreted: " in caplog.messages[0]
     with pytest.raises(CompilerError):
-        nlp_gait.solve(toy(corner), settings=IpoptSettings(compiled=True))
+        nlp_gait.solve(toy(corner), solver=IpoptSettings(compiled=True))

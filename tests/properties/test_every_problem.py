@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
-from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.backends.solvers.ipopt import WIDTHS, IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.exact import ExactValues, exact_model
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.registry import PROBLEMS
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Outcome
 
 # Left out of all but the first test, with the reason.
 TRANSCRIBED = {
@@ -50,9 +50,8 @@ def problem_of(name: str, kind: str | None = None) -> GaitProblem:
     return load(name) if kind is None else load(name, derivatives=kind)
 
 
-def evaluated(problem: GaitProblem, x: Array) -> tuple[Array, ...]:
-    """cost, violation, g, lower, upper and indexes."""
-    return tuple(np.array(value).ravel() for value in exact_model(problem).function(x, problem.p))
+def evaluated(problem: GaitProblem, x: Array) -> ExactValues:
+    return exact_model(problem).at(x, problem.p)
 
 
 def test_what_is_left_out_is_left_out_for_its_reason() -> None:
@@ -70,9 +69,8 @@ far = (
 def test_every_output_is_finite_for_every_finite_x(name: str, kind: str | None, data: st.DataObject) -> None:
     problem = problem_of(name, kind)
     x = np.array(data.draw(st.lists(far, min_size=len(problem.names), max_size=len(problem.names))))
-    cost, violation, g, _, _, indexes = evaluated(problem, x)
-    for output in (cost, violation, g, indexes):
-        assert np.isfinite(output).all()
+    at = evaluated(problem, x)
+    assert np.isfinite([at.cost, at.violation, *at.g, *at.indexes.values()]).all()
 
 
 @of_every_variant
@@ -89,8 +87,8 @@ def test_a_violation_is_zero_if_and_only_if_every_row_holds(
     for candidate in (problem, relaxed(problem)):
         _, violation, g, lower, upper, _ = evaluated(candidate, x)
         excess = np.maximum(np.maximum(lower - g, g - upper), 0.0)
-        assert (violation[0] == 0.0) == bool(((lower <= g) & (g <= upper)).all())
-        assert violation[0] == pytest.approx(float(excess @ (1 / exact_model(problem).row_scales)), rel=ROUNDING)
+        assert (violation == 0.0) == bool(((lower <= g) & (g <= upper)).all())
+        assert violation == pytest.approx(float(excess @ (1 / exact_model(problem).row_scales)), rel=ROUNDING)
 
 
 def relaxed(problem: GaitProblem) -> GaitProblem:
@@ -108,22 +106,22 @@ def relaxed(problem: GaitProblem) -> GaitProblem:
 def test_the_test_above_sees_feasible_and_infeasible_candidates(name: str) -> None:
     problem, rng = problem_of(name), np.random.default_rng(0)
     points = [rng.uniform(problem.lower, problem.upper) for _ in range(200)]
-    feasible = [evaluated(candidate, x)[1][0] == 0.0 for candidate in (problem, relaxed(problem)) for x in points]
+    feasible = [evaluated(candidate, x).violation == 0.0 for candidate in (problem, relaxed(problem)) for x in points]
     assert {True, False} == set(feasible)
 
 
 @cache
-def solved(name: str) -> tuple[GaitProblem, End]:
+def solved(name: str) -> tuple[GaitProblem, Outcome]:
     """The best of two starts."""
     problem = problem_of(name)
-    ipopt, rng = ipopt_for(problem, IpoptSettings()), np.random.default_rng(0)
+    ipopt, rng = IpoptSettings(), np.random.default_rng(0)
     return problem, min((ipopt.run(problem, problem.start_point(rng)) for _ in range(2)), key=lambda end: end.rank)
 
 
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solved(name)
-    assert end.success
+    assert end.success and end.guess is not None
     model = nlp_model(problem)
     lifted = ca.Function("lifted", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"]])
     cost = float(lifted(end.guess.primal, np.append(problem.p, WIDTHS[-1])))
@@ -139,18 +137,17 @@ def test_no_start_ends_below_what_the_exact_functions_find_around_it(name: str) 
     for size in (1e-2, 1e-3, 1e-4):
         for _ in range(100):
             x = np.clip(end.x + size * problem.scale * rng.normal(size=end.x.size), problem.lower, problem.upper)
-            cost, violation, *_ = evaluated(problem, x)
-            if violation[0] == 0.0:
-                assert cost[0] >= end.cost * (1 - np.sign(end.cost) * SOLVED)
+            at = evaluated(problem, x)
+            if at.violation == 0.0:
+                assert at.cost >= end.cost * (1 - np.sign(end.cost) * SOLVED)
 
 
 def inside(name: str) -> tuple[NlpModel, Array, Array]:
     """NLP, a start point of its variables within the bounds, and its parameters with the widest sigmoid."""
     problem = problem_of(name)
     model = nlp_model(problem)
-    z = (problem.start_point(np.random.default_rng(0)) - model.offset) / model.scale
-    lifted = np.array(model.lift_start(z, problem.p, WIDTHS[0])).ravel()
-    return model, np.concatenate([z, lifted]), np.append(problem.p, WIDTHS[0])
+    start = model.start(problem, problem.start_point(np.random.default_rng(0)), WIDTHS[0])
+    return model, start, np.append(problem.p, WIDTHS[0])
 
 
 def assert_derivative(function: ca.Function, slope: ca.Function, at: Array, rest: tuple[Array, ...]) -> None:

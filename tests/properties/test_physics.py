@@ -43,8 +43,7 @@ def signals_of(problem: GaitProblem, x: Array) -> dict[str, Array]:
 
 
 def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    model = exact_model(problem)
-    return dict(zip(model.index_names, map(float, np.array(model.function(x, problem.p)[5]).ravel()), strict=True))
+    return exact_model(problem).at(x, problem.p).indexes
 
 
 def heavier(factor: float) -> Record:

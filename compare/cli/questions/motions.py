@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from compare.cli.common import AsJson, Seed, command, fail, print_json, print_table, progress_bar, stdout
-from compare.cli.resumable import resumable
-
-if TYPE_CHECKING:
-    from compare.questions.motions.study import Motion
+from compare.cli.command import command
+from compare.cli.common import fail, progress_bar
+from compare.cli.interrupts import resumable
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, Seed, names_in
+from compare.cli.questions.answers import hand_out
+from nlp_gait.files import writable_folder
 
 
 @command
@@ -26,9 +26,7 @@ def motions(
     starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    out: Annotated[Path, typer.Option(help="Folder for results, table and pictures; continued from there.")] = Path(
-        "results"
-    ),
+    out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.
@@ -38,34 +36,15 @@ def motions(
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """
-    from compare.questions.motions.report import write_motions
+    from compare.questions.motions.report import motions_answer
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
-    from nlp_gait.files import writable_folder
 
     folder = writable_folder(out)
-    study = tasks(problem, orders=_names(orders), free_orders=_names(free_orders), robot=robot, starts=starts)
-    with resumable(folder, f"motions/{problem}-*.json"), progress_bar("motions", len(study)) as advance:
-        found = run(study, folder / "motions", seed=seed, progress=advance)
-    written = write_motions(folder, found, problem)
-    if as_json:
-        print_json({"problem": problem, "motions": [m.to_json() for m in found], "files": [str(p) for p in written]})
-    else:
-        _print(problem, found, written)
+    study = tasks(problem, orders=names_in(orders), free_orders=names_in(free_orders), robot=robot, starts=starts)
+    with resumable(folder), progress_bar("motions", len(study)) as advance:
+        found = run(study, folder, seed=seed, progress=advance)
+    hand_out(motions_answer(found, problem), folder, as_json)
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _print(problem: str, found: list[Motion], written: list[Path]) -> None:
-    from compare.questions.motions.report import HEADER, rows, sentences
-
-    print_table(f"{problem}: richer motions", HEADER, rows(found))
-    for sentence in sentences(found):
-        stdout.print(sentence, soft_wrap=True)
-    for path in written:
-        stdout.print(f"wrote {path}", soft_wrap=True)

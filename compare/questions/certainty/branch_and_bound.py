@@ -10,16 +10,17 @@ Source:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from compare.study.progress import Progress, unwatched
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.enclosure import Enclosure
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -39,10 +40,10 @@ class Certificate:
     Attributes:
         objective: exact value of the incumbent, in the problem's sense.
         bound: no x within the variables' bounds that the judge calls feasible has a better objective than this.
-        tolerance: relative distance of both that was asked for.
+        tolerance: requested distance of bound and objective, relative.
         closed: that distance was reached.
-        boxes: enclosed.
-        left: boxes neither dropped nor split at the end.
+        boxes: number that were enclosed.
+        left: number of boxes neither dropped nor split at the end.
         time_s: wall time [s].
         cpu_s: processor time [s].
         x: the incumbent.
@@ -70,15 +71,15 @@ def certify(
     *,
     tolerance: float = 0.01,
     time_limit_s: float = 300.0,
-    progress: Callable[[int, float], None] = lambda boxes, bound: None,
+    progress: Progress = unwatched,
 ) -> Certificate:
-    """Bound on the optimum over all variables' bounds.
+    """Bound on the optimum within the variables' bounds.
 
     Args:
         problem: smooth, with few variables: the work grows exponentially with their number.
         incumbent: (n,) feasible point, the best known.
         tolerance: relative distance of bound and objective at which to stop.
-        time_limit_s: wall time after which the bound reached so far is given [s].
+        time_limit_s: wall time after which the bound reached so far is returned [s].
         progress: told the boxes enclosed and the bound, in the problem's sense, after each batch.
 
     Raises:
@@ -88,12 +89,12 @@ def certify(
     if not (tolerance > 0.0 and time_limit_s > 0.0):
         raise InputError(f"tolerance and time limit must be positive, got {tolerance}, {time_limit_s} s")
     x = problem.check_x(incumbent)
-    cost, violation = (float(v) for v in exact_model(problem).function(x, problem.p)[:2])
-    if not violation <= FEASIBILITY_TOLERANCE:
-        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {violation:.3g}")
+    at = exact_model(problem).at(x, problem.p)
+    if not at.violation <= FEASIBILITY_TOLERANCE:
+        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
     enclosure = Enclosure(problem)
-    target = cost - tolerance * abs(cost)
+    target = at.cost - tolerance * abs(at.cost)
     boxes = np.stack([problem.lower, problem.upper], axis=-1)[None]
     bounds, smears, boxes = _assessed(enclosure, boxes, target)
     enclosed = 1
@@ -109,9 +110,9 @@ def certify(
         new_bounds, new_smears, new_boxes = _assessed(enclosure, halves, target)
         boxes = np.concatenate([boxes[rest], new_boxes])
         bounds, smears = np.concatenate([bounds[rest], new_bounds]), np.concatenate([smears[rest], new_smears])
-        progress(enclosed, bound())
+        progress(f"{enclosed} boxes, bound {bound():.6g}")
     return Certificate(
-        objective=problem.objective.sign * cost,
+        objective=problem.objective.sign * at.cost,
         bound=bound(),
         tolerance=tolerance,
         closed=not len(bounds),

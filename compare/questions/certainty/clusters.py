@@ -19,12 +19,12 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimum:
-    """A local optimum.
+class LocalOptimum:
+    """A distinct local optimum, and how often it was reached.
 
     Attributes:
         objective: of the best end in it, in the problem's sense.
-        count: of starts that ended in it.
+        count: number of starts that ended in it.
         share: of the starts that converged.
         x: of the best end.
     """
@@ -43,7 +43,7 @@ class Unseen:
         good_turing: share of starts that would end in an unseen optimum: optima reached once, divided by N.
         expected_optima: expected number of all local optima, under a uniform prior on their number and shares; None if the
             sample is too small for it.
-        expected_covered: expected share of starts that end in optima seen, under the same prior; None likewise.
+        expected_covered: expected share of starts that end in seen optima, under the same prior; None likewise.
         largest_missed: with 95 % confidence no single unseen optimum attracts more than this share of the starts.
 
     Source:
@@ -57,7 +57,7 @@ class Unseen:
     largest_missed: float
 
 
-def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
+def cluster(problem: GaitProblem, ends: Ends) -> list[LocalOptimum]:
     """Distinct optima among the ends that converged and are feasible, best first."""
     kept = np.flatnonzero(ends.success)
     order = kept[np.argsort(problem.objective.sign * ends.objective[kept], kind="stable")]
@@ -74,7 +74,7 @@ def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
             heads.append(int(i))
             counts.append(1)
     return [
-        Optimum(
+        LocalOptimum(
             objective=float(ends.objective[head]),
             count=count,
             share=count / len(kept),
@@ -84,7 +84,7 @@ def cluster(problem: GaitProblem, ends: Ends) -> list[Optimum]:
     ]
 
 
-def unseen(optima: list[Optimum]) -> Unseen:
+def unseen(optima: list[LocalOptimum]) -> Unseen:
     """Estimates from the counts of at least one optimum."""
     counts: Array = np.array([optimum.count for optimum in optima], dtype=float)
     n, w = float(counts.sum()), float(len(counts))

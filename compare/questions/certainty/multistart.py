@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
-from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings, ipopt_for
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
 
@@ -28,14 +29,12 @@ class Ends:
         objective: (N,) exact values, in the problem's sense.
         success: (N,) converged, and feasible for the exact functions.
         status: (N,) in words.
-        time_s: (N,) wall time of each solve [s].
     """
 
     x: Array
     objective: Array
     success: np.ndarray[Any, np.dtype[np.bool_]]
     status: tuple[str, ...]
-    time_s: Array
 
 
 def multistart(
@@ -44,52 +43,51 @@ def multistart(
     *,
     starts: int,
     seed: int = 0,
-    settings: IpoptSettings | None = None,
-    progress: Callable[[int, str], None],
+    solver: Solver | None = None,
+    progress: Progress = unwatched,
 ) -> Ends:
-    """Ends of IPOPT from random starts; batch k draws its start points from the seed and k, whatever ran before.
+    """Ends of a solver from random starts; batch k draws its start points from the seed and k, whatever ran before.
 
     Args:
         problem: with its current parameter values.
         out: folder in which finished batches are kept.
         starts: how many.
         seed: of the start points.
-        settings: of IPOPT; by default with compiled functions where there is a compiler.
-        progress: told how many starts are done more, and a note.
+        solver: with its settings; None for IPOPT with its defaults.
+        progress: told of each batch when it begins and when it is done.
 
     Raises:
-        InputError: no start.
+        InputError: fewer than one start.
         OutputError: a batch cannot be kept.
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
-    chosen = settings or IpoptSettings()
-    ipopt = ipopt_for(problem, chosen, starts)
-    steps = Steps(out, lambda note: progress(0, note), code=[sys.modules[__name__]])
+    chosen = solver or IpoptSettings()
+    ready = chosen.ready_for(problem, starts)
+    steps = Steps(out, progress, code=[sys.modules[__name__]])
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
     rows: list[list[Any]] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
-        rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ipopt, seed, k, count))
-        progress(count, f"{len(rows)} starts")
-    x, objective, success, status, time_s = zip(*rows, strict=True)
+        rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ready, seed, k, count))
+        progress(f"{len(rows)} starts")
+    x, objective, success, status = zip(*rows, strict=True)
     return Ends(
         x=np.array(x, dtype=float),
         # what is not finite is kept as null
         objective=np.array([np.nan if value is None else value for value in objective], dtype=float),
         success=np.array(success, dtype=bool),
         status=tuple(status),
-        time_s=np.array(time_s, dtype=float),
     )
 
 
-def _batch(problem: GaitProblem, ipopt: Ipopt, seed: int, batch: int, count: int) -> list[list[Any]]:
-    """x, objective, success, status and time of each start of a batch, as plain data."""
+def _batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> list[list[Any]]:
+    """x, objective, success and status of each start of a batch, as plain data."""
     rng = np.random.default_rng([seed, batch])
     rows: list[list[Any]] = []
     for _ in range(count):
-        end = ipopt.run(problem, problem.start_point(rng))
-        objective = problem.objective.sign * end.cost if np.isfinite(end.cost) else None
-        rows.append([end.x.tolist(), objective, bool(end.success), end.status, end.time_s])
+        end = solver.run(problem, problem.start_point(rng))
+        objective = end.objective if np.isfinite(end.objective) else None
+        rows.append([end.x.tolist(), objective, bool(end.success), end.status])
     return rows

@@ -1,10 +1,9 @@
-"""How certain it is that the best optimum known is the global one: what is proven, and what is only supported."""
+"""How certain it is that the best known optimum is the global one: what is proven, and what is only supported."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,19 @@ from typing import Any
 import numpy as np
 
 import metaheuristics
+from compare.analysis.units import with_unit
 from compare.questions.certainty import branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
-from compare.questions.certainty.clusters import Optimum, Unseen, cluster, unseen
-from compare.questions.certainty.multistart import Ends, multistart
+from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
+from compare.questions.certainty.multistart import multistart
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE
+from compare.study.task import plain_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 # Branch and bound is for this many variables at most: its work grows exponentially with them.
 MOST_CERTIFIED = 4
@@ -43,15 +46,14 @@ class LongSearch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certainty:
-    """Evidence.
+    """Evidence that the best known optimum is the global one.
 
     Attributes:
         problem: with its parameter values.
         starts: of IPOPT.
-        statuses: how often they ended how.
+        statuses: number of starts by how they ended.
         optima: distinct local optima, best first.
         unseen: what the counts say about others.
-        ends: of all starts.
         search: None if it was not asked for.
         certificate: None if it was not asked for or there are too many variables.
     """
@@ -59,31 +61,31 @@ class Certainty:
     problem: GaitProblem
     starts: int
     statuses: dict[str, int]
-    optima: tuple[Optimum, ...]
+    optima: tuple[LocalOptimum, ...]
     unseen: Unseen
-    ends: Ends
     search: LongSearch | None
     certificate: Certificate | None
 
     @property
     def proven(self) -> str:
-        """In one sentence."""
+        """What is proven, in one sentence."""
         c = self.certificate
         if c is None:
             return "nothing: branch and bound is for smooth problems of at most four variables"
         if not math.isfinite(c.bound):
             return f"nothing: the time limit came before a finite bound, after {c.boxes:,} boxes"
-        unit = "" if self.problem.objective.unit == "1" else f" {self.problem.objective.unit}"
+        unit = self.problem.objective.unit
+        bound, best = (with_unit(value, unit, ".6g") for value in (c.bound, c.objective))
         word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
         return (
-            f"{word} {c.bound:.6g}{unit}, {100 * c.gap:.3g} % from the best known {c.objective:.6g}{unit}; "
+            f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
             + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
             + "; intervals rounded outward, libm's functions taken to be within four units in the last place"
         )
 
     @property
     def supported(self) -> str:
-        """In one sentence."""
+        """What is only supported, in one sentence."""
         best = self.optima[0]
         text = (
             f"{best.count} of {sum(o.count for o in self.optima)} converged starts end in the best of {len(self.optima)} "
@@ -100,9 +102,7 @@ class Certainty:
         """Plain data; the ends of the starts stay in their files."""
         certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
         return {
-            "problem": self.problem.name,
-            "options": dict(self.problem.options),
-            "parameters": dict(self.problem.values),
+            **plain_problem(self.problem),
             "starts": self.starts,
             "statuses": self.statuses,
             "optima": [asdict(optimum) for optimum in self.optima],
@@ -123,9 +123,9 @@ def certainty(
     tolerance: float = 0.01,
     time_limit_s: float = 600.0,
     seed: int = 0,
-    progress: Callable[[int, str], None],
+    progress: Progress = unwatched,
 ) -> Certainty:
-    """Starts, a long search and, for few variables, branch and bound; what is done is kept under ``out``.
+    """Evidence by many starts, a long search and, for few variables, branch and bound; each step is kept under ``out``.
 
     Args:
         problem: with its current parameter values.
@@ -135,14 +135,14 @@ def certainty(
         tolerance: relative, of the certificate.
         time_limit_s: of the certificate [s]; 0 for none.
         seed: of starts and search.
-        progress: told how many starts are done more, and a note.
+        progress: told each step, and how far it is.
 
     Raises:
         InputError: no start converged, or tolerance or time limit are not allowed.
         SearchError: CMA-ES is asked for and not installed.
         CompilerError: branch and bound is asked for and there is no compiler.
     """
-    # What is wrong is said now, not after the starts.
+    # Checked before the starts, which take long.
     if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
         raise InputError(
             f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"
@@ -154,7 +154,7 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, lambda note: progress(0, note), code=[branch_and_bound])
+    steps = Steps(out, progress, code=[branch_and_bound])
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -167,29 +167,25 @@ def certainty(
 
     def proven() -> dict[str, Any]:
         certificate = certify(
-            problem,
-            np.array(best.x),
-            tolerance=tolerance,
-            time_limit_s=time_limit_s,
-            progress=lambda boxes, bound: progress(0, f"{boxes} boxes, bound {bound:.6g}"),
+            problem, np.array(best.x), tolerance=tolerance, time_limit_s=time_limit_s, progress=progress
         )
         return {**asdict(certificate), "bound": certificate.bound if math.isfinite(certificate.bound) else None}
 
     search = certificate = None
     if evaluations:
-        search = LongSearch(**steps("cma", {**identity, "evaluations": evaluations, "seed": seed}, searched))
+        inputs = {**identity, "evaluations": evaluations, "seed": seed}
+        search = decoded(LongSearch, steps("cma", inputs, searched))
     if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
         kept = steps("certificate", inputs, proven)
         bound = -problem.objective.sign * math.inf if kept["bound"] is None else kept["bound"]
-        certificate = Certificate(**{**kept, "x": tuple(kept["x"]), "bound": bound})
+        certificate = decoded(Certificate, {**kept, "bound": bound})
     return Certainty(
         problem=problem,
         starts=starts,
         statuses=dict(Counter(ends.status)),
         optima=tuple(optima),
         unseen=unseen(optima),
-        ends=ends,
         search=search,
         certificate=certificate,
     )

@@ -1,40 +1,26 @@
-"""Table and pictures of the comparison of motions."""
+"""The comparison of motions as an answer: tables, sentences and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, legend_below, new_figure, save, style
+from compare.drawing.figures import COLOURS, legend_below, new_figure, style
+from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
-from compare.study.task import ProblemSpec
-from nlp_gait.files import csv_text, write_text
-from nlp_gait.problem import Array
+from compare.report.document import Figure, Table
+from nlp_gait.problem import Signals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
-HEADER = (
-    "motion",
-    "variables",
-    "power [W]",
-    "saved [%]",
-    "IPOPT [s]",
-    "iterations",
-    "starts",
-    "dense power [W]",
-    "dense violation",
-)
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
-# Points of a drawn path.
-DRAWN = 20
+DRAWN = 20  # samples of a drawn path for each of the problem's own
 
 
 def title(motion: Motion) -> str:
@@ -44,27 +30,62 @@ def title(motion: Motion) -> str:
     return KIND_WORDS[motion.task.kind] + motion.task.trajectory
 
 
-def rows(found: Sequence[Motion]) -> list[tuple[str, ...]]:
-    """Cells under ``HEADER``."""
-    base = found[0].power_W
-    return [
-        (
-            title(m),
-            str(m.variables),
-            f"{m.power_W:.6f}",
-            f"{100 * (1 - m.power_W / base):.2f}",
-            f"{m.time_s:.1f}",
-            str(m.iterations),
-            f"{m.converged}/{m.attempts}",
-            f"{m.dense_power_W:.6f}",
-            m.worst or "none",
-        )
+def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
+    """What richer motions save.
+
+    Args:
+        found: the first is the one to compare with.
+        problem: name of the phase.
+    """
+    stem, base = f"{problem}-motions", found[0].power_W
+    over = (
+        "Least power over the coefficients beyond the paper's cubics, with the value that the richest motions point to."
+    )
+    along = "Paths of the hip, and of the swing foot if it moves."
+    return Answer(
+        stem=stem,
+        title=f"{problem}: richer motions",
+        verdict=sentences(found),
+        parts=(
+            table_of(
+                "Optima",
+                found,
+                {
+                    "motion": title,
+                    "variables": lambda m: str(m.variables),
+                    "power [W]": lambda m: f"{m.power_W:.6f}",
+                    "saved [%]": lambda m: f"{100 * (1 - m.power_W / base):.2f}",
+                    "IPOPT [s]": lambda m: f"{m.time_s:.1f}",
+                    "iterations": lambda m: str(m.iterations),
+                    "starts": lambda m: f"{m.converged}/{m.attempts}",
+                    "dense power [W]": lambda m: f"{m.dense_power_W:.6f}",
+                    "dense violation": lambda m: m.worst or "none",
+                },
+            ),
+            Figure(name=stem, caption=over, drawing=power_figure(found)),
+            Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
+            _numbers(stem, found),
+        ),
+        data={"problem": problem, "motions": [m.to_json() for m in found]},
+    )
+
+
+def _numbers(stem: str, found: Sequence[Motion]) -> Table:
+    header = (
+        "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation "
+        "converged starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status"
+    ).split()
+    rows = [
+        [m.task.kind, m.task.problem, m.task.trajectory, m.task.options.get("objective", "power")]
+        + [m.task.options["samples_per_interval"], m.variables, m.power_W, m.dense_power_W, m.worst, m.converged]
+        + [m.attempts, m.iterations, f"{m.time_s:.3f}", *(m.objectives.values() or (None, None)), m.status]
         for m in found
     ]
+    return all_digits(stem, header, rows)
 
 
 def sentences(found: Sequence[Motion]) -> list[str]:
-    """What the table says: the limits of the orders, the cheat between 11 samples, the price of smoothness."""
+    """What the table says: where the orders lead, what hides between 11 samples, the price of smoothness."""
     said = []
     for kind, (_, _, words) in LOOKS.items():
         powers = [m.power_W for m in found if m.task.kind == kind]
@@ -91,31 +112,7 @@ def sentences(found: Sequence[Motion]) -> list[str]:
     return said
 
 
-def motions_csv(found: Sequence[Motion]) -> str:
-    """One row for each motion, units in the header."""
-    table: list[Sequence[object]] = []
-    table.append(
-        "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation converged "
-        "starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status".split()
-    )
-    for m in found:
-        options = m.task.options
-        values: list[float | str] = [*m.objectives.values()] or ["", ""]
-        table.append(
-            [
-                m.task.kind,
-                m.task.problem,
-                m.task.trajectory,
-                options.get("objective", "power"),
-                options["samples_per_interval"],
-            ]
-            + [m.variables, repr(m.power_W), repr(m.dense_power_W), m.worst, m.converged, m.attempts, m.iterations]
-            + [f"{m.time_s:.3f}", *values, m.status]
-        )
-    return csv_text(table)
-
-
-def power_figure(found: Sequence[Motion]) -> Figure:
+def power_figure(found: Sequence[Motion]) -> Drawing:
     """Power against the number of free coefficients, with the floor that the richest motions point to."""
     with style():
         figure = new_figure(4.6, 3.0)
@@ -144,44 +141,26 @@ def power_figure(found: Sequence[Motion]) -> Figure:
     return figure
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Path3:
-    """Paths (n, 3) of hip and swing foot [m]."""
+def path_figure(found: Sequence[Motion]) -> Drawing:
+    """Paths of the paper's cubics, of the richest planned motion and of the richest one with free joints.
 
-    label: str
-    hip: Array
-    foot: Array
-
-
-def paths(found: Sequence[Motion]) -> list[Path3]:
-    """Of the paper's cubics, the richest planned motion and the richest with free joints."""
-    chosen: dict[str, Motion] = {}
-    for m in found:
-        if m.task.kind in LOOKS:
-            chosen[m.task.kind] = m
-    drawn = [found[0], *(m for m in chosen.values() if m is not found[0])]
-    result = []
-    for m in drawn:
-        problem = ProblemSpec(name=m.task.problem, options=m.task.options).load().dense(DRAWN)
-        assert problem is not None  # a phase has one; for the type checker
-        arrays: Mapping[str, Array] = problem.signals(m.x).arrays
-        result.append(Path3(label=title(m), hip=arrays["hip"], foot=arrays["right_foot"]))
-    return result
-
-
-def path_figure(drawn: Sequence[Path3]) -> Figure:
-    """Hip from above and from the side, and the swing foot from the side if it moves."""
-    swings = bool(np.ptp(drawn[0].foot[:, 0]) > 0.0)
+    The hip from above and from the side, and the swing foot from the side if it moves.
+    """
+    richest = {m.task.kind: m for m in found if m.task.kind in LOOKS}
+    drawn = [found[0], *(m for m in richest.values() if m is not found[0])]
+    arrays = [_signals(m).arrays for m in drawn]
+    swings = bool(np.ptp(arrays[0]["right_foot"][:, 0]) > 0.0)
     colours = (COLOURS["ipopt"], *(colour for colour, _, _ in LOOKS.values()))
     with style():
         figure = new_figure(6.3 if swings else 4.6, 2.4)
         panels: Sequence[Axes] = figure.subplots(1, 3 if swings else 2)
-        for path, colour, line in zip(drawn, colours, ("--", "-", "-"), strict=False):
-            x, y, z = 1e3 * path.hip.T
-            panels[0].plot(x, y, line, color=colour, label=path.label)
+        for motion, path, colour, line in zip(drawn, arrays, colours, ("--", "-", "-"), strict=False):
+            x, y, z = 1e3 * path["hip"].T
+            panels[0].plot(x, y, line, color=colour, label=title(motion))
             panels[1].plot(x, z, line, color=colour)
             if swings:
-                panels[2].plot(1e3 * path.foot[:, 0], 1e3 * path.foot[:, 2], line, color=colour)
+                foot = 1e3 * path["right_foot"]
+                panels[2].plot(foot[:, 0], foot[:, 2], line, color=colour)
         names = [("hip x [mm]", "hip y [mm]"), ("hip x [mm]", "hip height [mm]"), ("foot x [mm]", "foot height [mm]")]
         for axes, (along, up) in zip(panels, names, strict=False):
             axes.set(xlabel=along, ylabel=up)
@@ -189,10 +168,8 @@ def path_figure(drawn: Sequence[Path3]) -> Figure:
     return figure
 
 
-def write_motions(folder: Path, found: Sequence[Motion], problem: str) -> list[Path]:
-    """Write table and pictures; returns their paths."""
-    stem = folder / f"{problem}-motions"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, motions_csv(found))
-    power = save(power_figure(found), stem)
-    return [table, *power, *save(path_figure(paths(found)), folder / f"{problem}-motions-paths")]
+def _signals(motion: Motion) -> Signals:
+    """Time histories that are dense enough to be drawn."""
+    problem = motion.task.spec.load().dense(DRAWN)
+    assert problem is not None  # a phase has one; for the type checker
+    return problem.signals(motion.x)

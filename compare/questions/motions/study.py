@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,12 @@ import numpy as np
 
 from compare.judge import Evaluation, evaluate
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
-from compare.study.task import ProblemSpec
+from compare.study.progress import Progress, unwatched
+from compare.study.steps import Steps, fingerprint
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, writable_folder, write_json
+from nlp_gait.decoding import decoded
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.problems.nao.single_support_free import fitted_start
@@ -38,7 +40,7 @@ class Motion:
         success: at least one start converged to a feasible point.
         power_W: on the problem's own samples.
         dense_power_W: on the judge's dense grid.
-        objectives: values by name of all that is or could be minimised, with units in the names.
+        objectives: values of what the smooth tasks minimise, by name with its unit.
         worst: row that the dense grid finds violated most, with the amount; empty if none is.
         converged: starts that ended in a feasible optimum, of ``attempts``.
         attempts: number of starts.
@@ -74,58 +76,44 @@ class Motion:
         return asdict(self)
 
 
-def motions(
-    study: Sequence[MotionTask], folder: Path, *, seed: int = 0, progress: Callable[[str], None] | None = None
-) -> list[Motion]:
-    """Solve all tasks; those whose results lie in the folder already are read from there.
+def motions(study: Sequence[MotionTask], out: Path, *, seed: int = 0, progress: Progress = unwatched) -> list[Motion]:
+    """Solve all tasks; what an earlier call has finished is read from its file.
 
     Args:
         study: see ``tasks``.
-        folder: for one JSON file each.
+        out: folder in which finished tasks are kept.
         seed: of the random starts.
-        progress: called after each task with its label.
+        progress: told of each task when it is done.
 
     Raises:
-        InputError: a file in the folder belongs to another study.
+        OutputError: a motion cannot be kept.
     """
-    writable_folder(folder)
+    steps = Steps(out, unwatched, code=[sys.modules[__name__]])
     found: list[Motion] = []
     for task in study:
-        path = folder / f"{task.problem}-{task.label}.json"
-        if path.exists():
-            found.append(_stored(path, task, seed))
-        else:
-            found.append(_solved(task, found, seed))
-            write_json(path, found[-1].to_json())
-        if progress is not None:
-            progress(task.label)
+        problem = task.spec.load()
+        x0 = _start(task, problem, found)
+        start = None if x0 is None else x0.tolist()
+        inputs = {**fingerprint(problem), "task": asdict(task), "seed": seed, "start": start}
+        kept = steps(f"{task.problem}-{task.label}", inputs, partial(_solved, task, problem, x0, seed))
+        found.append(decoded(Motion, kept))
+        progress(task.label)
     return found
 
 
-def _stored(path: Path, task: MotionTask, seed: int) -> Motion:
-    data = read_json(path, "motion")
-    expected = {"task": asdict(task), "seed": seed}
-    if not isinstance(data, dict) or {key: data.get(key) for key in expected} != expected:
-        raise InputError(
-            f"{str(path)!r} holds the result of another study; delete it or choose another folder with --out"
-        )
-    return Motion(**{**data, "task": task, "powers_W": tuple(data["powers_W"])})
-
-
-def _solved(task: MotionTask, earlier: Sequence[Motion], seed: int) -> Motion:
-    problem = ProblemSpec(name=task.problem, options=task.options).load()
-    x0 = _start(task, problem, earlier)
+def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int) -> dict[str, Any]:
+    """A motion as plain data."""
     solution = solve(
         problem,
         starts=task.starts + 1,
         seed=seed,
         x0=x0,
-        settings=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
+        solver=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
     )
-    x = np.array(list(solution.x.values()))
+    x = problem.check_x(solution.x)
     verdict = evaluate(problem, x)
     dense = verdict.dense or {}
-    return Motion(
+    motion = Motion(
         task=task,
         seed=seed,
         variables=len(problem.names),
@@ -142,6 +130,7 @@ def _solved(task: MotionTask, earlier: Sequence[Motion], seed: int) -> Motion:
         time_s=solution.time_s.solve,
         x=solution.x,
     )
+    return motion.to_json()
 
 
 def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) -> Array | None:
@@ -152,19 +141,19 @@ def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) ->
         if SPANS[motion.task.trajectory] <= spans and _contains(problem, motion.task, task.trajectory):
             return _embedded(motion.x, problem.names, spans)
     for motion in solved if task.kind == FREED else ():
-        planned = ProblemSpec(name=motion.task.problem, options=motion.task.options).load()
-        return fitted_start(task.trajectory, planned, np.array(list(motion.x.values())))  # type: ignore[arg-type]
+        planned = motion.task.spec.load()
+        return fitted_start(task.trajectory, planned, planned.check_x(motion.x))  # type: ignore[arg-type]
     return None
 
 
 def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> bool:
     """Whether a problem has all curves of a simpler one."""
-    same = ProblemSpec(name=simpler.problem, options={**simpler.options, "trajectory": trajectory}).load()
+    same = simpler.spec.with_options(trajectory=trajectory).load()
     return set(same.names) <= set(problem.names)
 
 
 def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:
-    """The same motion with more spans, and with curves at zero that it has not."""
+    """The same motion with more spans, and with the curves that it lacks at zero."""
     curves: dict[str, list[float]] = {}
     for name, value in x.items():
         curves.setdefault(name.partition("[")[0], []).append(value)
@@ -178,13 +167,8 @@ def _objectives(task: MotionTask, x: Array) -> dict[str, float]:
     """Jerk and torque rate of a motion, where the study minimises these."""
     if task.trajectory != SMOOTH_ORDER or task.kind not in (PLANNED, SMOOTHED):
         return {}
-    found: dict[str, float] = {}
-    for name in SMOOTH:
-        problem = ProblemSpec(name=task.problem, options={**task.options, "objective": name}).load()
-        found[f"{problem.objective.name} [{problem.objective.unit}]"] = float(
-            exact_model(problem).function(x, problem.p)[0]
-        )
-    return found
+    problems = [task.spec.with_options(objective=name).load() for name in SMOOTH]
+    return {f"{p.objective.name} [{p.objective.unit}]": exact_model(p).at(x, p.p).cost for p in problems}
 
 
 def _worst(verdict: Evaluation) -> str:
@@ -195,9 +179,9 @@ def _worst(verdict: Evaluation) -> str:
 
 
 def limit(powers: Sequence[float]) -> float | None:
-    """Where a sequence goes whose differences shrink by a constant factor, from its last three terms.
+    """Limit of a sequence whose differences shrink by a constant factor, from its last three terms.
 
-    None if they do not shrink, and if it would be farther away than the last two terms are apart.
+    None if they do not shrink, or if the limit would be farther away than the last two terms are apart.
 
     Source:
         Aitken's extrapolation, which is Richardson's for an unknown order.

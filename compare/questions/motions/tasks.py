@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError
 from nlp_gait.problems.nao.curves import SPANS
 
@@ -39,6 +40,11 @@ class MotionTask:
     starts: int
 
     @property
+    def spec(self) -> ProblemSpec:
+        """The problem as plain data."""
+        return ProblemSpec(name=self.problem, options=self.options)
+
+    @property
     def trajectory(self) -> str:
         """Order of its curves."""
         return str(self.options["trajectory"])
@@ -64,9 +70,9 @@ def tasks(
     """
     if phase not in PHASES:
         raise InputError(f"motions are compared for {' and '.join(PHASES)}, got {phase!r}")
-    for given, known in ((orders, tuple(SPANS)), (free_orders, tuple(SPANS))):
-        if list(given) != [order for order in known if order in given]:
-            raise InputError(f"orders must rise and be among {', '.join(known)}, got {', '.join(given)}")
+    for given in (orders, free_orders):
+        if list(given) != [order for order in SPANS if order in given]:
+            raise InputError(f"orders must rise and be among {', '.join(SPANS)}, got {', '.join(given)}")
     if not orders:
         raise InputError("there must be at least one order")
 

@@ -1,39 +1,88 @@
-"""Table and picture of the motors' variants."""
+"""The motors' variants as an answer: tables and picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import legend_below, new_figure, save, style
-from compare.drawing.labels import axis_label
+from compare.drawing.figures import legend_below, new_figure, style
+from compare.drawing.labels import axis_label, name_in_words, units_of
+from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.motors.study import Variant
-from nlp_gait.files import csv_text, write_text
+from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
+
+STILL = 1e-4  # of a variable's range
 
 
-def motors_csv(found: Sequence[Variant]) -> str:
-    """One row for each variant."""
-    table: list[Sequence[object]] = []
-    names, kinds = list(found[0].x), list(found[0].uses)
-    table.append(
-        ["variant", "motors", "power_W", "power_at_published_x_W", "violation_of_published_x", "power_as_published_W"]
-        + [*names, *(f"share_of_{kind.replace(' ', '_')}" for kind in kinds), "success", "status"]
+def motors_answer(found: Sequence[Variant], problem: GaitProblem) -> Answer:
+    """What each feature of the motors changes.
+
+    Args:
+        found: the first is the published one.
+        problem: as published.
+    """
+    stem = f"{problem.name}-motors"
+    kinds = tuple(found[0].uses)
+    uses = [
+        (v.name, *(f"{v.uses[kind].share:.1%} {v.uses[kind].row.partition('[')[2][:-1]}" for kind in kinds))
+        for v in found
+    ]
+    largest = "Largest share of each limit that the optimum uses: joint, sample"
+    shown = "Power at the optimum and at the published one; where x* lies in its ranges."
+    return Answer(
+        stem=stem,
+        title=f"{problem.name} with real motors",
+        parts=(
+            table_of(
+                "What each feature changes",
+                found,
+                {
+                    "motors": lambda v: v.name,
+                    "optimum [W]": lambda v: f"{v.power_W:.6f}",
+                    "published x* [W]": lambda v: (
+                        f"{v.unchanged_power_W:.6f}" + (" (breaks limits)" if v.unchanged_violation > 0.0 else "")
+                    ),
+                    "optimum's power as published [W]": lambda v: f"{v.published_power_W:.6f}",
+                    "x* moves most in": lambda v: (
+                        "-" if v.moved[0] < STILL else f"{v.moved[1]} by {v.moved[0]:.0%} of its range"
+                    ),
+                },
+            ),
+            text_table(("motors", *kinds), uses, largest),
+            optima_table({v.name: v.x for v in found}),
+            Figure(name=stem, caption=shown, drawing=motors_figure(found, problem)),
+            _numbers(stem, found),
+        ),
+        data={"problem": problem.name, "variants": [asdict(variant) for variant in found]},
     )
-    for v in found:
-        numbers = (v.power_W, v.unchanged_power_W, v.unchanged_violation, v.published_power_W, *v.x.values())
-        shares = [repr(v.uses[kind].share) for kind in kinds]
-        table.append([v.name, v.features, *map(repr, numbers), *shares, str(v.success).lower(), v.status])
-    return csv_text(table)
 
 
-def motors_figure(found: Sequence[Variant], problem: GaitProblem) -> Figure:
+def _numbers(stem: str, found: Sequence[Variant]) -> Table:
+    names, kinds = list(found[0].x), list(found[0].uses)
+    header = [
+        *("variant", "motors", "power_W", "power_at_published_x_W", "violation_of_published_x", "power_as_published_W"),
+        *(*names, *(f"share_of_{kind.replace(' ', '_')}" for kind in kinds), "success", "status"),
+    ]
+    rows: list[list[Value]] = [
+        [
+            *(v.name, v.features, v.power_W, v.unchanged_power_W, v.unchanged_violation, v.published_power_W),
+            *v.x.values(),
+            *(v.uses[kind].share for kind in kinds),
+            *(v.success, v.status),
+        ]
+        for v in found
+    ]
+    return all_digits(stem, header, rows)
+
+
+def motors_figure(found: Sequence[Variant], problem: GaitProblem) -> Drawing:
     """Left: power at the optimum and at the published one. Right: where x* lies in its ranges."""
     places = np.arange(len(found))
     with style():
@@ -48,18 +97,10 @@ def motors_figure(found: Sequence[Variant], problem: GaitProblem) -> Figure:
         legend_below(figure)
         shares = np.array([(np.array(list(v.x.values())) - problem.lower) / problem.scale for v in found])
         image = right.imshow(shares, aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0)
-        units = {v.name: v.unit for v in problem.variables}
-        words = [axis_label(name, units[name]).split(" [")[0] for name in problem.names]
+        units = units_of(problem)
+        words = [name_in_words(name, units[name]) for name in problem.names]
         right.set_xticks(range(len(words)), words, rotation=40, ha="right")
         right.set_yticks([])
         right.grid(visible=False)
         figure.colorbar(image, ax=right, label="x* from lower to upper bound")
     return figure
-
-
-def write_motors(folder: Path, found: Sequence[Variant], problem: GaitProblem) -> list[Path]:
-    """Write table and picture; returns their paths."""
-    stem = folder / f"{problem.name}-motors"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, motors_csv(found))
-    return [table, *save(motors_figure(found, problem), stem)]

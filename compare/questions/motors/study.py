@@ -1,13 +1,14 @@
-"""What the real motors change: the optimum of a NAO phase under one feature of theirs after the other."""
+"""What real motors change: the optimum of a NAO phase with one set of their features after another."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
@@ -45,19 +46,19 @@ class Use:
 
 @dataclass(frozen=True, kw_only=True)
 class Variant:
-    """One way to reckon with the motors.
+    """The optimum with some features of the motors.
 
     Attributes:
         name: in words.
         features: as in the option ``motors``.
         success: whether IPOPT converged to a feasible point.
         status: in words.
-        power_W: at the optimum, as this variant reckons it.
-        unchanged_power_W: at the published optimum, as this variant reckons it.
+        power_W: at the optimum, as this variant calculates it.
+        unchanged_power_W: at the published optimum, as this variant calculates it.
         unchanged_violation: of the published optimum under this variant's limits, 0 if it keeps them.
-        published_power_W: at this variant's optimum, as the paper reckons it.
+        published_power_W: at this variant's optimum, as the paper calculates it.
         x: by variable name.
-        moved: distance of x* from the published one, in units of the variables' ranges: the largest, and whose it is.
+        moved: largest distance of a variable from the published optimum, in units of its range, and the variable's name.
         uses: by kind of limit, at this optimum, whether or not the variant has the limits.
     """
 
@@ -75,7 +76,7 @@ class Variant:
 
 
 def motor_variants(
-    spec: ProblemSpec, *, starts: int = 10, seed: int = 0, progress: Callable[[str], None] | None = None
+    spec: ProblemSpec, *, starts: int = 10, seed: int = 0, progress: Progress = unwatched
 ) -> tuple[Variant, ...]:
     """Optimum under each variant.
 
@@ -83,7 +84,7 @@ def motor_variants(
         spec: a NAO phase, without the option ``motors``.
         starts: random starts of IPOPT for each.
         seed: of the starts.
-        progress: called after each variant with its name.
+        progress: told the name of each variant when it is solved.
 
     Raises:
         InputError: a problem without motors, or one that has the option already.
@@ -94,16 +95,15 @@ def motor_variants(
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
     if "motors" not in inspect.signature(problem_maker(spec.name)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
-    limited = _with(spec, "limits")
+    limited = spec.with_options(motors="limits").load()
     found: list[Variant] = []
     try:
         for name, features in VARIANTS.items():
-            problem = _with(spec, features)
-            first = np.array(list(found[0].x.values())) if found else None
+            problem = spec.with_options(motors=features).load() if features else published
+            first = published.check_x(found[0].x) if found else None
             solution = solve(problem, starts=starts, seed=seed, x0=first)
             found.append(_variant(name, problem, solution, first, published, limited))
-            if progress is not None:
-                progress(name)
+            progress(name)
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted after {len(found)} of {len(VARIANTS)} variants", tuple(found)) from None
     return tuple(found)
@@ -117,38 +117,33 @@ def _variant(
     published: GaitProblem,
     limited: GaitProblem,
 ) -> Variant:
-    """A variant from its solution, beside the published optimum ``first`` (n,), which None says it is itself."""
-    x = np.array([solution.x[variable] for variable in problem.names])
+    """A variant from its solution, compared with the published optimum ``first`` (n,); None where this is the published one."""
+    x = problem.check_x(solution.x)
     first = x if first is None else first
     moves = np.abs(x - first) / problem.scale
-    unchanged, violation, *_ = exact_model(problem).function(first, problem.p)
+    unchanged = exact_model(problem).at(first, problem.p)
     return Variant(
         name=name,
         features=VARIANTS[name],
         success=solution.success,
         status=solution.status,
         power_W=solution.objective,
-        unchanged_power_W=float(unchanged),
-        unchanged_violation=float(violation),
-        published_power_W=float(exact_model(published).function(x, published.p)[0]),
+        unchanged_power_W=unchanged.cost,
+        unchanged_violation=unchanged.violation,
+        published_power_W=exact_model(published).at(x, published.p).cost,
         x=solution.x,
         moved=(float(moves.max()), problem.names[int(moves.argmax())]),
         uses=limit_uses(limited, x),
     )
 
 
-def limit_uses(limited: GaitProblem, x: np.ndarray) -> dict[str, Use]:
+def limit_uses(limited: GaitProblem, x: Array) -> dict[str, Use]:
     """Largest shares of the motors' limits that x (n,) uses, in a problem with ``motors=limits``."""
-    exact = exact_model(limited)
-    _, _, value, lower, upper, _ = (np.array(part).ravel() for part in exact.function(x, limited.p))
+    names, at = exact_model(limited).row_names, exact_model(limited).at(x, limited.p)
     uses = {}
     for kind, groups in USES.items():
-        rows = [i for i, name in enumerate(exact.row_names) if name.split("[")[0] in groups]
-        shares = [value[i] / (upper[i] if value[i] > 0.0 else lower[i]) for i in rows]
+        rows = [i for i, name in enumerate(names) if name.partition("[")[0] in groups]
+        shares = [at.g[i] / (at.upper[i] if at.g[i] > 0.0 else at.lower[i]) for i in rows]
         largest = int(np.argmax(shares))
-        uses[kind] = Use(share=float(shares[largest]), row=exact.row_names[rows[largest]])
+        uses[kind] = Use(share=float(shares[largest]), row=names[rows[largest]])
     return uses
-
-
-def _with(spec: ProblemSpec, features: str) -> GaitProblem:
-    return replace(spec, options={**spec.options, **({"motors": features} if features else {})}).load()

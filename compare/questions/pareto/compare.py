@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compare.questions.pareto.criteria import Criterion
+from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
+from compare.study.progress import Progress, unwatched
 from metaheuristics.interface import Array
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
 MOST_CHALLENGES = 1000
 
@@ -25,7 +27,7 @@ class Quality:
         algorithm: of pymoo.
         budget: evaluations.
         runs: number.
-        empty: runs without a feasible point; they count as hypervolume 0 and not in what follows.
+        empty: runs without a feasible point; they count as hypervolume 0 and are left out of what follows.
         hypervolume: (least, median, greatest) share of the true front's, with both ranges as 1 and the reference 1.1.
         igd: (least, median, greatest) mean distance from a point of the true front to the nearest one found.
         excess: (least, median, greatest) over runs of the mean power above the true front's at an equal criterion, relative.
@@ -42,11 +44,11 @@ class Quality:
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """The points of all runs that no other betters, those nearest to the front beside the least power at their own criterion.
+    """The best points of all runs, those nearest to the front compared with the least power at their own criterion.
 
     Attributes:
-        points: how many no other betters.
-        solved: how many of these were solved for.
+        points: how many are bettered by no other.
+        solved: for how many of these the least power was solved for.
         infeasible: of these, by the judge's exact functions.
         least_excess: smallest power above the least one found at an equal criterion, relative; negative if a point betters it.
         median_excess: likewise.
@@ -65,6 +67,8 @@ class Challenge:
 
 def quality(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[Quality]:
     """One row for each algorithm and budget."""
+    if not fronts:
+        return []
     from pymoo.indicators.hv import HV
     from pymoo.indicators.igd import IGD
 
@@ -96,33 +100,32 @@ def quality(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[
 
 def challenge(
     free: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
     most: int = MOST_CHALLENGES,
-    progress: Callable[[str], None] = lambda note: None,
+    progress: Progress = unwatched,
 ) -> Challenge:
-    """Solve for the least power at the criterion of points, from the point itself and from the front's nearest point.
+    """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
 
-    Of more points than ``most``, those are taken that lie lowest over the front's straight pieces.
+    Of more points than ``most``, those are taken that lie lowest over the straight lines between the front's points.
 
     Args:
         free: the problem without a demand on the criterion.
         criterion: beside power.
         front: the true one, as far as it is known.
         points: of searches.
-        most: solved at most for so many.
+        most: largest number of points to solve for.
         progress: told the point.
     """
-    exact = exact_model(free)
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:most]
     solved: list[FrontPoint] = []
     excess: list[float] = []
     infeasible = moved = 0
     for point in lowest:
-        power, violation = (float(v) for v in exact.function(np.array(point.x), free.p)[:2])
-        if not violation <= FEASIBILITY_TOLERANCE:
+        exact = exact_model(free).at(point.x, free.p)
+        if not exact.violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue
         near = front[int(np.argmin(np.abs(values - point.value)))]
@@ -130,12 +133,12 @@ def challenge(
         of_front, of_search = (point_at(free, criterion, at, np.array(start.x)) for start in (near, point))
         candidates = [p for p in (of_front, of_search) if p is not None]
         if not candidates:
-            excess.append(power / near.power_W - 1.0 if near.value >= point.value else -np.inf)
+            excess.append(exact.cost / near.power_W - 1.0 if near.value >= point.value else -np.inf)
             continue
         best = min(candidates, key=lambda p: p.power_W)
         moved += of_front is None or best.power_W < of_front.power_W * (1.0 - 1e-6)
         solved.append(best)
-        excess.append(power / best.power_W - 1.0)
+        excess.append(exact.cost / best.power_W - 1.0)
         progress(f"{criterion.name} {point.value:.5g} {criterion.unit}")
     return Challenge(
         points=len(points),

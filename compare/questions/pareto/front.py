@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.questions.pareto.criteria import REWARD, Criterion, rewarding
-from nlp_gait.backends.optima.continuation import Attempt, Continuation, best_end
-from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from compare.questions.pareto.competing import REWARD, CompetingObjective, rewarding
+from compare.study.progress import Progress, unwatched
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.optima.continuation import Continuation, best_success
+from nlp_gait.backends.solve import solution_of, solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Outcome, Solution
 
 # The front ends where another hundredth of the criterion would cost ten times the least power.
 LARGEST_TRADE_OFF = 1000.0
 LEAST_POINTS = 5
 # Random starts are tried at every third point of the first, evenly spaced ones.
 CHECK_EVERY = 3
-# Planned at least, for IPOPT: functions are worth compiling.
+# Planned at least: IPOPT's functions are worth compiling.
 SOLVES = 200
 
 
@@ -32,7 +36,7 @@ class FrontPoint:
         demanded: least value of the criterion that was demanded.
         value: exact value of the criterion, at least that.
         power_W: exact power.
-        price: slope of the front, from the multiplier of the demand [W per unit of the criterion].
+        price: slope of the front, from the multiplier of the demand [W per unit of the criterion]; NaN if the solver gives none.
         violation: exact total violation.
         x: (n,) as plain numbers.
     """
@@ -40,19 +44,20 @@ class FrontPoint:
     demanded: float
     value: float
     power_W: float
-    price: float
+    price: float = 0.0
     violation: float
     x: tuple[float, ...]
 
 
 def pareto_front(
     problem: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     *,
     points: int = 40,
     starts: int = 5,
     seed: int = 0,
-    progress: Callable[[str], None] = lambda note: None,
+    solver: Solver | None = None,
+    progress: Progress = unwatched,
 ) -> list[FrontPoint]:
     """Points of the front, by rising criterion, about evenly spaced along it.
 
@@ -67,6 +72,7 @@ def pareto_front(
         points: at least five.
         starts: random starts at both ends and at every third point.
         seed: of the random starts.
+        solver: with its settings; None for IPOPT with its defaults.
         progress: told what is done.
 
     Raises:
@@ -75,19 +81,17 @@ def pareto_front(
     if points < LEAST_POINTS:
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
     free = criterion.freed(problem)
-    low, high = front_ends(free, criterion, starts, seed)
-    settings = IpoptSettings()
-    ipopt = ipopt_for(free, settings, SOLVES)
+    low, high = front_ends(free, criterion, starts, seed, solver)
+    ready = (solver or IpoptSettings()).ready_for(free, SOLVES)
     rng = np.random.default_rng(seed)
-    found: dict[float, list[Attempt]] = {}
+    found: dict[float, list[Outcome]] = {}
 
     def attempt(at: float, x0: Array) -> None:
         limited = criterion.limited(free, at)
-        x0 = np.clip(x0, limited.lower, limited.upper)
-        found.setdefault(at, []).append(Attempt(x0, ipopt.run(limited, x0)))
+        found.setdefault(at, []).append(ready.run(limited, np.clip(x0, limited.lower, limited.upper)))
 
     def walk(order: Sequence[float], path_seed: int) -> None:
-        path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=SOLVES)
+        path = Continuation(starts=starts, seed=path_seed, solver=solver, solves=SOLVES)
         for at in order:
             limited = criterion.limited(free, at)
             found[at] = found.get(at, []) + path.run(limited, found.get(at, []))
@@ -105,27 +109,22 @@ def pareto_front(
     while len(found) < points:
         at, neighbours = _largest_gap(found)
         limited = criterion.limited(free, at)
-        for end in neighbours:
-            x0 = np.clip(end.x, limited.lower, limited.upper)
-            found.setdefault(at, []).append(Attempt(x0, ipopt.run_from(limited, end.guess)))
-        if best_end(found[at]) is None:
+        warm = (ready.run_from(limited, end) for end in neighbours)
+        found[at] = [*found.get(at, []), *(end for end in warm if end is not None)]
+        if best_success(found[at]) is None:
             for end in neighbours:
                 attempt(at, end.x)
         progress(f"{criterion.name} {at:.5g} {criterion.unit}")
     walk(sorted(found), seed)
     walk(sorted(found, reverse=True), seed + 1)
-    path = Continuation(settings=settings, solves=SOLVES)
-    return nondominated([p for at in sorted(found) if (p := _point(path, free, criterion, at, found[at])) is not None])
+    return nondominated([p for at in sorted(found) if (p := _point(free, criterion, at, found[at])) is not None])
 
 
-def point_at(free: GaitProblem, criterion: Criterion, least: float, x0: Array) -> FrontPoint | None:
+def point_at(free: GaitProblem, criterion: CompetingObjective, least: float, x0: Array) -> FrontPoint | None:
     """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
     limited = criterion.limited(free, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
-    settings = IpoptSettings()
-    end = ipopt_for(free, settings, SOLVES).run(limited, x0)
-    path = Continuation(settings=settings, solves=SOLVES)
-    return _point(path, free, criterion, least, [Attempt(x0, end)])
+    return _point(free, criterion, least, [IpoptSettings().ready_for(free, SOLVES).run(limited, x0)])
 
 
 def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
@@ -137,38 +136,25 @@ def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     return kept[::-1]
 
 
-def front_ends(free: GaitProblem, criterion: Criterion, starts: int, seed: int) -> tuple[FrontPoint, FrontPoint]:
-    """Least power, and the point beyond which the criterion is too dear."""
-    solution = solve(free, starts=2 * starts, seed=seed)
+def front_ends(
+    free: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None = None
+) -> tuple[FrontPoint, FrontPoint]:
+    """Least power, and the point beyond which the criterion costs too much."""
+    solution = solve(free, starts=2 * starts, seed=seed, solver=solver)
     if not solution.success:
         raise InputError(f"{free.name} has no front: {solution.status}")
-    low = _at(free, criterion, np.array(list(solution.x.values())))
+    low = _reached(free, criterion, solution)
     reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
     ending = rewarding(free, criterion).with_values(**{REWARD: reward})
-    solution = solve(ending, starts=2 * starts, seed=seed)
+    solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
     if not solution.success:
         raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
-    return low, _at(free, criterion, np.array(list(solution.x.values())))
+    return low, _reached(free, criterion, solution)
 
 
-def _at(problem: GaitProblem, criterion: Criterion, x: Array) -> FrontPoint:
-    from compare.judge import evaluate
-
-    judged = evaluate(problem, x)
-    value = criterion.value(problem, x)
-    return FrontPoint(
-        demanded=value,
-        value=value,
-        power_W=float(judged.objective["value"]),
-        price=0.0,
-        violation=judged.violation,
-        x=tuple(x.tolist()),
-    )
-
-
-def _largest_gap(found: dict[float, list[Attempt]]) -> tuple[float, list[End]]:
+def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
     """Middle of the longest gap between neighbours that were solved, and their ends."""
-    solved = [(at, end) for at in sorted(found) if (end := best_end(found[at])) is not None]
+    solved = [(at, end) for at in sorted(found) if (end := best_success(found[at])) is not None]
     at = np.array([a for a, _ in solved])
     cost = np.array([end.cost for _, end in solved])
     lengths = np.hypot(np.diff(at) / np.ptp(at), np.diff(cost) / np.ptp(cost))
@@ -177,17 +163,24 @@ def _largest_gap(found: dict[float, list[Attempt]]) -> tuple[float, list[End]]:
 
 
 def _point(
-    path: Continuation, free: GaitProblem, criterion: Criterion, at: float, attempts: list[Attempt]
+    free: GaitProblem, criterion: CompetingObjective, at: float, outcomes: Sequence[Outcome]
 ) -> FrontPoint | None:
-    solution = path.solution(criterion.limited(free, at), attempts)
-    if not solution.success:
+    solution = solution_of(criterion.limited(free, at), outcomes)
+    best = best_success(outcomes)
+    if best is None:
         return None
-    x = np.array(list(solution.x.values()))
+    price = math.nan if best.guess is None else criterion.price(solution)
+    return replace(_reached(free, criterion, solution), demanded=at, price=price)
+
+
+def _reached(free: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
+    """A solution as a point that demands what it reaches."""
+    x = free.check_x(solution.x)
+    value = criterion.value(free, x)
     return FrontPoint(
-        demanded=at,
-        value=criterion.value(free, x),
-        power_W=solution.objective,
-        price=criterion.price(solution),
+        demanded=value,
+        value=value,
+        power_W=exact_model(free).at(x, free.p).cost,
         violation=solution.violation,
         x=tuple(x.tolist()),
     )

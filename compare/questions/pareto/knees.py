@@ -10,7 +10,7 @@ import numpy as np
 from compare.questions.pareto.front import FrontPoint
 from nlp_gait.problem import Array
 
-# A bend is a knee if the front turns by so much [rad] within this part of its length, the ranges of both objectives being 1.
+# A bend is a knee if the front turns by this much [rad] within this part of its length, the ranges of both objectives being 1.
 LEAST_TURN = np.pi / 12
 WINDOW = 0.1
 

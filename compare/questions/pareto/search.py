@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.questions.pareto.criteria import Criterion
+from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
 from metaheuristics.interface import Array
 from metaheuristics.multi_objective import MultiObjective, minimize_many
@@ -38,10 +40,10 @@ class Scale:
         return self.largest - self.range * F[:, 1], self.least_power + self.power_range * F[:, 0]
 
 
-class PowerAndCriterion:
+class PowerAndCompeting:
     """The compiled objective with a criterion beside the power; see ``metaheuristics.multi_objective.ManyObjectives``."""
 
-    def __init__(self, objective: CompiledObjective, criterion: Criterion, scale: Scale) -> None:
+    def __init__(self, objective: CompiledObjective, criterion: CompetingObjective, scale: Scale) -> None:
         self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
         self._objective, self._criterion, self._scale = objective, criterion, scale
 
@@ -74,15 +76,14 @@ class SearchFront:
 
 def search_fronts(
     problem: GaitProblem,
-    criterion: Criterion,
+    criterion: CompetingObjective,
     scale: Scale,
     out: Path,
     *,
-    algorithms: Sequence[str],
-    budgets: Sequence[int],
+    searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
-    progress: Callable[[str], None],
+    progress: Progress = unwatched,
 ) -> list[SearchFront]:
     """Fronts of all runs; each run is kept as a file when it is done.
 
@@ -91,30 +92,25 @@ def search_fronts(
         criterion: beside power.
         scale: of both, so that no algorithm's distances are dominated by one of them.
         out: folder.
-        algorithms: of pymoo.
-        budgets: evaluations, rising.
+        searches: rising numbers of evaluations by algorithm of pymoo.
         runs: run k uses seed + k.
         seed: of the first run.
         progress: told which run is done.
 
     Raises:
-        SearchError: an algorithm or a budget that cannot be.
+        SearchError: an unknown algorithm, or a budget that is not allowed.
         OutputError: a run cannot be kept.
     """
-    steps = Steps(out, lambda note: None)
-    compiled = PowerAndCriterion(compile_objective(problem), criterion, scale)
+    steps = Steps(out, unwatched)
+    compiled = PowerAndCompeting(compile_objective(problem), criterion, scale)
     ranges = [scale.least_power, scale.power_range, scale.largest, scale.range]
-    identity = {**fingerprint(problem), "criterion": criterion.name, "budgets": list(budgets), "scale": ranges}
+    identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}
     fronts = []
-    for name in algorithms:
+    for name, budgets in searches.items():
         algorithm = MultiObjective(algorithm=name)
         for run in range(runs):
-            inputs = {**identity, "algorithm": repr(algorithm), "seed": seed + run}
-
-            def compute(algorithm: MultiObjective = algorithm, run: int = run) -> list[dict[str, Any]]:
-                snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed + run)
-                return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
-
+            inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed + run}
+            compute = partial(_snapshots, compiled, algorithm, budgets, seed + run)
             kept = steps(f"{name.lower()}-{run}", inputs, compute)
             for budget, snapshot in zip(budgets, kept, strict=True):
                 values, powers = scale.back(np.array(snapshot["F"]).reshape(-1, 2))
@@ -124,10 +120,18 @@ def search_fronts(
     return fronts
 
 
+def _snapshots(
+    compiled: PowerAndCompeting, algorithm: MultiObjective, budgets: Sequence[int], seed: int
+) -> list[dict[str, Any]]:
+    """What one run had found after each budget, as plain data."""
+    snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed)
+    return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
+
+
 def best_of_all(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
     """Points of all runs that none of them betters: if these are on or behind a front, all points are."""
     points = [
-        FrontPoint(demanded=v, value=v, power_W=w, price=0.0, violation=0.0, x=tuple(x))
+        FrontPoint(demanded=v, value=v, power_W=w, violation=0.0, x=tuple(x))
         for front in fronts
         for v, w, x in zip(front.values.tolist(), front.powers.tolist(), front.X.tolist(), strict=True)
     ]

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.compare import Challenge, Quality, challenge, quality
-from compare.questions.pareto.criteria import Criterion, criterion
+from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import FrontPoint, pareto_front
 from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
+from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
+from compare.study.task import plain_problem
 from metaheuristics.multi_objective import MultiObjective
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 
@@ -34,7 +38,7 @@ class ParetoStudy:
     """
 
     problem: GaitProblem
-    criterion: Criterion
+    criterion: CompetingObjective
     front: tuple[FrontPoint, ...]
     bends: Bends
     searches: tuple[SearchFront, ...]
@@ -47,9 +51,7 @@ class ParetoStudy:
         if self.challenge is not None:
             outcome = {key: value for key, value in asdict(self.challenge).items() if key != "front"}
         return {
-            "problem": self.problem.name,
-            "options": dict(self.problem.options),
-            "parameters": dict(self.problem.values),
+            **plain_problem(self.problem),
             "criterion": {"name": self.criterion.name, "unit": self.criterion.unit},
             "front": [asdict(point) for point in self.front],
             "knees": asdict(self.bends),
@@ -68,9 +70,9 @@ def pareto_study(
     searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
-    progress: Callable[[str], None],
+    progress: Progress = unwatched,
 ) -> ParetoStudy:
-    """The front, and the searches beside it; what is done is kept under ``out`` and not done again.
+    """The front, and the searches beside it; finished steps are kept under ``out`` and not done again.
 
     Args:
         problem: of the front.
@@ -84,71 +86,41 @@ def pareto_study(
         progress: told what is done.
 
     Raises:
-        UnknownNameError: no such criterion.
+        UnknownNameError: an unknown criterion.
         InputError: the problem trades nothing, or its front cannot be found.
-        SearchError: no such algorithm, a budget that cannot be, or pymoo is not installed.
+        SearchError: an unknown algorithm, a budget that is not allowed, or pymoo is not installed.
     """
-    beside = criterion(name, problem)
+    beside = competing_objective(name, problem)
     for algorithm, budgets in searches.items():
-        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # said now, not after the front
+        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # before the front, which takes long
     free = beside.freed(problem)
     steps = Steps(out, progress, code=[front_module])
     identity = {**fingerprint(free), "criterion": name}
 
-    def solved() -> list[dict[str, Any]]:
-        return [
-            asdict(p) for p in pareto_front(problem, beside, points=points, starts=starts, seed=seed, progress=progress)
-        ]
-
     inputs = {**identity, "points": points, "starts": starts, "seed": seed}
-    front = _points(steps(f"front-{name}", inputs, solved))
-    if not searches:
-        return _study(free, beside, front, (), None)
-    scale = Scale(front)
+    solved = partial(pareto_front, problem, beside, points=points, starts=starts, seed=seed, progress=progress)
+    kept = steps(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
+    front = [decoded(FrontPoint, point) for point in kept]
     found: list[SearchFront] = []
-    for algorithm, budgets in searches.items():
-        found += search_fronts(
-            free,
-            beside,
-            scale,
-            out,
-            algorithms=[algorithm],
-            budgets=list(budgets),
-            runs=runs,
-            seed=seed,
-            progress=progress,
+    outcome = None
+    if searches:
+        found = search_fronts(
+            free, beside, Scale(front), out, searches=searches, runs=runs, seed=seed, progress=progress
         )
-    best = best_of_all(found)
-
-    def answered() -> dict[str, Any]:
-        return asdict(challenge(free, beside, front, best, progress=progress))
-
-    asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
-    kept = steps(f"challenge-{name}", asked, answered)
-    outcome = Challenge(**{**kept, "front": tuple(_points(kept["front"]))})
-    return _study(free, beside, outcome.front, found, outcome)
-
-
-def _study(
-    free: GaitProblem,
-    beside: Criterion,
-    front: Sequence[FrontPoint],
-    found: Sequence[SearchFront],
-    outcome: Challenge | None,
-) -> ParetoStudy:
+        best = best_of_all(found)
+        asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
+        answered = partial(challenge, free, beside, front, best, progress=progress)
+        outcome = decoded(Challenge, steps(f"challenge-{name}", asked, lambda: asdict(answered())))
+        front = list(outcome.front)
     return ParetoStudy(
         problem=free,
         criterion=beside,
         front=tuple(front),
         bends=bends(front),
         searches=tuple(found),
-        qualities=tuple(quality(front, found)) if found else (),
+        qualities=tuple(quality(front, found)),
         challenge=outcome,
     )
-
-
-def _points(rows: Sequence[Mapping[str, Any]]) -> list[FrontPoint]:
-    return [FrontPoint(**{**row, "x": tuple(row["x"])}) for row in rows]
 
 
 def parse_searches(texts: Sequence[str]) -> dict[str, tuple[int, ...]]:

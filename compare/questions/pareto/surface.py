@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import new_figure, save, style
+from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label
-from compare.questions.pareto.criteria import Criterion, criterion
+from compare.questions.answer import Answer
+from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import front_ends
+from compare.report.document import Figure
+from compare.study.progress import Progress, unwatched
+from compare.study.task import plain_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +56,7 @@ class Surface:
     """
 
     problem: GaitProblem
-    criteria: tuple[Criterion, Criterion]
+    criteria: tuple[CompetingObjective, CompetingObjective]
     points: tuple[SurfacePoint, ...]
     infeasible: tuple[tuple[float, float], ...]
 
@@ -65,19 +68,19 @@ def pareto_surface(
     points: int,
     starts: int,
     seed: int,
-    progress: Callable[[str], None],
+    progress: Progress = unwatched,
 ) -> Surface:
-    """Least power over a square grid of at least so many points, from the cheapest values of both criteria to the largest.
+    """Least power over a square grid of at least this many points, from the cheapest values of both criteria to the largest.
 
     Args:
         problem: of the surface.
         names: of two criteria.
-        points: at least so many demands.
+        points: least number of pairs of demands.
         starts: random starts at both ends of the walk over the grid.
         seed: of these.
         progress: told after each solve.
     """
-    first, second = (criterion(name, problem) for name in names)
+    first, second = (competing_objective(name, problem) for name in names)
     free = second.freed(first.freed(problem))
     side = math.ceil(math.sqrt(points))
     grids = []
@@ -92,7 +95,7 @@ def pareto_surface(
         if not solution.success:
             infeasible.append(at)
             continue
-        x = np.array(list(solution.x.values()))
+        x = free.check_x(solution.x)
         found.append(
             SurfacePoint(
                 demanded=at,
@@ -116,19 +119,28 @@ def _meets(point: SurfacePoint, other: SurfacePoint) -> bool:
     return reached or point.demanded == other.demanded
 
 
-def surface_json(surface: Surface) -> dict[str, Any]:
-    """Plain data."""
-    return {
-        "problem": surface.problem.name,
-        "options": dict(surface.problem.options),
-        "parameters": dict(surface.problem.values),
-        "criteria": [{"name": c.name, "unit": c.unit} for c in surface.criteria],
-        "points": [asdict(point) for point in surface.points],
-        "infeasible": [list(at) for at in surface.infeasible],
-    }
+def surface_answer(surface: Surface) -> Answer:
+    """Least power over the grid of demands."""
+    problem, criteria = surface.problem, surface.criteria
+    names = "-".join(criterion.name for criterion in criteria)
+    met, all_pairs = len(surface.points), len(surface.points) + len(surface.infeasible)
+    shown = "Least power over the first demand; the colour says the second one."
+    figure = Figure(name=f"{problem.name}-surface-{names}", caption=shown, drawing=surface_figure(surface))
+    return Answer(
+        stem=f"{problem.name}-pareto-{names}",
+        title=f"{problem.name}: least power for two demands",
+        verdict=(f"{met} of {all_pairs} pairs of demands can be met.",),
+        parts=(figure,),
+        data={
+            **plain_problem(problem),
+            "criteria": [{"name": criterion.name, "unit": criterion.unit} for criterion in criteria],
+            "points": [asdict(point) for point in surface.points],
+            "infeasible": [list(at) for at in surface.infeasible],
+        },
+    )
 
 
-def surface_figure(surface: Surface) -> Figure:
+def surface_figure(surface: Surface) -> Drawing:
     """Lines of equal demand on the second criterion, coloured by it: power over the first one."""
     first, second = surface.criteria
     with style():
@@ -150,9 +162,3 @@ def surface_figure(surface: Surface) -> Figure:
         bar = figure.colorbar(matplotlib.cm.ScalarMappable(norm, shades), ax=axes)
         bar.set_label(f"at least this {axis_label(second.name, second.unit)}")
     return figure
-
-
-def write_surface(folder: Path, surface: Surface) -> list[Path]:
-    """Write the picture of a surface; returns its paths."""
-    names = "-".join(c.name for c in surface.criteria)
-    return list(save(surface_figure(surface), folder / f"{surface.problem.name}-surface-{names}"))

@@ -18,9 +18,9 @@ class Price:
         unit: of the quantity; ``"1"`` for a factor.
         value: its current value, 0 for what is added to a length.
         slope: change of the optimal objective for each unit.
-        step: natural step [unit], and how it is said.
-        words: for example ``"1 mm"``.
-        reach: change downwards and upwards up to which x* moves along one line.
+        step: natural step [unit].
+        words: the step in words, for example ``"1 mm"``.
+        reach: how far the quantity may change, down and up, while x* moves along one line.
         x: change of x* for each unit, by variable name; None where dependent bounds contradict each other.
         resolved: the objective's slope by solving again a little lower and higher; None if that was not asked for.
         x_error: largest difference of ``x`` and what solving again gives, in units of the largest entry; None without one.
@@ -68,7 +68,7 @@ class Prices:
 
     Attributes:
         problem: its name.
-        objective_name: and ``unit`` of it.
+        objective_name: for example ``"power"``.
         unit: of the objective.
         sense: in which it is optimised.
         objective: at the optimum.
@@ -78,7 +78,7 @@ class Prices:
         robot: quantities of the robot, largest change first; empty if the problem has no robot to choose.
         weak: bounds that hold without a price, or nearly hold: beyond them a derivative is one-sided.
         dependent: active rows that follow from others.
-        residual: by which the first-order conditions are missed.
+        residual: of the first-order conditions.
         reason: why there are no derivatives; None if there are.
     """
 

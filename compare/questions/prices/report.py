@@ -1,55 +1,102 @@
-"""Table and picture of prices."""
+"""Prices as an answer: tables and picture."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from compare.drawing.figures import new_figure, save, style
+from compare.analysis.units import heading, with_unit
+from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import name_in_words
+from compare.questions.answer import Answer, all_digits
 from compare.questions.prices.price import Price, Prices
-from nlp_gait.files import csv_text, write_text
+from compare.report.document import Figure, Part, Table, Value, text_table
+from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 SHOWN = 10  # bars of each kind
+LISTED = 12  # rows of the robot's table; all are in the CSV file
 UP, DOWN = "#D55E00", "#0072B2"
 # Scales at which most bars read as small numbers.
 PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
 
 
-def prices_csv(found: Prices) -> str:
-    """All quantities, one row each; slopes are those of the objective and of x* for each unit of the quantity."""
-    table: list[Sequence[object]] = []
-    names = list(found.x)
-    table.append(
-        (
-            "kind",
-            "quantity",
-            "unit",
-            "value",
-            "slope",
-            "natural_step",
-            "change_per_step",
-            "resolved_slope",
-            "one_step_less",
+def prices_answer(found: Prices, problem: GaitProblem) -> Answer:
+    """What holds the optimum back, and which error of the robot would change it most."""
+    ranges = problem.by_name(problem.scale)
+    stem, optimum = f"{found.problem}-prices", with_unit(found.objective, found.unit)
+    parts: list[Part] = []
+    if found.limits:
+        title = "What holds it back: change of the optimum for one step upwards of a limit or coefficient"
+        parts.append(text_table(_header(found), [_row(price, ranges) for price in found.limits], title))
+    parts.append(f"{found.free} other parameters cost nothing here")
+    if found.robot:
+        title = (
+            f"Which error of the robot would change it most, limits as they are (first {LISTED} of {len(found.robot)})"
         )
-        + ("one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in names))
+        parts.append(text_table(_header(found), [_row(price, ranges) for price in found.robot[:LISTED]], title))
+    parts.append(
+        f"First-order conditions hold to {found.residual:.1e}; {found.dependent} of the active rows follow from others. "
+        "x* moves along a line only as far as the last column says: beyond it, another kink or limit takes over."
     )
+    if found.weak:
+        parts.append(f"Held without a price, so that derivatives may differ on both sides: {', '.join(found.weak)}")
+    if found.limits or found.robot:
+        shown = "What one natural step of each limit costs, and what an error of the robot would change."
+        parts.append(Figure(name=stem, caption=shown, drawing=prices_figure(found)))
+    parts.append(_numbers(stem, found))
+    return Answer(
+        stem=stem,
+        title=f"{found.problem}: what each limit costs",
+        verdict=(f"{found.objective_name} {optimum}, to {found.sense}",),
+        parts=parts,
+        data=asdict(found),
+    )
+
+
+def _header(found: Prices) -> tuple[str, ...]:
+    steps = (heading(words, found.unit) for words in ("by the slope", "- step", "+ step"))
+    return ("quantity", "step", *steps, "error of slope, x*", "x* moves most in", "line [steps]")
+
+
+def _row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
+    furthest = price.furthest(ranges)
+    moves = "no derivative" if price.x is None else "-" if furthest is None else f"{furthest[0]} {furthest[1]:+.3g}"
+    down, up = (value / price.step for value in price.reach)
+    steps = ("-", "-") if price.one_step is None else ("none" if v is None else f"{v:+.5f}" for v in price.one_step)
+    line = f"{down:+.2g} to {up:+.2g}"
+    return (price.name, price.words, f"{price.per_step:+.5f}", *steps, _agreement(price), moves, line)
+
+
+def _agreement(price: Price) -> str:
+    """Relative difference of the slope of the optimum, and of x*, from what solving again gives."""
+    if price.one_step is None:
+        return "-"
+    return ", ".join("-" if error is None else f"{error:.0e}" for error in (price.error, price.x_error))
+
+
+def _numbers(stem: str, found: Prices) -> Table:
+    """All quantities; slopes are those of the objective and of x* for each unit of the quantity."""
+    header = [
+        *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
+        *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in found.x)),
+    ]
+    rows: list[list[Value]] = []
     for kind, group in (("limit", found.limits), ("robot", found.robot)):
         for price in group:
-            steps = price.one_step or (None, None)
-            numbers = (price.value, price.slope, price.step, price.per_step, price.resolved, *steps, *price.reach)
-            moves = [None if price.x is None else price.x[name] for name in names]
-            cells = ("" if value is None else repr(value) for value in (*numbers, *moves))
-            table.append((kind, price.name, price.unit, *cells))
-    return csv_text(table)
+            moves = [None if price.x is None else price.x[name] for name in found.x]
+            numbers = (price.value, price.slope, price.step, price.per_step, price.resolved)
+            rows.append(
+                [kind, price.name, price.unit, *numbers, *(price.one_step or (None, None)), *price.reach, *moves]
+            )
+    return all_digits(stem, header, rows)
 
 
-def prices_figure(found: Prices) -> Figure:
+def prices_figure(found: Prices) -> Drawing:
     """Bars: what a natural step of each limit costs, and what an error of the robot would change."""
     groups = [group for group in (found.limits, found.robot) if group]
     titles = ("raising a limit", "another robot under the same limits")
@@ -60,7 +107,7 @@ def prices_figure(found: Prices) -> Figure:
         for axes, group, title in zip(figure.subplots(1, len(groups), squeeze=False)[0], groups, titles, strict=False):
             _bars(axes, group[:SHOWN], scale)
             axes.set_title(title)
-            axes.set_xlabel(f"change of {found.objective_name}" + ("" if unit == "1" else f" [{unit}]"))
+            axes.set_xlabel(heading(f"change of {found.objective_name}", unit))
     return figure
 
 
@@ -72,11 +119,3 @@ def _bars(axes: Axes, group: Sequence[Price], scale: float) -> None:
     axes.invert_yaxis()
     axes.axvline(0.0, color="0.3", linewidth=0.6)
     axes.grid(visible=False, axis="y")
-
-
-def write_prices(folder: Path, found: Prices) -> list[Path]:
-    """Write table and picture; returns their paths."""
-    stem = folder / f"{found.problem}-prices"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, prices_csv(found))
-    return [table, *save(prices_figure(found), stem)] if found.limits or found.robot else [table]

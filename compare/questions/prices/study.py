@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,17 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
+from compare.questions.other_robot import is_mass, present_value, with_robot
 from compare.questions.prices.price import STANDS, Price, Prices
+from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.optima.continuation import Continuation, best_end
+from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
-from nlp_gait.backends.solvers.ipopt import ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
-from nlp_gait.robots import load_robot
-from nlp_gait.robots.perturbation import perturbed_name, quantities, split_name
+from nlp_gait.problem.solution import Outcome
+from nlp_gait.robots import Robot
+from nlp_gait.robots.perturbation import quantities
 
 # A limit whose natural step changes the optimum by less than this share of it costs nothing.
 FREE = 1e-9
@@ -34,26 +35,26 @@ MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 
 
 class Solved(NamedTuple):
-    """An optimum with IPOPT's end, from which neighbours are solved."""
+    """An optimum with the outcome near it, from which neighbours are solved."""
 
     problem: GaitProblem
-    end: End
+    near: Outcome
     optimum: Optimum
 
 
-def solved(problem: GaitProblem, starts: int, seed: int) -> Solved:
+def solved(problem: GaitProblem, starts: int, seed: int, solver: Solver | None = None) -> Solved:
     """Best optimum from random starts, to machine precision.
 
     Raises:
-        InputError: none converged to a feasible point, or the problem is too large.
+        InputError: none converged to a feasible point, the solver gives no multipliers, or the problem is too large.
     """
-    end = best_end(Continuation(starts=starts, seed=seed).run(problem))
-    if end is None:
+    near = best_success(Continuation(starts=starts, seed=seed, solver=solver).run(problem))
+    if near is None:
         raise InputError(
             f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
             "try more --starts, or relax the limits that `nlp-gait solve` names"
         )
-    return Solved(problem, end, optimum(problem, end))
+    return Solved(problem, near, optimum(problem, near))
 
 
 def prices(
@@ -62,24 +63,25 @@ def prices(
     starts: int = 10,
     seed: int = 0,
     checks: int = 3,
-    progress: Callable[[str], None] | None = None,
+    solver: Solver | None = None,
+    progress: Progress = unwatched,
 ) -> Prices:
     """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
 
     Args:
         spec: the problem.
-        starts: random starts of IPOPT.
+        starts: random starts.
         seed: of the starts.
-        checks: how many of the robot's dearest quantities are checked by solving again; of the parameters all are.
-        progress: called with a note as the work goes on.
+        checks: how many of the robot's quantities, largest change first, are checked by solving again; all parameters are.
+        solver: one that gives multipliers; None for IPOPT, which in any case sharpens what was found.
+        progress: told each step when it begins.
 
     Raises:
-        InputError: no optimum was found, or the problem is too large.
+        InputError: no optimum was found, the solver gives no multipliers, or the problem is too large.
     """
-    note = progress or (lambda _: None)
     problem = spec.load()
-    note("solving")
-    base = solved(problem, starts, seed)
+    progress("solving")
+    base = solved(problem, starts, seed, solver)
     found = base.optimum
     limits, free = list[Price](), 0
     robot: list[Price] = []
@@ -87,11 +89,11 @@ def prices(
         every = _ranked(_parameter_prices(found))
         limits = [price for price in every if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
         free = len(every) - len(limits)
-        limits = [_checked(base, price, note, partial(_moved, problem, price)) for price in limits]
-        if isinstance(problem.options.get("robot"), str):
-            robot = _ranked(_robot_prices(spec, found, note))
+        limits = [_checked(base, price, progress, partial(_moved, problem, price)) for price in limits]
+        if problem.robot is not None:
+            robot = _ranked(_robot_prices(spec, found, problem.robot, progress))
             robot[:checks] = [
-                _checked(base, price, note, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
+                _checked(base, price, progress, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
             ]
     return Prices(
         problem=problem.name,
@@ -110,17 +112,6 @@ def prices(
     )
 
 
-def robot_changes(spec: ProblemSpec) -> Iterator[tuple[str, float, float, NaturalStep]]:
-    """Name, value without a change, half-width of the differences and natural step of a robot's quantities."""
-    robot = str(spec.load().options["robot"])
-    _, changes = split_name(robot)
-    for name in quantities(load_robot(robot)):
-        if name.endswith("mass"):
-            yield name, changes.get(name, 1.0), MASS_DIFFERENCE, MASS
-        else:
-            yield name, changes.get(name, 0.0), LENGTH_DIFFERENCE_M, LENGTH
-
-
 def _parameter_prices(found: Optimum) -> list[Price]:
     """Prices of all parameters; both bounds of a fixed variable are one, under the variable's name."""
     derivatives, problem = parameter_sensitivities(found), found.problem
@@ -137,18 +128,20 @@ def _parameter_prices(found: Optimum) -> list[Price]:
     return prices
 
 
-def _robot_prices(spec: ProblemSpec, found: Optimum, note: Callable[[str], None]) -> list[Price]:
-    changes = list(robot_changes(spec))
+def _robot_prices(spec: ProblemSpec, found: Optimum, robot: Robot, progress: Progress) -> list[Price]:
+    names = quantities(robot)
+    values = [present_value(found.problem, name) for name in names]
 
     def pairs() -> Iterator[tuple[GaitProblem, GaitProblem, float]]:
-        for name, value, half, _ in changes:
-            note(f"robot with another {name}")
-            yield _with_robot(spec, name, value + half), _with_robot(spec, name, value - half), 2 * half
+        for name, value in zip(names, values, strict=True):
+            progress(f"robot with another {name}")
+            half = MASS_DIFFERENCE if is_mass(name) else LENGTH_DIFFERENCE_M
+            yield with_robot(spec, {name: value + half}), with_robot(spec, {name: value - half}), 2 * half
 
     derivatives = model_sensitivities(found, pairs())
     return [
-        _price(found.problem, derivatives, i, name, "1" if step is MASS else "m", value, step)
-        for i, (name, value, _, step) in enumerate(changes)
+        _price(found.problem, derivatives, i, name, *(("1", value, MASS) if is_mass(name) else ("m", value, LENGTH)))
+        for i, (name, value) in enumerate(zip(names, values, strict=True))
     ]
 
 
@@ -181,23 +174,12 @@ def _moved(problem: GaitProblem, price: Price, change: float) -> GaitProblem | N
 
 
 def _with_changed_robot(spec: ProblemSpec, price: Price, change: float) -> GaitProblem:
-    return _with_robot(spec, price.name, price.value + change)
+    return with_robot(spec, {price.name: price.value + change})
 
 
-def _with_robot(spec: ProblemSpec, quantity: str, value: float) -> GaitProblem:
-    """The problem with another robot under the same limits: a robot's error does not move them."""
-    problem = spec.load()
-    name, changes = split_name(str(problem.options["robot"]))
-    other = replace(spec, options={**spec.options, "robot": perturbed_name(name, {**changes, quantity: value})})
-    limits = {q.name: float(v) for q, v in zip(problem.parameters, problem.p, strict=True)}
-    return other.load().with_values(**limits)
-
-
-def _checked(
-    base: Solved, price: Price, note: Callable[[str], None], changed: Callable[[float], GaitProblem | None]
-) -> Price:
+def _checked(base: Solved, price: Price, progress: Progress, changed: Callable[[float], GaitProblem | None]) -> Price:
     """A price with what solving again says, from the unchanged optimum, a little and a natural step away."""
-    note(f"solving again with another {price.name}")
+    progress(f"solving again with another {price.name}")
     turn = min(abs(reach) for reach in price.reach)
     small = min(CHECK_SHARE * price.step, max(turn / 2, LEAST_CHECK_SHARE * price.step))
     low, high, less, more = (_neighbour(base, changed(d)) for d in (-small, small, -price.step, price.step))
@@ -213,7 +195,7 @@ def _checked(
     )
 
 
-def _x_error(problem: GaitProblem, price: Price, low: End, high: End, small: float) -> float | None:
+def _x_error(problem: GaitProblem, price: Price, low: Outcome, high: Outcome, small: float) -> float | None:
     if price.x is None:
         return None
     expected = np.array(list(price.x.values())) / problem.scale
@@ -223,12 +205,11 @@ def _x_error(problem: GaitProblem, price: Price, low: End, high: End, small: flo
     return float(np.abs((high.x - low.x) / (2 * small) / problem.scale - expected).max() / largest)
 
 
-def _neighbour(base: Solved, problem: GaitProblem | None) -> End | None:
+def _neighbour(base: Solved, problem: GaitProblem | None) -> Outcome | None:
     """Optimum of a neighbour, None if there is none or IPOPT does not get there."""
     if problem is None:
         return None
-    ipopt = ipopt_for(problem, SHARP)
-    end = ipopt.run_from(problem, base.end.guess)
-    if not end.success:
-        end = ipopt.run(problem, np.clip(base.end.x, problem.lower, problem.upper))
-    return end if end.success and math.isfinite(end.cost) else None
+    end = SHARP.run_from(problem, base.near)
+    if end is None or not end.success:
+        end = SHARP.run(problem, np.clip(base.near.x, problem.lower, problem.upper))
+    return end if end.success else None

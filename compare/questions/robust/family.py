@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from compare.questions.other_robot import present_value, robot_name, with_robot
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
+from nlp_gait.backends.exact import ExactValues, exact_model
 from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.robots.perturbation import perturbed_name, split_name
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
-# Limits for which a worst corner is looked for in one round, dearest violation first, one of each group of rows.
+# Limits for which a round looks for the worst corner: the largest violations, one of each group of rows.
 CORNERS_IN_ROUND = 3
-# A corner costs more if it does so by this share of the worst known one.
+# A corner costs more than the worst known one if it does so by more than this share.
 COST_TOLERANCE = 1e-6
 
 Box = Mapping[str, float]  # half-widths by the robot's quantity
@@ -29,8 +30,8 @@ class Worst:
         violation: largest, of one row, in its unit; 0 if all limits hold.
         row: whose it is.
         unit: of the violation.
-        corner: quantities' changes in the robot that it happens with.
-        power_W: largest, whichever robot it happens with.
+        corner: changes of the quantities of the robot for which it happens.
+        power_W: largest over all robots of the set.
     """
 
     violation: float
@@ -46,13 +47,11 @@ class Family:
     def __init__(self, spec: ProblemSpec, box: Box) -> None:
         self._spec, self._box = spec, box
         self.nominal = spec.load()
-        self._limits = {q.name: float(v) for q, v in zip(self.nominal.parameters, self.nominal.p, strict=True)}
         self._problems: dict[Corner, GaitProblem] = {}
-        self._robot, self._base = split_name(str(self.nominal.options["robot"]))
 
     @property
     def centre(self) -> Corner:
-        """No change."""
+        """The corner without a change."""
         return (0,) * len(self._box)
 
     def changes(self, corner: Corner) -> dict[str, float]:
@@ -61,25 +60,22 @@ class Family:
 
     def robot(self, corner: Corner) -> str:
         """Name of a corner's robot."""
-        values = {
-            name: self._base.get(name, float(name.endswith("mass"))) + change
-            for name, change in self.changes(corner).items()
-        }
-        return perturbed_name(self._robot, {**self._base, **values})
+        return robot_name(self.nominal, self._values(corner))
+
+    def values(self, corner: Corner, x: Array) -> ExactValues:
+        """Exact values at x (n,) with a corner's robot."""
+        return exact_model(self.problem(corner)).at(x, self.nominal.p)
 
     def problem(self, corner: Corner) -> GaitProblem:
         """The problem with a corner's robot."""
         if not any(corner):
             return self.nominal
         if corner not in self._problems:
-            other = replace(self._spec, options={**self._spec.options, "robot": self.robot(corner)})
-            self._problems[corner] = other.load().with_values(**self._limits)
+            self._problems[corner] = with_robot(self._spec, self._values(corner))
         return self._problems[corner]
 
-    def values(self, corner: Corner, x: Array) -> tuple[float, Array, Array, Array]:
-        """Cost, rows and their bounds at x (n,)."""
-        cost, _, rows, lower, upper, _ = exact_model(self.problem(corner)).function(x, self.nominal.p)
-        return float(cost), *(np.array(part).ravel() for part in (rows, lower, upper))  # type: ignore[return-value]
+    def _values(self, corner: Corner) -> dict[str, float]:
+        return {name: present_value(self.nominal, name) + by for name, by in self.changes(corner).items()}
 
     def worst(self, x: Array, corners: Sequence[Corner]) -> Worst:
         """The worst that a gait meets in some corners; rows are compared in units of their scales."""
@@ -87,9 +83,9 @@ class Family:
         largest = (-np.inf, 0, 0.0, self.centre)
         power = -np.inf
         for corner in corners:
-            cost, rows, lower, upper = self.values(corner, x)
-            power = max(power, cost)
-            excess = np.maximum(np.maximum(lower - rows, rows - upper), 0.0)
+            at = self.values(corner, x)
+            power = max(power, at.cost)
+            excess = np.maximum(np.maximum(at.lower - at.g, at.g - at.upper), 0.0)
             i = int(np.argmax(excess / model.row_scales))
             largest = max(largest, (float(excess[i] / model.row_scales[i]), i, float(excess[i]), corner))
         _, i, violation, corner = largest
@@ -104,15 +100,16 @@ class Family:
     def worst_corners(self, x: Array, known: Sequence[Corner], cost: float) -> list[Corner]:
         """New corners that break a limit at x, or cost more than is known: the worst by the rows' derivatives."""
         model = exact_model(self.nominal)
-        own_cost, rows, lower, upper = self.values(self.centre, x)
+        own = self.values(self.centre, x)
         slopes, cost_slopes = [], []
         for k in range(len(self._box)):
             high, low = (self.values(tuple(sign * (i == k) for i in range(len(self._box))), x) for sign in (1, -1))
-            slopes.append((high[1] - low[1]) / 2)
-            cost_slopes.append((high[0] - low[0]) / 2)
+            slopes.append((high.g - low.g) / 2)
+            cost_slopes.append((high.cost - low.cost) / 2)
         slope = np.array(slopes)
         reach = np.abs(slope).sum(axis=0)
-        short, long = (lower - rows + reach) / model.row_scales, (rows + reach - upper) / model.row_scales
+        short = (own.lower - own.g + reach) / model.row_scales
+        long = (own.g + reach - own.upper) / model.row_scales
         candidates = [tuple(np.where(np.array(cost_slopes) >= 0.0, 1, -1).tolist())]
         groups: set[str] = set()
         for i in np.argsort(-np.maximum(short, long)):
@@ -126,5 +123,5 @@ class Family:
         return [corner for corner in dict.fromkeys(candidates) if corner not in known and self._worse(corner, x, cost)]
 
     def _worse(self, corner: Corner, x: Array, cost: float) -> bool:
-        exact_cost, violation = (float(v) for v in exact_model(self.problem(corner)).function(x, self.nominal.p)[:2])
-        return violation > FEASIBILITY_TOLERANCE or exact_cost > cost * (1.0 + COST_TOLERANCE)
+        at = self.values(corner, x)
+        return not at.violation <= FEASIBILITY_TOLERANCE or at.cost > cost * (1.0 + COST_TOLERANCE)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from compare.questions.robust.study import Robust
+from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Result
@@ -42,8 +43,8 @@ class Played:
     predicted_margin_m: float
 
 
-def played(spec: ProblemSpec, found: Robust, progress: Callable[[str], None] | None = None) -> tuple[Played, ...]:
-    """Both gaits on every robot of the scenario problem.
+def played(spec: ProblemSpec, found: Robust, progress: Progress = unwatched) -> tuple[Played, ...]:
+    """Both gaits on every robot of the scenario problem; ``progress`` is told of each.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -52,25 +53,22 @@ def played(spec: ProblemSpec, found: Robust, progress: Callable[[str], None] | N
     for robot in found.robots:
         for gait, x in (("nominal", found.nominal_x), ("robust", found.x)):
             runs.append(_play(spec, robot, gait, x))
-            if progress is not None:
-                progress(f"{gait} gait on {robot[:40]}")
+            progress(f"{gait} gait on {robot[:40]}")
     return tuple(runs)
 
 
 def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> Played:
-    problem = replace(spec, options={**spec.options, "robot": robot}).load()
-    point = np.array([x[name] for name in problem.names])
+    problem = spec.with_options(robot=robot).load()
+    point = problem.check_x(x)
     plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
     trace = play(plan, drive=drive)
-    model = exact_model(problem)
-    indexes = np.array(model.function(point, problem.p)[5]).ravel()
     return Played(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,
         largest_tilt_deg=math.degrees(float(trace.tilt.max())),
         margin_m=lateral_margin(plan, trace, drive),
-        predicted_margin_m=float(indexes[model.index_names.index(MARGIN)]),
+        predicted_margin_m=exact_model(problem).at(point, problem.p).indexes[MARGIN],
     )
 
 

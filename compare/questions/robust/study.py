@@ -1,28 +1,28 @@
 """The price of a motion that keeps its limits whatever masses and soles turn out to be within their tolerances.
 
 The uncertain robots form a box: each mass within a share, each sole within a distance. A scenario problem over a few of its
-corners is solved; then the corner that is worst for each limit, by the rows' derivatives, joins them, until no corner that is
-found so breaks a limit or costs more.
+corners is solved; then the corner that is worst for each limit, by the rows' derivatives, joins them, until none that is found in
+this way breaks a limit or costs more.
 
 Source:
     Mutapcic, Boyd (2009), Cutting-set methods for robust convex optimization with pessimizing oracles, used here on a problem
-    that is not convex: the corners found are checked exactly, that there is no worse point in the box is not proven.
+    that is not convex: the corners are checked exactly, but it is not proven that the box holds no worse point.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from compare.questions.robust.family import Box, Corner, Family, Worst
+from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem.solution import Solution
 from nlp_gait.problem.worst_case import worst_case
-from nlp_gait.robots import load_robot
 
 ROUNDS = 8
 
@@ -36,7 +36,7 @@ class Robust:
         box: half-widths by quantity.
         corners: changes of the robots in the scenario problem; the first is the nominal one, without changes.
         robots: their names.
-        rounds: in which corners were added.
+        rounds: number of searches for worse corners.
         settled: whether the last round found no worse corner.
         status: of the last solution.
         nominal_x: optimum for the nominal robot alone.
@@ -68,11 +68,11 @@ class Robust:
 
 def boxes(spec: ProblemSpec, mass: float, sole_m: float) -> dict[str, Box]:
     """Boxes of uncertainty, each wider than the one before: soles alone, with the whole robot's mass, with each link's."""
-    robot = str(spec.load().options.get("robot", ""))
-    if not spec.name.startswith("nao-") or not robot:
-        raise InputError(f"only the NAO problems have a robot to be uncertain about, got {spec.name!r}")
+    robot = spec.load().robot
+    if robot is None:
+        raise InputError(f"problem {spec.name!r} has no robot to be uncertain about; the NAO problems have one")
     soles = {"sole_x_m": sole_m, "sole_y_m": sole_m}
-    links = {f"{link}.mass": mass for link in load_robot(robot).links}
+    links = {f"{link}.mass": mass for link in robot.links}
     return {
         "soles": soles,
         "soles, mass of the whole": {"mass": mass, **soles},
@@ -88,7 +88,7 @@ def robust(
     starts: int = 10,
     seed: int = 0,
     samples: int = 20,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = unwatched,
 ) -> Robust:
     """Robust optimum over a box of robots.
 
@@ -99,18 +99,17 @@ def robust(
         starts: random starts of the nominal problem.
         seed: of the starts and of the random corners.
         samples: random corners on which the robust optimum is checked.
-        progress: called with a note as the work goes on.
+        progress: told each step when it begins.
     """
-    note = progress or (lambda _: None)
     family = Family(spec, box)
-    note(f"{name}: nominal optimum")
+    progress(f"{name}: nominal optimum")
     nominal = solve(family.nominal, starts=starts, seed=seed)
     _require(nominal, "the nominal problem")
-    first = x = np.array([nominal.x[variable] for variable in family.nominal.names])
+    first = x = family.nominal.check_x(nominal.x)
     corners: list[Corner] = [family.centre]
     found, settled, rounds = nominal, False, 0
     for rounds in range(1, ROUNDS + 1):
-        note(f"{name}: round {rounds}, {len(corners)} scenarios")
+        progress(f"{name}: round {rounds}, {len(corners)} scenarios")
         worse = family.worst_corners(x, corners, float(found.objective))
         if not worse:
             settled = True
@@ -118,10 +117,10 @@ def robust(
         corners += worse
         found = solve(worst_case([family.problem(corner) for corner in corners]), x0=x)
         _require(found, f"{len(corners)} scenarios together ({name})")
-        x = np.array([found.x[variable] for variable in family.nominal.names])
+        x = family.nominal.check_x(found.x)
     rng = np.random.default_rng(seed)
     random = [tuple(rng.choice((-1, 1), len(box)).tolist()) for _ in range(samples)]
-    note(f"{name}: {samples} random corners")
+    progress(f"{name}: {samples} random corners")
     return Robust(
         name=name,
         box=dict(box),
@@ -134,7 +133,7 @@ def robust(
         nominal_W=nominal.objective,
         nominal_worst=family.worst(first, corners),
         x=found.x,
-        power_W=family.values(family.centre, x)[0],
+        power_W=family.values(family.centre, x).cost,
         worst_W=found.objective,
         worst=family.worst(x, corners),
         random_worst=family.worst(x, random or corners),

@@ -1,44 +1,72 @@
-"""Table and picture of a sweep."""
+"""A sweep as an answer: table and picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, new_figure, save, style
-from compare.drawing.labels import axis_label, quantity
+from compare.analysis.units import with_unit
+from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.labels import axis_label, quantity, units_of
+from compare.questions.answer import Answer, all_digits
 from compare.questions.sweep.study import SweepPoint
-from nlp_gait.files import csv_text, write_text
+from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
 
 
-def sweep_csv(points: Sequence[SweepPoint], problem: GaitProblem) -> str:
-    """Table of all points, one row each, units in the header."""
-    axes, names = list(points[0].at), list(problem.names)
-    table: list[Sequence[object]] = []
-    unit = problem.objective.unit
-    objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
+def sweep_answer(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Answer:
+    """Optima over the grid."""
+    axes, objective = tuple(points[0].at), problem.objective
+    stem = f"{problem.name}-sweep-{'-'.join(axes)}-{algorithm}"
+    rows = [
+        (
+            *(f"{value:g}" for value in p.at.values()),
+            with_unit(p.objective if p.feasible else None, objective.unit),
+            p.status,
+        )
+        for p in points
+    ]
+    shown = "Optimum over the first axis; crosses where no feasible point was found."
+    return Answer(
+        stem=stem,
+        title=f"{problem.name} by {algorithm}",
+        parts=(
+            text_table((*axes, objective.name, "status"), rows, "Optima"),
+            Figure(name=stem, caption=shown, drawing=sweep_figure(points, problem, algorithm)),
+            _numbers(stem, points, problem),
+        ),
+        data={"problem": problem.name, "points": [asdict(point) for point in points]},
+    )
+
+
+def _numbers(stem: str, points: Sequence[SweepPoint], problem: GaitProblem) -> Table:
+    axes, unit = list(points[0].at), problem.objective.unit
     # A variable may be an axis too; its column then says what the axis asked for, exactly.
-    columns = [name for name in names if name not in axes]
-    table.append([*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"])
-    for point in points:
-        at = [repr(value) for value in point.at.values()]
-        x = [repr(point.x[name]) for name in columns]
-        numbers = [repr(point.objective), str(point.feasible).lower(), repr(point.violation)]
-        table.append([*at, *numbers, *x, point.evaluations, f"{point.time_s:.4f}", point.status])
-    return csv_text(table)
+    columns = [name for name in problem.names if name not in axes]
+    objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
+    header = [*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"]
+    rows: list[list[Value]] = [
+        [
+            *(*p.at.values(), p.objective, p.feasible, p.violation),
+            *(p.x[name] for name in columns),
+            *(p.evaluations, f"{p.time_s:.4f}", p.status),
+        ]
+        for p in points
+    ]
+    return all_digits(stem, header, rows)
 
 
-def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Figure:
+def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Drawing:
     """Optimum over the first axis, one line for each combination of the others; infeasible points as crosses at the bottom."""
     first, *others = points[0].at
-    units = {v.name: v.unit for v in problem.variables} | {q.name: q.unit for q in problem.parameters}
+    units, objective = units_of(problem), problem.objective
     lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
     with style():
         import matplotlib
@@ -52,23 +80,15 @@ def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: 
             values = [p.objective if p.feasible else np.nan for p in line]
             colour = shade if others else COLOURS.get(algorithm, shade)
             axes.plot([p.at[first] for p in line], values, "o-", color=colour, label=label or algorithm)
-        infeasible = sorted({p.at[first] for p in points if not p.feasible})
-        if infeasible:
-            bottom = axes.get_xaxis_transform()
-            axes.plot(
-                infeasible, np.full(len(infeasible), 0.03), "x", color="0.4", label="infeasible", transform=bottom
-            )
+        mark(axes, sorted({p.at[first] for p in points if not p.feasible}), "infeasible")
         axes.set_xlabel(axis_label(first, units[first]))
-        axes.set_ylabel(
-            "least " * (problem.objective.sign > 0) + axis_label(problem.objective.name, problem.objective.unit)
-        )
+        axes.set_ylabel("least " * (objective.sign > 0) + axis_label(objective.name, objective.unit))
         figure.legend(loc="outside right upper") if others else axes.legend()
     return figure
 
 
-def write_sweep(folder: Path, points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> list[Path]:
-    """Write the table and the picture of a sweep; returns their paths."""
-    stem = folder / f"{problem.name}-sweep-{'-'.join(points[0].at)}-{algorithm}"
-    table = stem.with_name(f"{stem.name}.csv")
-    write_text(table, sweep_csv(points, problem))
-    return [table, *save(sweep_figure(points, problem, algorithm), stem)]
+def mark(axes: Axes, at: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", up: float = 0.03) -> None:
+    """Marks at some values of x, at a share ``up`` of the axes' height; nothing for no values."""
+    if at:
+        place = axes.get_xaxis_transform()
+        axes.plot(at, np.full(len(at), up), marker, color=colour, label=label, transform=place)

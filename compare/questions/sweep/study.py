@@ -1,19 +1,22 @@
-"""A problem solved over a grid of parameter values or fixed variables: the true curve that search histories only scatter over."""
+"""A problem solved over a grid of parameter values or fixed variables: the true curve, around which search histories scatter."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
+from compare.study.progress import Progress, unwatched
+from compare.study.record import RunRecord
 from compare.study.runner import run_task
-from compare.study.task import IPOPT, ProblemSpec, Stop, Task, check_task
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
@@ -37,7 +40,7 @@ class SweepPoint:
         at: value of each axis.
         objective: exact value, in the problem's sense.
         feasible: a feasible optimum was found.
-        status: in words; names the rows in the way if there is none.
+        status: in words; without a feasible point it names the rows that stand in the way.
         x: by variable name.
         violation: exact total violation.
         evaluations: calls of f.
@@ -84,21 +87,21 @@ def sweep(
     starts: int = 5,
     evaluations: int = 10_000,
     seed: int = 0,
-    progress: Callable[[], None] | None = None,
+    progress: Progress = unwatched,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
 
-    IPOPT walks the grid there and back so that each point is a neighbour of the last and starts from it; a search algorithm
-    starts anew at each. Infeasible points are kept, with the rows that stand in the way.
+    An NLP solver walks the grid there and back so that each point is a neighbour of the last and starts from it; a search
+    algorithm starts anew at each. Infeasible points are kept, with the rows that stand in the way.
 
     Args:
         spec: problem with its other values.
         axes: at least one.
-        algorithm: ``"ipopt"`` or a search algorithm.
-        starts: random starts of IPOPT at both ends of its walk, and where no neighbour helps.
-        evaluations: budget of a search run.
+        algorithm: an NLP solver or a search algorithm.
+        starts: random starts of an NLP solver at both ends of its walk, and where no neighbour helps.
+        evaluations: budget of a search run, and of a run of SLSQP.
         seed: of starts and searches.
-        progress: called ``count_solves`` times.
+        progress: told of each solve, ``count_solves`` times.
 
     Raises:
         UnknownNameError: an axis is neither a variable nor a parameter; no such algorithm.
@@ -109,15 +112,15 @@ def sweep(
     if len(set(names)) < len(names):
         raise InputError(f"each axis must be named once, got {', '.join(names)}")
     walk = _snake(axes)
-    specs = [_with(spec, axes, at) for at in walk]  # all checked before the work
     named = [dict(zip(names, at, strict=True)) for at in walk]
-    if algorithm == IPOPT:
-        solutions, sentence = _solutions([s.load() for s in specs], starts, seed, progress)
-        points = [None if s is None else _ipopt_point(at, s) for at, s in zip(named, solutions, strict=True)]
+    problem = spec.load()
+    specs = [replace(spec, values=dict(placed(problem, at).values)) for at in named]  # all checked before the work
+    tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
+    check_task(tasks[0])
+    if not tasks[0].is_search:
+        solutions, sentence = _solutions([s.load() for s in specs], tasks[0].solver(), starts, seed, progress)
+        points = [None if s is None else _solved_point(at, s) for at, s in zip(named, solutions, strict=True)]
     else:
-        stop = Stop(evaluations=evaluations)
-        tasks = [Task(problem=s, algorithm=algorithm, stop=stop, seed=seed) for s in specs]
-        check_task(tasks[0])
         points, sentence = _search_points(named, tasks, progress)
     found = dict(zip(walk, points, strict=False))
     grid = [found.get(at) for at in itertools.product(*(axis.values for axis in axes))]
@@ -128,17 +131,14 @@ def sweep(
 
 
 def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
-    """How often a sweep solves a problem: IPOPT twice at each point of the grid."""
-    return math.prod(len(axis.values) for axis in axes) * (2 if algorithm == IPOPT else 1)
+    """How often a sweep solves a problem: an NLP solver twice at each point of the grid."""
+    return math.prod(len(axis.values) for axis in axes) * (2 if algorithm in GRADIENT_SOLVERS else 1)
 
 
-def _with(spec: ProblemSpec, axes: Sequence[Axis], at: Sequence[float]) -> ProblemSpec:
-    """The problem at one point of the grid."""
-    problem = spec.load()
-    for axis, value in zip(axes, at, strict=True):
-        fixed = axis.name in problem.names
-        problem = problem.fix(**{axis.name: value}) if fixed else problem.with_values(**{axis.name: value})
-    return replace(spec, values=dict(problem.values))
+def placed(problem: GaitProblem, at: Mapping[str, float]) -> GaitProblem:
+    """The problem at one point of the grid: parameters set, variables fixed."""
+    fixed = {name: value for name, value in at.items() if name in problem.names}
+    return problem.with_values(**{name: at[name] for name in at if name not in fixed}).fix(**fixed)
 
 
 def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
@@ -154,32 +154,34 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
 
 
 def _solutions(
-    problems: Sequence[GaitProblem], starts: int, seed: int, progress: Callable[[], None] | None
+    problems: Sequence[GaitProblem], solver: Solver, starts: int, seed: int, progress: Progress
 ) -> tuple[Sequence[Solution | None], str]:
     """Solutions along the walk, and how far it came if it was interrupted."""
     try:
-        return solve_both_ways(problems, starts=starts, seed=seed, progress=progress), ""
+        found = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
+        return found, ""
     except Interrupted as interrupt:
         return cast("list[Solution | None]", interrupt.partial), interrupt.sentence
 
 
 def _search_points(
-    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Callable[[], None] | None
+    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Progress
 ) -> tuple[list[SweepPoint | None], str]:
     """Points along the walk, and how far it came if it was interrupted."""
     points: list[SweepPoint | None] = []
     try:
         for at, task in zip(named, tasks, strict=True):
             with remembered_interrupts() as check:
-                point = _search_point(at, task, progress)
+                record = run_task(task)
+                progress("")
                 check()
-            points.append(point)
+            points.append(_search_point(at, record))
     except KeyboardInterrupt:
         return points, f"interrupted after {len(points)} of {len(tasks)} points"
     return points, ""
 
 
-def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
+def _solved_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
     return SweepPoint(
         at=at,
         objective=solution.objective,
@@ -192,10 +194,7 @@ def _ipopt_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
     )
 
 
-def _search_point(at: Mapping[str, float], task: Task, progress: Callable[[], None] | None) -> SweepPoint:
-    record = run_task(task)
-    if progress is not None:
-        progress()
+def _search_point(at: Mapping[str, float], record: RunRecord) -> SweepPoint:
     verdict = record.verdict
     return SweepPoint(
         at=at,

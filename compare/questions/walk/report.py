@@ -1,36 +1,156 @@
-"""Pictures of walking: what it costs along an axis, and one cycle over two steps."""
+"""What walking costs along an axis, as an answer: tables, and pictures of the cost and of one cycle over two steps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import new_figure, save, style
-from compare.drawing.labels import axis_label
-from compare.questions.walk.study import Gait
+from compare.analysis.units import millimetres, with_unit
+from compare.drawing.figures import new_figure, style
+from compare.drawing.labels import axis_label, name_in_words, units_of
+from compare.questions.answer import Answer, all_digits, table_of
+from compare.questions.sweep.report import mark
+from compare.questions.walk.study import Gait, result_of
+from compare.report.document import Figure, Part, Table, Value
+from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
-from nlp_gait.problems.nao.body import nao
-from nlp_gait.problems.nao.cycle_motion import TIMES
+from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.steps import walk
+from nlp_gait.simulation.walking import Walk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
 LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+# Indexes of the table of numbers.
+INDEXES = (
+    "power_W",
+    "energy_J_per_m",
+    "cost_of_transport",
+    "speed_m_s",
+    "step_length_m",
+    "ssp_power_W",
+    "dsp_power_W",
+    "ssp_dbm_x_min_m",
+    "ssp_dbm_y_min_m",
+    "ssp_dbm_x_mean_m",
+    "ssp_dbm_y_mean_m",
+    "dsp_dbm_x_mean_m",
+    "dsp_dbm_y_mean_m",
+    "touch_down_torque_jump_Nm",
+    "lift_off_torque_jump_Nm",
+)
+# What it says of the walk in the engine, and of the measurements there.
+WALKED = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
+MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
 
 
-def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
+def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
+    """What walking costs along the axis, from at least one gait."""
+    (name,), problem = gaits[0].found.at, spec.load()
+    feasible = [gait for gait in gaits if gait.found.feasible]
+    results = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
+    cheapest_cycles = table_of(
+        "Cheapest cycles",
+        feasible,
+        {
+            name: lambda gait: f"{gait.at:g}",
+            "power": lambda gait: f"{gait.indexes['power_W']:.4f} W",
+            "cost of transport": lambda gait: f"{gait.indexes['cost_of_transport']:.4f}",
+            "step": lambda gait: f"{gait.indexes['step_length_m']:.4f} m",
+            "single support": lambda gait: f"{gait.found.x[problem.durations[0]]:.3f} s",
+            "double support": lambda gait: f"{gait.found.x[problem.durations[1]]:.3f} s",
+        },
+    )
+    costs = Figure(
+        name=f"{problem.name}-cost",
+        caption="Cost of transport, step and times; crosses where no feasible cycle was found.",
+        drawing=cost_figure(gaits, problem),
+    )
+    parts: list[Part] = [
+        cheapest_cycles,
+        *(f"{name} = {gait.at:g}: {gait.found.status}" for gait in gaits if not gait.found.feasible),
+        *_walks(name, gaits),
+        costs,
+    ]
+    if feasible:
+        cheapest = min(feasible, key=lambda gait: gait.indexes["cost_of_transport"])
+        drawing = cycle_figure(result_of(spec, cheapest.found))
+        caption = "Two steps of the cheapest cycle: hip and feet, and the left leg's angles."
+        parts.append(Figure(name=problem.name, caption=caption, drawing=drawing))
+    stem = f"{problem.name}-walk"
+    parts.append(_numbers(stem, gaits))
+    return Answer(
+        stem=stem,
+        title=f"{problem.name}: cheapest cycles over {name}",
+        parts=parts,
+        data={"gaits": [gait.to_json() for gait in gaits]},
+        results={
+            stem: {**plain_problem(result.problem), "x": result.problem.by_name(result.x)}
+            for stem, result in results.items()
+        },
+    )
+
+
+def _phase(duration: str) -> str:
+    """A phase by the variable that holds its duration, for example ``single support``."""
+    return name_in_words(duration, "s").removesuffix(" time")
+
+
+def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
+    """How the gaits that were played fared."""
+    walks = [(gait.at, gait.walk, gait.walk.measurements) for gait in gaits if gait.walk is not None]
+    if not walks:
+        return []
+    columns: dict[str, Callable[[tuple[float, Walk, Measurements]], str]] = {
+        name: lambda row: f"{row[0]:g}",
+        "fate": lambda row: _fate(row[1]),
+        "walked": lambda row: millimetres(row[1].walked_m, ".0f"),
+        "of": lambda row: millimetres(row[1].planned_m, ".0f"),
+        "drift": lambda row: millimetres(row[1].drift_m, ".0f"),
+        "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".1f"),
+        "tilt": lambda row: with_unit(row[2].largest_tilt_deg, "deg", ".1f"),
+        "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".3f"),
+        "mechanical power": lambda row: with_unit(row[2].measured.mechanical_W, "W", ".3f"),
+        "model": lambda row: with_unit(row[2].predicted.mechanical_W, "W", ".3f"),
+        "energy": lambda row: with_unit(row[1].energy_J_per_m, "J/m", ".1f"),
+    }
+    return [table_of(f"{walks[0][1].steps} steps in the physics engine, open loop", walks, columns)]
+
+
+def _fate(walked: Walk) -> str:
+    fell_at_s = walked.measurements.fell_at_s
+    fate = "walks" if fell_at_s is None else f"falls at {fell_at_s:.2f} s"
+    return fate if walked.steps_done == walked.steps else f"{fate}, {walked.steps_done} steps"
+
+
+def _numbers(stem: str, gaits: Sequence[Gait]) -> Table:
+    (name,), x = gaits[0].found.at, gaits[0].found.x
+    own = f"at {name}" if name in x or name in INDEXES else name
+    header = [own, "feasible", *INDEXES, *x, *(f"engine_{key}" for key in (*WALKED, *MEASURED)), "status"]
+    rows: list[list[Value]] = []
+    for gait in gaits:
+        engine: list[Value] = [None] * (len(WALKED) + len(MEASURED))
+        if gait.walk is not None:
+            found = gait.walk.measurements
+            engine = [getattr(gait.walk, key) for key in WALKED]
+            engine += [found.largest_tilt_deg, found.tracking_max_rad]
+            engine += [found.measured.mechanical_W, found.measured.heat_W]
+        indexes = [gait.indexes[key] for key in INDEXES]
+        rows.append([gait.at, gait.found.feasible, *indexes, *gait.found.x.values(), *engine, gait.found.status])
+    return all_digits(stem, header, rows)
+
+
+def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
     """Cost of transport, step length and times along the axis; infeasible points as crosses at the bottom."""
     (name,) = gaits[0].found.at
-    units = {v.name: v.unit for v in problem.variables} | {q.name: q.unit for q in problem.parameters}
     good = [gait for gait in gaits if gait.found.feasible]
     at = [gait.at for gait in good]
     with style():
@@ -38,23 +158,19 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Figure:
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
         cost.plot(at, [gait.indexes["cost_of_transport"] for gait in good], "o-", color=MODEL, label="model")
         _engine_costs(cost, good)
-        bad = [gait.at for gait in gaits if not gait.found.feasible]
-        if bad:
-            cost.plot(
-                bad, np.full(len(bad), 0.03), "x", color="0.4", label="infeasible", transform=cost.get_xaxis_transform()
-            )
+        mark(cost, [gait.at for gait in gaits if not gait.found.feasible], "infeasible")
         cost.set_ylabel("cost of transport\nP / (m g v)")
         cost.set_ylim(bottom=0.0)
         cost.legend()
         lengths.plot(at, [1000.0 * gait.indexes["step_length_m"] for gait in good], "o-", color=MODEL)
         lengths.set_ylabel("step\n[mm]")
         lengths.set_ylim(bottom=0.0)
-        for phase, label, colour in (("ssp", "single support", LEFT), ("dsp", "double support", RIGHT)):
-            times.plot(at, [gait.found.x[TIMES[phase]] for gait in good], "o-", color=colour, label=label)
+        for time, colour in zip(problem.durations, (LEFT, RIGHT), strict=True):
+            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=_phase(time))
         times.set_ylabel("time [s]")
         times.set_ylim(bottom=0.0)
         times.legend(ncols=2)
-        times.set_xlabel(axis_label(name, units[name]))
+        times.set_xlabel(axis_label(name, units_of(problem)[name]))
     return figure
 
 
@@ -68,19 +184,17 @@ def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
     if points:
         axes.plot(*zip(*points, strict=True), "s--", color=ENGINE, label="physics engine")
     fallen = [gait.at for gait in gaits if gait.walk is not None and gait.walk.measurements.fallen]
-    if fallen:
-        axes.plot(
-            fallen, np.full(len(fallen), 0.1), "v", color=RIGHT, label="falls", transform=axes.get_xaxis_transform()
-        )
+    mark(axes, fallen, "falls", "v", RIGHT, 0.1)
 
 
-def cycle_figure(result: Result) -> Figure:
+def cycle_figure(result: Result) -> Drawing:
     """Two steps of a cycle: paths of hip and feet from the side and from above, and the angles of the left leg."""
-    robot = nao(str(result.problem.options["robot"]), rotational_inertia=True)
-    signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
+    problem = result.problem
+    assert problem.playback is not None  # a cycle can be played; for the type checker
+    signals = walk(finely_sampled(result), problem.playback.robot, STEPS_SHOWN)
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
-    single, double = (float(result.x[result.problem.variable_index(TIMES[phase])]) for phase in ("ssp", "dsp"))
-    switches = np.cumsum([0.0] + [single, double] * STEPS_SHOWN)
+    durations = [float(result.x[problem.variable_index(name)]) for name in problem.durations]
+    switches = np.cumsum([0.0] + durations * STEPS_SHOWN)
     with style():
         figure = new_figure(6.3, 7.2)
         side, above, place, angles = figure.subplots(4, 1, height_ratios=(1.0, 1.2, 1.2, 1.6))
@@ -111,11 +225,3 @@ def cycle_figure(result: Result) -> Figure:
         for axes in (side, above, place, angles):
             axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=1.0)
     return figure
-
-
-def write_figures(folder: Path, gaits: Sequence[Gait], problem: GaitProblem, shown: Result | None) -> list[Path]:
-    """Write both pictures, that of a cycle only if there is one; returns the paths."""
-    written = list(save(cost_figure(gaits, problem), folder / "nao-cycle-cost"))
-    if shown is not None:
-        written += save(cycle_figure(shown), folder / "nao-cycle")
-    return written

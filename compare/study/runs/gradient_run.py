@@ -1,41 +1,18 @@
-"""A run of a gradient method: IPOPT or another NLP solver on the lifted problem, from a random start or a search's result."""
+"""A run of an NLP solver, from a random start or a search's result."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
-import nlp_gait
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.task import IPOPT, Task, plain_settings
-from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.solvers.ipopt import ipopt_for
-from nlp_gait.backends.solvers.nlpsol import claimed, solve_with
+from compare.study.task import IPOPT, Task
+from nlp_gait.backends.solve import solution_of
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import ActiveConstraint
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What a gradient method hands back; the history has at least its end, ``cost`` in the problem's sense."""
-
-    x: Array
-    success: bool
-    status: str
-    violation: float
-    evaluations: Mapping[str, int]
-    iterations: int
-    settings: Mapping[str, Any]
-    active_constraints: tuple[ActiveConstraint, ...]
-    history: History
-    time_s: Times
+from nlp_gait.problem.solution import Best
 
 
 def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
@@ -49,9 +26,7 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
         InputError: the run to polish has no point.
     """
     started = time.perf_counter()
-    problem = task.problem.load()
-    nlp_model(problem)
-    build = time.perf_counter() - started
+    problem, solver = task.problem.load(), task.solver()
     if task.start:
         x0 = np.clip(problem.check_x(task.start), problem.lower, problem.upper)
     elif start is None:
@@ -59,28 +34,24 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     elif not start.x:
         raise InputError(f"{start.algorithm}, run {start.run}, has no point to polish: {start.status}")
     else:
-        x0 = np.array(list(start.x.values()))
-    outcome = _ipopt(task, problem, x0, build) if task.algorithm == IPOPT else _other(task, problem, x0, build)
-    return record_of(task, problem, outcome, start)
-
-
-def record_of(task: Task, problem: GaitProblem, outcome: Outcome, start: RunRecord | None = None) -> RunRecord:
-    """Record of an outcome, with the cost and history of the run that it polishes before its own."""
-    evaluations, history, times = dict(outcome.evaluations), outcome.history, outcome.time_s
+        x0 = np.clip(problem.check_x(start.x), problem.lower, problem.upper)
+    outcome = solver.run(problem, x0)
+    prepared_s = time.perf_counter() - started - outcome.time_s
+    compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
+    settings = solver.plain()
+    if outcome.linear_solver:
+        settings["linear_solver"] = outcome.linear_solver
+    solution = solution_of(problem, [outcome])
+    evaluations, earlier = outcome.evaluations.by_kind(), list[Best]()
+    before, before_s = (0, 0.0) if start is None else (start.evaluations["f"], start.time_s.solve)
     if start is not None:
-        before_s, before = start.time_s.solve, start.evaluations["f"]
         evaluations["f"] += before
-        history = History(
-            evaluations=(*start.history.evaluations, *(before + count for count in history.evaluations)),
-            objective=(*start.history.objective, *history.objective),
-        )
-        times = Times(
-            build=times.build,
-            compile=times.compile,
-            solve=before_s + times.solve,
-            objective=math.nan,
-            history=(*start.time_s.history, *(before_s + t for t in times.history)),
-        )
+        earlier = list(map(Best, start.history.evaluations, start.history.objective, start.time_s.history))
+    # A solver that keeps no history has its end.
+    own = outcome.history or (
+        Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s),
+    )
+    history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
     verdict = Verdict.of(evaluate(problem, outcome.x))
     return RunRecord(
         problem=task.problem.title,
@@ -88,9 +59,9 @@ def record_of(task: Task, problem: GaitProblem, outcome: Outcome, start: RunReco
         run=task.run,
         seed=task.run_seed,
         definition=task.definition(),
-        settings=outcome.settings,
-        status=outcome.status,
-        success=outcome.success,
+        settings=settings,
+        status=solution.status if task.algorithm == IPOPT else outcome.status,  # other solvers are quoted
+        success=outcome.claimed,
         x=problem.by_name(outcome.x),
         objective=verdict.objective if math.isfinite(verdict.objective) else None,
         violation=outcome.violation if math.isfinite(outcome.violation) else None,
@@ -98,55 +69,15 @@ def record_of(task: Task, problem: GaitProblem, outcome: Outcome, start: RunReco
         evaluations=evaluations,
         failed_evaluations=0,
         iterations=outcome.iterations,
-        active_constraints=outcome.active_constraints,
-        history=history,
-        time_s=times,
-    )
-
-
-def _ipopt(task: Task, problem: GaitProblem, x0: Array, build: float) -> Outcome:
-    limit = {} if task.stop.time_limit_s is None else {"time_limit_s": task.stop.time_limit_s}
-    settings = nlp_gait.IpoptSettings(**{**limit, **task.settings})
-    started = time.perf_counter()
-    ipopt_for(problem, settings)
-    compile_s = time.perf_counter() - started
-    solution = nlp_gait.solve(problem, x0=x0, settings=settings)
-    counts = asdict(solution.evaluations)
-    return Outcome(
-        x=np.array(list(solution.x.values())),
-        success=solution.success,
-        status=solution.status,
-        violation=solution.violation,
-        evaluations=counts,
-        iterations=solution.iterations,
-        settings={**plain_settings(settings), "linear_solver": solution.linear_solver},
         active_constraints=solution.active_constraints,
-        history=_end(counts["f"], solution.objective if solution.success else None),
-        time_s=_times(build, compile_s, solution.time_s.solve),
+        history=History(
+            evaluations=tuple(best.calls for best in history), objective=tuple(best.objective for best in history)
+        ),
+        time_s=Times(
+            build=prepared_s - compile_s,
+            compile=compile_s,
+            solve=before_s + outcome.time_s,
+            objective=outcome.objective_s,
+            history=tuple(best.time_s for best in history),
+        ),
     )
-
-
-def _other(task: Task, problem: GaitProblem, x0: Array, build: float) -> Outcome:
-    end = solve_with(str(task.algorithm), problem, x0, task.stop.time_limit_s)
-    cost, violation = claimed(problem, end.x)
-    counts = asdict(end.evaluations)
-    return Outcome(
-        x=end.x,
-        success=end.success,
-        status=end.status,
-        violation=violation,
-        evaluations=counts,
-        iterations=end.iterations,
-        settings={"kind": str(task.algorithm)},
-        active_constraints=(),
-        history=_end(counts["f"], problem.objective.sign * cost if end.success else None),
-        time_s=_times(build, end.build_s, end.time_s),
-    )
-
-
-def _end(calls: int, objective: float | None) -> History:
-    return History(evaluations=(calls,), objective=(objective,))
-
-
-def _times(build: float, compile_s: float, solve: float) -> Times:
-    return Times(build=build, compile=compile_s, solve=solve, objective=math.nan, history=(solve,))

@@ -19,11 +19,11 @@ from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import Array, GaitProblem
 
 LOG = logging.getLogger("nlp_gait")
-# Of a wrong library, not of rounding: compiled and interpreted values agree to some 1e-12.
+# Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.
 CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
-# A second thread takes part once it has this much to do; handing over the work costs some 0.05 ms.
+# A second thread takes part once it has this much to do; handing over the work costs about 0.05 ms.
 LEAST_THREAD_TIME_S = 3e-4
 
 
@@ -37,7 +37,7 @@ class CompiledObjective:
         upper: (n,) current upper bounds.
         row_names: (m,) constraint rows, in the order of ``constraints``.
         backend: ``"compiled"`` or ``"interpreted"``.
-        description: backend, compiler and lane count, for people.
+        description: backend, compiler and lane count, in words.
     """
 
     def __init__(self, problem: GaitProblem, evaluator: NativeKernel | InterpretedKernel, threads: int) -> None:
@@ -91,13 +91,10 @@ class CompiledObjective:
         if parts <= 1:
             self._part(X, f, violation, g)
         else:
-            edges = [rows * i // parts for i in range(parts + 1)]
-            cuts = [slice(a, b) for a, b in zip(edges, edges[1:], strict=False)]
-            jobs = [
-                self._pool.submit(self._part, X[cut], f[cut], violation[cut], None if g is None else g[cut])
-                for cut in cuts[1:]
-            ]
-            self._part(X[cuts[0]], f[cuts[0]], violation[cuts[0]], None if g is None else g[cuts[0]])
+            cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
+            pieces = [(X[cut], f[cut], violation[cut], None if g is None else g[cut]) for cut in cuts]
+            jobs = [self._pool.submit(self._part, *piece) for piece in pieces[1:]]
+            self._part(*pieces[0])
             wait(jobs)
             for job in jobs:
                 job.result()
@@ -140,7 +137,7 @@ def compile_objective(
         lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
     Raises:
-        InputError: a thread or lane count that cannot be, or a problem that is not searchable.
+        InputError: a thread or lane count that is not allowed, or a problem that is not searchable.
         CompilerError: ``require_compiler``, and there is no compiler or it fails.
     """
     if not problem.searchable:
@@ -172,12 +169,12 @@ def _native(problem: GaitProblem, kernel: Kernel, compiler: Compiler, lanes: int
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
-    """The native kernel, if it computes what the virtual machine does, at most points at least.
+    """The native kernel, if it computes what the virtual machine does at more than half of some random points.
 
     Not at all of them: where rounding decides a jump, as in the quantised drive of a tracked step, both may be right.
 
     Raises:
-        CompilerError: it does not: the compiler is broken, or not for this machine.
+        CompilerError: it does not: the compiler is broken, or is not for this machine.
     """
     X = np.random.default_rng(0).uniform(problem.lower, problem.upper, (CHECK_POINTS, len(problem.names)))
     lower, upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))

@@ -52,11 +52,11 @@ class Compiler:
         command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
         _run(command, TIME_LIMIT_S)
         if not library.is_file():
-            raise CompilerError(f"{Path(self.command[0]).name} ended as if all were well, but wrote no library")
+            raise CompilerError(f"{Path(self.command[0]).name} exited with status 0, but wrote no library")
 
 
 def find_compiler() -> Compiler:
-    """The first C++ compiler that answers: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
+    """The first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
 
     Raises:
         CompilerError: there is none; the message says what was tried.
@@ -97,7 +97,7 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
-            start_new_session=True,  # so that what the compiler has started can be ended with it
+            start_new_session=True,  # so that the compiler's own children can be killed with it
         )
     except OSError as error:
         raise CompilerError(f"{program} cannot be run: {error}") from error

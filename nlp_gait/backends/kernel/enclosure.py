@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import ctypes
 import re
-from importlib.resources import files
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.kernel.kernel_source import kernel_of
+from nlp_gait.backends.kernel.kernel_source import assembled_source, kernel_of
 from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.problem import Array, GaitProblem
 
 SYMBOLS = ("nlp_gait_enclosure_bytes", "nlp_gait_enclose")
-FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 
 
@@ -43,7 +42,7 @@ class Enclosure:
         self.lower, self.upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
         self.scales = kernel.model.row_scales
         source = _source(kernel.function)
-        loaded, self.library = load_library(source, find_compiler(), FLAGS, SYMBOLS)
+        loaded, self.library = load_library(source, find_compiler(), BASE_FLAGS, SYMBOLS)
         self._enclose = loaded.nlp_gait_enclose
         self._enclose.argtypes = [ctypes.c_int, _POINTER, _INTEGER, _INTEGER, _INTEGER, *[_POINTER] * 4]
         loaded.nlp_gait_enclosure_bytes.restype = _INTEGER
@@ -93,20 +92,10 @@ def _source(kernel: ca.Function) -> str:
         ("jacobian", [ca.jacobian(g, x)]),
     ):
         generator.add(ca.Function(name, [x, p], [ca.densify(output) for output in outputs]))
-    generated = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
+    generated = generator.dump()
     # A square is not the product of two independent intervals, and a sign is no branch.
     for helper, name in (("sq", "squared"), ("sign", "sign")):
         generated = re.sub(rf"\bcasadi_real casadi_{helper}\(.*", "", generated)
         generated = re.sub(rf"\bcasadi_{helper}\(", f"{name}(", generated)
-    native = files("nlp_gait.backends.kernel") / "native"
-    return "\n".join(
-        [
-            "#include <initializer_list>",
-            (native / "intervals.hpp").read_text(encoding="utf-8"),
-            "#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of intervals.hpp",
-            generated,
-            f"#define VARIABLES {x.shape[0]}",
-            f"#define PARAMETERS {p.shape[0]}",
-            (native / "enclosures.hpp").read_text(encoding="utf-8"),
-        ]
-    )
+    sizes = {"VARIABLES": x.shape[0], "PARAMETERS": p.shape[0]}
+    return assembled_source("intervals.hpp", generated, sizes, "enclosures.hpp")

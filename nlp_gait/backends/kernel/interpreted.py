@@ -8,7 +8,7 @@ import numpy as np
 from nlp_gait.backends.kernel.kernel_source import Kernel
 from nlp_gait.problem import Array
 
-# Candidates that one call of the virtual machine takes; more would only take more memory.
+# Candidates in one call of the virtual machine; more would only use more memory.
 BLOCK = 64
 
 
@@ -16,7 +16,7 @@ class InterpretedKernel:
     """Evaluates a kernel in blocks of candidates, one thread at a time.
 
     Attributes:
-        description: for people.
+        description: in words.
     """
 
     def __init__(self, kernel: Kernel) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -56,19 +57,30 @@ def kernel_source(function: ca.Function) -> str:
     """
     generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
     generator.add(function)
-    generated = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
-    native = files("nlp_gait.backends.kernel") / "native"
     sizes = {
         "VARIABLES": function.size1_in(0),
         "PARAMETERS": function.size1_in(1),
         "ROWS": function.size1_out(1),
     }
+    return assembled_source("lanes.hpp", generator.dump(), sizes, "batch.hpp")
+
+
+def assembled_source(numbers: str, generated: str, sizes: Mapping[str, int], loop: str) -> str:
+    """C++ source from CasADi's generated code.
+
+    Args:
+        numbers: header of the type that the code computes with.
+        generated: by CasADi.
+        sizes: macros.
+        loop: header of the functions that call it.
+    """
+    native = files("nlp_gait.backends.kernel") / "native"
     return "\n".join(
         [
-            (native / "lanes.hpp").read_text(encoding="utf-8"),
-            "#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp",
-            generated,
+            (native / numbers).read_text(encoding="utf-8"),
+            f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of {numbers}",
+            re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generated),
             *(f"#define {name} {size}" for name, size in sizes.items()),
-            (native / "batch.hpp").read_text(encoding="utf-8"),
+            (native / loop).read_text(encoding="utf-8"),
         ]
     )

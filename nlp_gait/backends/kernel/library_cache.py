@@ -118,7 +118,7 @@ def _distrust(path: Path, kind: Callable[[int], bool]) -> str | None:
         if status.st_uid != os.getuid():
             return "it belongs to another user"
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return "others may write to it; chmod 700 mends that"
+            return "others may write to it; chmod 700 fixes that"
     return None
 
 

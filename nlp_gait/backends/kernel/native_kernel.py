@@ -24,7 +24,7 @@ class NativeKernel:
 
     Attributes:
         lanes: candidates that one instruction works on.
-        description: compiler and lane count, for people.
+        description: compiler and lane count, in words.
         library: file of the library.
     """
 

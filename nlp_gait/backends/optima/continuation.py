@@ -3,86 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
-from nlp_gait.backends.solve import outcome_of, solution_of
-from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Solution
-
-
-class Attempt(NamedTuple):
-    """One run of IPOPT: where it began (n,) and where it ended."""
-
-    x0: Array
-    end: End
+from nlp_gait.backends.solve import solution_of
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.solution import Outcome, Solution
 
 
 class Continuation:
     """Follows an optimum over changing parameter values, in one direction.
 
     The first problem is solved from random starts. Each later one is tried warm, from the neighbour's primal and dual
-    solution; if that fails, cold from the neighbour's x; if that fails too, from random starts.
+    solution, if the solver has one; if that fails, cold from the neighbour's x; if that fails too, from random starts.
 
     Args:
         starts: number of random starts where there is no neighbour, or where it does not help.
         seed: of the random starts.
-        settings: of IPOPT.
+        solver: with its settings; None for IPOPT with its defaults.
         solves: how many are planned, which decides whether compiling pays if the settings leave it open.
     """
 
-    def __init__(
-        self, *, starts: int = 5, seed: int = 0, settings: IpoptSettings | None = None, solves: int = 1
-    ) -> None:
+    def __init__(self, *, starts: int = 5, seed: int = 0, solver: Solver | None = None, solves: int = 1) -> None:
         self._starts = starts
         self._seed = seed
-        self._settings = settings or IpoptSettings()
+        self._solver = solver or IpoptSettings()
         self._solves = solves
-        self._neighbour: End | None = None
+        self._neighbour: Outcome | None = None
 
     def solve(self, problem: GaitProblem) -> Solution:
         """Solution of the next problem on the path: a copy of the first one with other parameter values."""
-        return self.solution(problem, self.run(problem))
+        return solution_of(problem, self.run(problem), self._seed)
 
     def run(
-        self, problem: GaitProblem, earlier: Sequence[Attempt] = (), stop: Callable[[], bool] = never
-    ) -> list[Attempt]:
-        """Attempts at the next problem; the best of these and the earlier ones is the next problem's neighbour.
+        self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Callable[[], bool] = never
+    ) -> list[Outcome]:
+        """Runs of the next problem; the best of these and the earlier ones is the next problem's neighbour.
 
         Args:
             problem: a copy of the first one with other parameter values.
-            earlier: attempts at the same problem from elsewhere. Random starts are not repeated where they were in vain.
+            earlier: runs of the same problem from elsewhere. Random starts are not repeated where they were in vain.
             stop: asked after each iteration whether to end at once.
         """
-        ipopt = ipopt_for(problem, self._settings, self._solves)
-        attempts: list[Attempt] = []
-        if self._neighbour is not None:
-            x0 = np.clip(self._neighbour.x, problem.lower, problem.upper)
-            attempts.append(Attempt(x0, ipopt.run_from(problem, self._neighbour.guess, stop)))
-            if not attempts[-1].end.success and not stop():
-                attempts.append(Attempt(x0, ipopt.run(problem, x0, stop)))
-        in_vain = bool(earlier) and best_end(earlier) is None
-        if best_end(attempts) is None and not in_vain and (self._neighbour is None or not earlier):
+        solver, near = self._solver.ready_for(problem, self._solves), self._neighbour
+        outcomes: list[Outcome] = []
+        if near is not None:
+            warm = solver.run_from(problem, near, stop)
+            outcomes += [] if warm is None else [warm]
+            if best_success(outcomes) is None and not stop():
+                outcomes.append(solver.run(problem, np.clip(near.x, problem.lower, problem.upper), stop))
+        in_vain = bool(earlier) and best_success(earlier) is None
+        if best_success(outcomes) is None and not in_vain and (near is None or not earlier):
             rng = np.random.default_rng(self._seed)
             points = [problem.start_point(rng) for _ in range(self._starts)]
-            attempts += [Attempt(x0, ipopt.run(problem, x0, stop)) for x0 in points if not stop()]
-        self._neighbour = best_end([*earlier, *attempts]) or self._neighbour
-        return attempts
-
-    def solution(self, problem: GaitProblem, attempts: Sequence[Attempt]) -> Solution:
-        """Solution of a problem from all attempts at it."""
-        outcomes = [outcome_of(i, problem, x0, end) for i, (x0, end) in enumerate(attempts)]
-        ends = [attempt.end for attempt in attempts]
-        return solution_of(problem, ipopt_for(problem, self._settings, self._solves), ends, outcomes, self._seed)
+            outcomes += [solver.run(problem, x0, stop) for x0 in points if not stop()]
+        self._neighbour = best_success([*earlier, *outcomes]) or near
+        return outcomes
 
 
-def best_end(attempts: Sequence[Attempt]) -> End | None:
-    """Cheapest end that is feasible, if there is one."""
-    return min((a.end for a in attempts if a.end.success), key=lambda end: end.cost, default=None)
+def best_success(outcomes: Sequence[Outcome]) -> Outcome | None:
+    """Cheapest outcome that succeeded, if there is one."""
+    return min((outcome for outcome in outcomes if outcome.success), key=lambda found: found.cost, default=None)
 
 
 def solve_both_ways(
@@ -90,7 +74,7 @@ def solve_both_ways(
     *,
     starts: int = 5,
     seed: int = 0,
-    settings: IpoptSettings | None = None,
+    solver: Solver | None = None,
     progress: Callable[[], None] | None = None,
 ) -> list[Solution]:
     """Solutions of a path of neighbouring problems, followed forwards and backwards; the better one counts.
@@ -102,25 +86,25 @@ def solve_both_ways(
         problems: copies of one problem with other parameter values, neighbours side by side.
         starts: number of random starts at both ends of the path, and where no neighbour helps.
         seed: of the random starts.
-        settings: of IPOPT.
+        solver: with its settings; None for IPOPT with its defaults.
         progress: called after each problem, twice as often as there are problems.
 
     Raises:
-        Interrupted: Ctrl-C; carries the solutions from the attempts until then, None for problems without any.
+        Interrupted: Ctrl-C; carries the solutions from the runs until then, None for problems without any.
     """
     order = range(len(problems))
-    attempts: list[list[Attempt]] = [[] for _ in problems]
+    outcomes: list[list[Outcome]] = [[] for _ in problems]
     with deferred_interrupts() as interrupted:
         for path_seed, direction in ((seed, order), (seed + 1, order[::-1])):
-            path = Continuation(starts=starts, seed=path_seed, settings=settings, solves=2 * len(problems))
+            path = Continuation(starts=starts, seed=path_seed, solver=solver, solves=2 * len(problems))
             for k in direction:
                 if interrupted():
                     break
-                attempts[k] += path.run(problems[k], attempts[k], interrupted)
+                outcomes[k] += path.run(problems[k], outcomes[k], interrupted)
                 if progress is not None:
                     progress()
+    tried = [solution_of(p, found, seed + 1) if found else None for p, found in zip(problems, outcomes, strict=True)]
+    solutions = [solution for solution in tried if solution is not None]
     if interrupted():
-        tried = [path.solution(p, found) if found else None for p, found in zip(problems, attempts, strict=True)]
-        count = sum(solution is not None for solution in tried)
-        raise Interrupted(f"interrupted after {count} of {len(problems)} points", tried)
-    return [path.solution(problem, found) for problem, found in zip(problems, attempts, strict=True)]
+        raise Interrupted(f"interrupted after {len(solutions)} of {len(problems)} points", tried)
+    return solutions

@@ -96,7 +96,7 @@ class KktStep:
 
     Attributes:
         w: dw.
-        multipliers: dlam, the shortest where they are not unique.
+        multipliers: dlam, of least norm where they are not unique.
         inconsistent: largest part of c that dependent rows contradict, for each right-hand side.
         flat: (n,) True for the unknowns that neither rows nor curvature determine; they do not move.
         freedom: dimension of the null space of A.

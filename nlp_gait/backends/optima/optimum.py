@@ -1,8 +1,8 @@
 """A local optimum to machine precision, with the bounds that hold it and how firmly they do.
 
 IPOPT stops near an optimum, with every multiplier a little off zero. Here the bounds with a price are taken as equations and the
-first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is let go, one that is
-violated is taken in, until nothing changes.
+first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is released, one that is
+violated is added, until nothing changes.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kkt_step
-from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Guess, Outcome
 
-# Tolerance at which IPOPT tells bounds with a price from those without one: at kinks of |power| both are small.
+# Tolerance at which IPOPT distinguishes bounds with a price from those without: at kinks of |power| both are small.
 SHARP = IpoptSettings(tolerance=1e-12)
 ROUNDS = 30
 # The conditions hold to this, in units of cost per range of a variable, and of the rows.
@@ -45,7 +45,7 @@ class Optimum:
         residual: largest violation of the conditions.
         freedom: dimension of the space in which x* and the lifted variables could move along the active bounds.
         dependent: number of active rows that follow from the others: their multipliers are not unique.
-        reason: why no derivative can be had, or None.
+        reason: why there is no derivative, or None.
     """
 
     problem: GaitProblem
@@ -63,8 +63,7 @@ class Optimum:
     @property
     def x(self) -> Array:
         """(n,) decision variables."""
-        model = self.functions.model
-        return np.asarray(model.offset + model.scale * self.w[: model.variables])
+        return self.functions.model.point(self.w)
 
     @property
     def objective(self) -> float:
@@ -94,25 +93,29 @@ class Optimum:
         return values, lower, upper
 
 
-def optimum(problem: GaitProblem, end: End) -> Optimum:
-    """The optimum near which IPOPT ended.
+def optimum(problem: GaitProblem, near: Outcome) -> Optimum:
+    """The optimum near which a solver ended.
 
     Raises:
-        InputError: the problem has too many variables for dense linear algebra.
+        InputError: the solver gives no multipliers, or the problem has too many variables for dense linear algebra.
     """
-    functions = kkt_functions(problem)
-    if len(end.guess.primal) > LARGEST:
+    if near.guess is None:
         raise InputError(
-            f"{problem.name} has {len(end.guess.primal)} variables; prices and sensitivities are made for at most {LARGEST}: "
+            f"{problem.name}: prices and sensitivities need multipliers, which {near.solver} does not give; solve with ipopt"
+        )
+    functions, unknowns = kkt_functions(problem), len(near.guess.primal)
+    if unknowns > LARGEST:
+        raise InputError(
+            f"{problem.name} has {unknowns} variables; prices and sensitivities are made for at most {LARGEST}: "
             "fewer intervals may help"
         )
-    sharper = ipopt_for(problem, SHARP).run_from(problem, end.guess)
-    return _with_flat_lifts_held(_converged(problem, functions, sharper if sharper.success else end))
+    sharper = SHARP.run_from(problem, near)
+    guess = near.guess if sharper is None or sharper.guess is None or not sharper.success else sharper.guess
+    return _with_flat_lifts_held(_converged(problem, functions, guess))
 
 
-def _converged(problem: GaitProblem, functions: KktFunctions, end: End) -> Optimum:
+def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Optimum:
     """Newton's method on the active rows, which change until all signs are right."""
-    guess = end.guess
     w, p = guess.primal.copy(), np.append(problem.p, guess.width)
     lam = np.concatenate([guess.rows, guess.bounds[: functions.model.variables]])
     _, values, lower, upper = (column(part) for part in functions.values(w, p))

@@ -1,4 +1,4 @@
-"""How an optimum answers to its parameters and to another model: derivatives of the objective and of x*.
+"""How an optimum responds to its parameters and to another model: derivatives of the objective and of x*.
 
 The objective's derivative is that of the Lagrangian at fixed x* and multipliers (envelope theorem); x* moves by the linearised
 first-order conditions with the active bounds held (implicit function theorem).
@@ -35,7 +35,7 @@ class Sensitivities:
         x: (n, k) of x*.
         defined: (k,) False where dependent active bounds contradict each other: no derivative exists.
         reach: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes
-            active or an active one is let go: beyond it x* turns.
+            active or an active one is released: beyond it x* changes direction.
     """
 
     objective: Array
@@ -58,26 +58,26 @@ def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     """Derivatives with respect to every parameter of the problem, in their order and units.
 
     Raises:
-        InputError: the optimum has none, and why.
+        InputError: the optimum has none; the message says why.
     """
     _require(optimum)
     parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
     cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
-    return _answer(optimum, _Change(cost[0], *others))
+    return _sensitivities(optimum, _Change(cost[0], *others))
 
 
 def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
     """Derivatives with respect to what the problem was built with, for example a robot's masses.
 
     By central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
-    problems are evaluated, not solved. Of their own parameter values nothing is taken.
+    problems are evaluated, not solved. Their own parameter values are not used.
 
     Args:
         optimum: of the unchanged problem.
         pairs: for each quantity the problem with more of it, with less of it, and the difference in that quantity.
 
     Raises:
-        InputError: the optimum has no sensitivities, and why; another model has other constraints.
+        InputError: the optimum has no sensitivities, or another model has other constraints.
     """
     _require(optimum)
     columns = []
@@ -85,7 +85,7 @@ def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, Gai
         high, low = (_evaluated(optimum, problem) for problem in (more, less))
         columns.append([(a - b) / difference for a, b in zip(high, low, strict=True)])
     cost, *others = (np.array(part).T for part in zip(*columns, strict=True))
-    return _answer(optimum, _Change(cost, *others))
+    return _sensitivities(optimum, _Change(cost, *others))
 
 
 def _evaluated(optimum: Optimum, problem: GaitProblem) -> _Change:
@@ -107,7 +107,7 @@ def _evaluated(optimum: Optimum, problem: GaitProblem) -> _Change:
     return _Change(cost[0], values, lower, upper, gradient)
 
 
-def _answer(optimum: Optimum, change: _Change) -> Sensitivities:
+def _sensitivities(optimum: Optimum, change: _Change) -> Sensitivities:
     model, side, active = optimum.functions.model, optimum.side, optimum.active
     hessian, jacobian = optimum.matrices
     held = (change.values - np.where(side[:, None] > 0, change.upper, change.lower))[active]
@@ -153,4 +153,4 @@ def _reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) 
 
 def _require(optimum: Optimum) -> None:
     if optimum.reason is not None:
-        raise InputError(f"{optimum.problem.name}: no sensitivities at this point, for {optimum.reason}")
+        raise InputError(f"{optimum.problem.name}: no sensitivities at this point: {optimum.reason}")

@@ -1,7 +1,7 @@
 """Compiled functions and derivatives of an NLP for IPOPT.
 
-To compile them takes long, to use them saves most of a solve: worth it from some ``WORTHWHILE_STARTS`` solves of one problem on,
-or when the cache folder has them already (``benchmarks/`` measures all of it).
+Compiling takes long, and saves most of the time of each solve: it pays from about ``WORTHWHILE_SOLVES`` solves of one problem
+on, or when the cache folder has the functions already (``benchmarks/`` measures all of it).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from nlp_gait.backends.kernel.compiler import find_compiler
 from nlp_gait.backends.kernel.library_cache import load_library
 
 # Solves of NAO's single support from which compilation pays: 0.2 s saved on each against some 6 s of compilation.
-WORTHWHILE_STARTS = 40
+WORTHWHILE_SOLVES = 40
 # Optimisation halves the time of a function and quadruples that of compilation.
 FLAGS = ("-O0", "-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-ffp-contract=off", "-w")
 OPTIMISED_FLAGS = ("-O1", *FLAGS[1:])

@@ -4,30 +4,40 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.exact import FEASIBILITY_TOLERANCE, exact_model
 from nlp_gait.backends.interrupts import deferred_interrupts, never
-from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.backends.solvers.derivatives import WORTHWHILE_STARTS, compiled_nlp, one_direction_at_a_time
-from nlp_gait.backends.solvers.ipopt_end import CONVERGED, End, Guess
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.solvers.derivatives import WORTHWHILE_SOLVES, compiled_nlp, one_direction_at_a_time
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
-from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, TIME_IS_UP, IterationWatch
+from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
+from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Evaluations
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 
 LOG = logging.getLogger("nlp_gait")
 
-# Sigmoid widths of the stages, in units of the switch (metres for a balance margin); each stage starts from the last one.
-# The narrower ones are tried only if the exact functions find the point infeasible.
-WIDTHS = (1e-2, 5e-4)
+STATUS_WORDS = {
+    "Solve_Succeeded": "converged",
+    "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
+    "Infeasible_Problem_Detected": "converged to a point of local infeasibility",
+    "Maximum_Iterations_Exceeded": "stopped at the iteration limit",
+    "Restoration_Failed": "restoration of feasibility failed",
+    "Search_Direction_Becomes_Too_Small": "search direction became too small",
+    "Diverging_Iterates": "iterates diverged",
+    "Invalid_Number_Detected": "a function returned NaN or inf",
+    "Error_In_Step_Computation": "the linear solver failed",
+    **REASONS,
+}
+CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+# Sigmoid widths of further stages, which are tried only if the exact functions find the point infeasible.
 NARROWER_WIDTHS = (1e-4, 2e-5)
 # Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
 # Over the 50 points of nao-ssp's swing heights 1e-5 takes 574 iterations, 1e-8 takes 138; over its durations 584 and 332.
@@ -35,8 +45,8 @@ WARM_BARRIER = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
-class IpoptSettings:
-    """Settings of one IPOPT run.
+class IpoptSettings(Solver):
+    """IPOPT with its settings.
 
     Attributes:
         tolerance: IPOPT's ``tol``.
@@ -48,6 +58,8 @@ class IpoptSettings:
         linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is refused: IPOPT
             never takes another one in its place.
     """
+
+    name: ClassVar[str] = "ipopt"
 
     tolerance: float = 1e-8
     iterations: int = 300
@@ -69,9 +81,42 @@ class IpoptSettings:
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
+    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
+        """IPOPT for a problem, made once for all its copies.
 
-class Ipopt:
-    """IPOPT for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only.
+        Args:
+            problem: any copy.
+            solves: how many are planned, which decides whether compiling pays if the settings leave it open.
+
+        Raises:
+            CompilerError: compiled functions are demanded, and there is no compiler or it fails.
+        """
+        worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
+        compiled = worthwhile if self.compiled is None else self.compiled
+        chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+
+        def make() -> Ipopt:
+            return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
+
+        try:
+            return problem.built(f"ipopt {chosen}", make)
+        except CompilerError as error:
+            if self.compiled:
+                raise
+            LOG.warning("IPOPT's functions are interpreted: %s", error)
+            return replace(self, compiled=False).ready_for(problem)
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        """See ``Solver``."""
+        return self.ready_for(problem).run(problem, x0, stop)
+
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        """See ``Solver``."""
+        return self.ready_for(problem).run_from(problem, near, stop)
+
+
+class Ipopt(Solver):
+    """IPOPT made for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only.
 
     Attributes:
         model: the NLP.
@@ -79,6 +124,8 @@ class Ipopt:
         compiled: whether it calls compiled functions.
         create_s: time to generate derivatives and solvers, and to compile them [s].
     """
+
+    name: ClassVar[str] = IpoptSettings.name
 
     def __init__(self, model: NlpModel, settings: IpoptSettings, *, long_derivatives: bool = False) -> None:
         started = time.perf_counter()
@@ -121,28 +168,31 @@ class Ipopt:
         self._warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
         self.create_s = time.perf_counter() - started
 
-    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> End:
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
-        z0 = (x0 - self.model.offset) / self.model.scale
-        widths = WIDTHS if self.model.smoothed else WIDTHS[-1:]
-        primal = np.concatenate([z0, np.array(self.model.lift_start(z0, problem.p, widths[0])).ravel()])
-        return self._stages(problem, {"x0": primal}, widths, stop, cold=True)
+        start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
+        return self._stages(problem, x0, start, self.model.widths, stop, cold=True)
 
-    def run_from(self, problem: GaitProblem, guess: Guess, stop: Callable[[], bool] = never) -> End:
-        """The last stage alone, from the end of a neighbouring problem."""
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        """The last stage alone, from the outcome of a neighbouring problem; None if that has no multipliers."""
+        guess = near.guess
+        if guess is None:
+            return None
+        x0 = np.clip(near.x, problem.lower, problem.upper)
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
-        return self._stages(problem, start, WIDTHS[-1:], stop, cold=False)
+        return self._stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
 
     def _stages(
         self,
         problem: GaitProblem,
+        x0: Array,
         start: dict[str, Array],
         widths: tuple[float, ...],
         stop: Callable[[], bool],
         cold: bool,
-    ) -> End:
+    ) -> Outcome:
         """Stages of a run. Where the caller does not ask to stop, Ctrl-C ends the iterations and is raised after them."""
-        model, exact, p, n = self.model, exact_model(problem), problem.p, self.model.variables
+        model, p = self.model, problem.p
         bounds = model.bounds(problem)
         iterations, evaluations = 0, Evaluations()
         started = time.perf_counter()
@@ -153,64 +203,33 @@ class Ipopt:
                 result = solver(p=np.append(p, width), **start, **bounds)
                 stats = solver.stats()
                 iterations += int(stats["iter_count"])
-                evaluations += _counts(stats)
+                evaluations += counted(stats)
                 z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
                 start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
                 status = self._watch.reason or str(stats["return_status"])
-                if stage + 1 < len(widths) and status not in (INTERRUPTED, TIME_IS_UP):
+                if stage + 1 < len(widths) and status not in REASONS:
                     continue
-                x = np.clip(model.offset + model.scale * z[:n], problem.lower, problem.upper)
-                cost, violation = (float(value) for value in exact.function(x, p)[:2])
-                if status not in CONVERGED or violation <= FEASIBILITY_TOLERANCE:
+                outcome = judged(
+                    self.name,
+                    problem,
+                    x0,
+                    model.point(z),
+                    claimed=status in CONVERGED,
+                    status=STATUS_WORDS.get(status, status.replace("_", " ").lower()),
+                    iterations=iterations,
+                    evaluations=evaluations,
+                    build_s=model.build_s,
+                    compile_s=self.create_s,
+                    time_s=time.perf_counter() - started,
+                    functions="compiled" if self.compiled else "interpreted",
+                    linear_solver=self.linear_solver,
+                    guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
+                )
+                if not outcome.claimed or outcome.violation <= FEASIBILITY_TOLERANCE:
                     break
         if stop is never and asked():
             raise KeyboardInterrupt
-        return End(
-            x=x,
-            cost=cost,
-            violation=violation,
-            row_multipliers=rows[: len(model.row_names)],
-            bound_multipliers=multipliers[:n],
-            return_status=status,
-            iterations=iterations,
-            evaluations=evaluations,
-            time_s=time.perf_counter() - started,
-            guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
-        )
-
-
-def ipopt_for(problem: GaitProblem, settings: IpoptSettings, solves: int = 1) -> Ipopt:
-    """IPOPT for a problem, made once for all its copies.
-
-    Args:
-        problem: any copy.
-        settings: where the problem has a say, None.
-        solves: how many are planned, which decides whether compiling pays if the settings leave it open.
-
-    Raises:
-        CompilerError: compiled functions are demanded, and there is no compiler or it fails.
-    """
-    worthwhile = problem.long_derivatives or solves >= WORTHWHILE_STARTS
-    compiled = worthwhile if settings.compiled is None else settings.compiled
-    chosen = replace(settings, hessian=settings.hessian or problem.hessian, compiled=compiled)
-
-    def make() -> Ipopt:
-        return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
-
-    try:
-        return problem.built(f"ipopt {chosen}", make)
-    except CompilerError as error:
-        if settings.compiled:
-            raise
-        LOG.warning("IPOPT's functions are interpreted: %s", error)
-        return ipopt_for(problem, replace(settings, compiled=False))
-
-
-def _counts(stats: Mapping[str, int]) -> Evaluations:
-    return Evaluations(
-        f=int(stats.get("n_call_nlp_f", 0)),
-        g=int(stats.get("n_call_nlp_g", 0)),
-        gradient=int(stats.get("n_call_nlp_grad_f", 0)),
-        jacobian=int(stats.get("n_call_nlp_jac_g", 0)),
-        hessian=int(stats.get("n_call_nlp_hess_l", 0)),
-    )
+        if outcome.claimed and not outcome.feasible:
+            refused = f"{outcome.status}, but the exact functions find it infeasible"
+            return replace(outcome, claimed=False, status=refused)
+        return outcome

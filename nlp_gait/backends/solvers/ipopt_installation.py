@@ -1,4 +1,4 @@
-"""What every IPOPT is told here, and which linear solver this installation has."""
+"""Options that every IPOPT gets here, and the linear solver of this installation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import casadi as ca
 
 from nlp_gait.errors import InputError
 
-# Options of every IPOPT here: silent, and deaf to an ``ipopt.opt`` that happens to lie in the working folder.
+# Options of every IPOPT here: it prints nothing, and ignores an ``ipopt.opt`` that happens to lie in the working folder.
 QUIET: Mapping[str, Any] = {
     "print_time": False,
     "show_eval_warnings": False,  # the status says that a function returned NaN
@@ -54,6 +54,6 @@ def linear_solver(wanted: str | None = None) -> str:
     if wanted is not None and (status != "Solve_Succeeded" or used.lower() != wanted):
         raise InputError(
             f"IPOPT's linear solver {wanted!r} does not run in this installation ({status.replace('_', ' ').lower()}; its "
-            f"library is missing, perhaps); leave linear_solver out for {linear_solver()}"
+            f"library may be missing); leave linear_solver out for {linear_solver()}"
         )
     return used

@@ -1,4 +1,4 @@
-"""Ends an NLP solver between two of its iterations: at the time limit, or when somebody asks for it."""
+"""Ends an NLP solver between two of its iterations, at the time limit or on request."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from casadi import MX
 from nlp_gait.backends.interrupts import never
 
 INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
+REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limit"}
 
 
 class IterationWatch(ca.Callback):
-    """CasADi's ``iteration_callback``; it changes nothing in the iterations, and must be kept as long as its solver."""
+    """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
     def __init__(self, nlp: Mapping[str, MX]) -> None:
         """Take the NLP's size: CasADi's dictionary of x, p, f, g."""
@@ -30,14 +31,14 @@ class IterationWatch(ca.Callback):
         """Watch the next run of this thread.
 
         Args:
-            stop: whether somebody wants it to end.
+            stop: whether the run should end.
             deadline: of ``time.perf_counter`` [s].
         """
         self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
 
     @property
     def reason(self) -> str:
-        """Why the run of this thread was ended from here, in IPOPT's manner; empty if it was not."""
+        """Why the run of this thread was ended here, as IPOPT would report it; empty if it was not."""
         return getattr(self._of_thread, "reason", "")
 
     def get_n_in(self) -> int:

@@ -9,37 +9,22 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import deferred_interrupts, never
-from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.backends.solvers.ipopt import WIDTHS
-from nlp_gait.backends.solvers.ipopt_end import STATUS_WORDS
-from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, IterationWatch
+from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Evaluations
+from nlp_gait.problem.solution import Evaluations, Outcome
 
-# Options that keep each solver from printing; a solver joins by a line here.
-OPTIONS: Mapping[str, Mapping[str, Any]] = {
-    "fatrop": {"fatrop.print_level": 0},
-    "sqpmethod": {
-        "print_header": False,
-        "print_iteration": False,
-        "print_status": False,
-        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
-    },
-    "uno": {"uno.logger": "SILENT"},
-}
-# Those that can be ended between two iterations, at a time limit or by Ctrl-C; fatrop never asks.
-WATCHED = ("sqpmethod", "uno")
 PROBE_TIME_LIMIT_S = 60.0
 PROBE = """
 import sys
@@ -51,40 +36,12 @@ sys.exit(0 if abs(float(result["x"][0]) - 0.5) < 1e-4 else "wrong optimum")
 """
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class NlpEnd:
-    """Where a solver ended.
-
-    Attributes:
-        x: (n,) decision variables, within their bounds.
-        success: as the solver itself claims.
-        status: in the solver's own words.
-        iterations: over all stages, where the solver tells.
-        evaluations: over all stages; products with the Hessian count as gradients.
-        build_s: time to make the solver, 0 if it was there [s].
-        time_s: time of the solver [s].
-    """
-
-    x: Array
-    success: bool
-    status: str
-    iterations: int
-    evaluations: Evaluations
-    build_s: float
-    time_s: float
-
-
 @cache
 def probe(name: str) -> str | None:
     """Why a solver does not run in this installation, or None if it does.
 
-    It is tried in another process on a small problem: a solver may be listed and still fail to load, or crash.
-
-    Raises:
-        InputError: not one of ``OPTIONS``.
+    It is tried in a process of its own on a small problem: a solver may be listed and still fail to load, or crash.
     """
-    if name not in OPTIONS:
-        raise InputError(f"NLP solver must be one of {', '.join(OPTIONS)}, got {name!r}")
     try:
         done = subprocess.run(
             [sys.executable, "-c", PROBE, name],
@@ -101,80 +58,118 @@ def probe(name: str) -> str | None:
     return said[-1] if said else f"it ends with status {done.returncode}"
 
 
-def solve_with(name: str, problem: GaitProblem, x0: Array, time_limit_s: float | None = None) -> NlpEnd:
-    """One run of a solver, with its own default settings, in IPOPT's stages of sigmoid width.
+@dataclass(frozen=True, kw_only=True)
+class CasadiSolver(Solver):
+    """A solver of the wheel with its own default settings, in IPOPT's stages of sigmoid width, each started from x alone.
 
-    Args:
-        name: of the solver.
-        problem: what is solved.
-        x0: (n,) start point.
-        time_limit_s: of wall time for all stages [s], checked after each iteration.
-
-    Raises:
-        InputError: the solver does not run here, or takes no time limit.
+    Attributes:
+        quiet: options that keep it from printing.
+        watched: it asks between iterations whether to end, at a time limit or on Ctrl-C.
     """
-    check_time_limit(name, time_limit_s)
-    model = nlp_model(problem)
-    started = time.perf_counter()
-    solver, watch = problem.built(f"nlpsol {name}", lambda: _make(name, model))
-    build_s = time.perf_counter() - started
-    z0 = (np.clip(x0, problem.lower, problem.upper) - model.offset) / model.scale
-    widths = WIDTHS if model.smoothed else WIDTHS[-1:]
-    primal = np.concatenate([z0, np.array(model.lift_start(z0, problem.p, widths[0])).ravel()])
-    bounds = model.bounds(problem)
-    iterations, evaluations, stats = 0, Evaluations(), {}
-    started = time.perf_counter()
-    with deferred_interrupts() if name in WATCHED else contextlib.nullcontext(never) as interrupted:
-        watch.begin(interrupted, math.inf if time_limit_s is None else started + time_limit_s)
-        for width in widths:
-            with _silent():
-                result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
-            primal = np.array(result["x"]).ravel()
-            stats = solver.stats()
-            iterations += int(stats.get("iter_count") or 0)
-            evaluations += _counts(stats)
-            if watch.reason:
-                break
-    if watch.reason == INTERRUPTED or interrupted():
-        raise KeyboardInterrupt
-    finite = bool(np.isfinite(primal).all())
-    said = STATUS_WORDS.get(watch.reason, f"{name} says {stats.get('return_status')!r}")
-    x = model.offset + model.scale * primal[: model.variables] if finite else problem.lower
-    return NlpEnd(
-        x=np.clip(x, problem.lower, problem.upper),
-        success=bool(stats["success"]) and finite and not watch.reason,
-        status=said if finite else "it returned NaN or inf",
-        iterations=iterations,
-        evaluations=evaluations,
-        build_s=build_s,
-        time_s=time.perf_counter() - started,
-    )
+
+    quiet: ClassVar[Mapping[str, Any]]
+    watched: ClassVar[bool] = False
+    time_limit_s: ClassVar[float | None] = None
+
+    def check(self, problem: GaitProblem) -> None:
+        """See ``Solver``."""
+        reason = probe(self.name)
+        if reason is not None:
+            raise InputError(f"NLP solver {self.name!r} does not run in this installation: {reason}")
+
+    def plain(self) -> dict[str, Any]:
+        """See ``Solver``."""
+        return {"kind": self.name}
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        """See ``Solver``.
+
+        Raises:
+            InputError: the solver does not run here.
+        """
+        model = nlp_model(problem)
+        solver, watch, create_s = problem.built(f"nlpsol {self.name}", lambda: self._made(problem))
+        widths, bounds = model.widths, model.bounds(problem)
+        primal = model.start(problem, x0, widths[0])
+        iterations, evaluations, stats = 0, Evaluations(), {}
+        started = time.perf_counter()
+        alone = stop is never and self.watched
+        with deferred_interrupts() if alone else contextlib.nullcontext(stop) as asked:
+            watch.begin(asked, math.inf if self.time_limit_s is None else started + self.time_limit_s)
+            for width in widths:
+                with _silent():
+                    result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+                primal = np.array(result["x"]).ravel()
+                stats = solver.stats()
+                iterations += int(stats.get("iter_count") or 0)
+                evaluations += counted(stats)
+                if watch.reason:
+                    break
+        if stop is never and (watch.reason == INTERRUPTED or asked()):
+            raise KeyboardInterrupt
+        finite = bool(np.isfinite(primal).all())
+        status = REASONS.get(watch.reason, f"{self.name} says {stats.get('return_status')!r}")
+        return judged(
+            self.name,
+            problem,
+            x0,
+            model.point(primal) if finite else problem.lower,
+            claimed=bool(stats["success"]) and finite and not watch.reason,
+            status=status if finite else "it returned NaN or inf",
+            iterations=iterations,
+            evaluations=evaluations,
+            build_s=model.build_s,
+            compile_s=create_s,
+            time_s=time.perf_counter() - started,
+        )
+
+    def _made(self, problem: GaitProblem) -> tuple[ca.Function, IterationWatch, float]:
+        """The solver of a problem's NLP, what watches it, and the time that it took to make them [s]."""
+        self.check(problem)
+        started = time.perf_counter()
+        nlp = nlp_model(problem).nlp
+        watch = IterationWatch(nlp)
+        options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **self.quiet}
+        with _silent():
+            return ca.nlpsol(self.name, self.name, nlp, options), watch, time.perf_counter() - started
 
 
-def check_time_limit(name: str, time_limit_s: float | None) -> None:
-    """Refuse a time limit for a solver that cannot heed it.
+@dataclass(frozen=True, kw_only=True)
+class Fatrop(CasadiSolver):
+    """FATROP, which cannot be ended between iterations."""
 
-    Raises:
-        InputError: it cannot.
-    """
-    if time_limit_s is not None and name not in WATCHED:
-        raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
+    name: ClassVar[str] = "fatrop"
+    quiet: ClassVar[Mapping[str, Any]] = {"fatrop.print_level": 0}
 
 
-def claimed(problem: GaitProblem, x: Array) -> tuple[float, float]:
-    """Exact cost and total violation at a point."""
-    cost, violation = exact_model(problem).function(x, problem.p)[:2]
-    return float(cost), float(violation)
+@dataclass(frozen=True, kw_only=True)
+class WatchedSolver(CasadiSolver):
+    """A solver that heeds a limit of wall time for all stages, checked after each iteration; None for no limit."""
+
+    watched: ClassVar[bool] = True
+
+    time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of those that are not watched
 
 
-def _make(name: str, model: NlpModel) -> tuple[ca.Function, IterationWatch]:
-    reason = probe(name)
-    if reason is not None:
-        raise InputError(f"NLP solver {name!r} does not run in this installation: {reason}")
-    watch = IterationWatch(model.nlp)
-    options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **OPTIONS[name]}
-    with _silent():
-        return ca.nlpsol(name, name, model.nlp, options), watch
+@dataclass(frozen=True, kw_only=True)
+class Sqpmethod(WatchedSolver):
+    """CasADi's sequential quadratic programming with qpOASES."""
+
+    name: ClassVar[str] = "sqpmethod"
+    quiet: ClassVar[Mapping[str, Any]] = {
+        "print_header": False,
+        "print_iteration": False,
+        "print_status": False,
+        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uno(WatchedSolver):
+    """Uno with its default preset."""
+
+    name: ClassVar[str] = "uno"
+    quiet: ClassVar[Mapping[str, Any]] = {"uno.logger": "SILENT"}
 
 
 @contextlib.contextmanager
@@ -191,17 +186,3 @@ def _silent() -> Iterator[None]:
         os.dup2(kept, 1)
         os.close(kept)
         os.close(nowhere)
-
-
-def _counts(stats: Mapping[str, Any]) -> Evaluations:
-    def calls(*names: str) -> int:
-        return sum(int(stats.get(f"n_call_nlp_{name}", 0)) for name in names)
-
-    products = int(stats.get("n_call_fwd1_nlp_grad_l", 0))
-    return Evaluations(
-        f=calls("f", "fg"),
-        g=calls("g", "fg"),
-        gradient=calls("grad_f", "jac_fg") + products,
-        jacobian=calls("jac_g", "jac_fg"),
-        hessian=calls("hess_l"),
-    )

@@ -157,7 +157,7 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     fixed = compile_objective(problem.fix(swing_height_m=0.024), threads=1)
     assert fixed.lower[7] == fixed.upper[7] == 0.024
     assert fixed.names == problem.names
-    value = float(exact_model(problem).function(X[0], strict.problem.p)[0])
+    value = exact_model(problem).at(X[0], strict.problem.p).cost
     assert strict_f[0] == pytest.approx(value, rel=COST_TOLERANCE)
 
 

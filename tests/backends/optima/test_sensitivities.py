@@ -9,13 +9,12 @@ from casadi import MX
 
 from nlp_gait import load
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.optima.continuation import Continuation, best_end
+from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
-from nlp_gait.backends.solvers.ipopt import ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import End
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Constraint, GaitProblem
+from nlp_gait.problem.solution import Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 
@@ -30,19 +29,24 @@ def found(problem: GaitProblem) -> Optimum:
     return solved(problem)[1]
 
 
-def solved(problem: GaitProblem) -> tuple[End, Optimum]:
-    end = best_end(Continuation(starts=3).run(problem))
+def solved(problem: GaitProblem) -> tuple[Outcome, Optimum]:
+    end = best_success(Continuation(starts=3).run(problem))
     assert end is not None
     return end, optimum(problem, end)
 
 
-def slope(problem: GaitProblem, near: End, name: str) -> tuple[float, np.ndarray]:
+def sharp(problem: GaitProblem, near: Outcome) -> Outcome:
+    end = SHARP.run_from(problem, near)
+    assert end is not None and end.success
+    return end
+
+
+def slope(problem: GaitProblem, near: Outcome, name: str) -> tuple[float, np.ndarray]:
     """Of optimum and x*, by solving a little lower and higher."""
     ends = []
     for change in (-STEP, STEP):
         moved = problem.with_values(**{name: problem.value(name) + change})
-        ends.append(ipopt_for(moved, SHARP).run_from(moved, near.guess))
-        assert ends[-1].success
+        ends.append(sharp(moved, near))
     low, high = ends
     return problem.objective.sign * (high.cost - low.cost) / (2 * STEP), (high.x - low.x) / (2 * STEP)
 
@@ -161,8 +165,7 @@ def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
     near, at = solved(problem)
     heavier, lighter = (load("nao-dsp", robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP))
     answer = model_sensitivities(at, [(heavier, lighter, 2 * STEP)])
-    ends = [ipopt_for(p, SHARP).run_from(p, near.guess) for p in (heavier, lighter)]
-    assert all(end.success for end in ends)
+    ends = [sharp(p, near) for p in (heavier, lighter)]
     assert answer.objective[0] == pytest.approx((ends[0].cost - ends[1].cost) / (2 * STEP), rel=RESOLVED)
     np.testing.assert_allclose(answer.x[:, 0], (ends[0].x - ends[1].x) / (2 * STEP), atol=RESOLVED_X)
 

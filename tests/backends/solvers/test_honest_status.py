@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import IpoptSettings, ipopt_for
-from nlp_gait.backends.solvers.ipopt_end import CONVERGED, STATUS_WORDS, End, Guess
+from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
 from nlp_gait.problem import Constraint
-from nlp_gait.problem.solution import Evaluations
+from nlp_gait.problem.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import Mathematics, corner, row, toy
+from tests.backends.toys import Mathematics, corner, row, row_violations, toy
 
 Result = tuple[MX, tuple[Constraint, ...]]
 
@@ -29,14 +28,14 @@ def rough(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> Result:
 
 
 def test_an_acceptable_level_is_a_success_that_says_so() -> None:
-    solution = solve(toy(rough), settings=IpoptSettings(tolerance=1e-14))
+    solution = solve(toy(rough), solver=IpoptSettings(tolerance=1e-14))
     assert solution.success
     assert solution.status == "converged to IPOPT's acceptable level only"
     assert solution.starts[0].status == solution.status
 
 
 def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
-    solution = solve(toy(corner), settings=IpoptSettings(tolerance=1e-30))
+    solution = solve(toy(corner), solver=IpoptSettings(tolerance=1e-30))
     assert not solution.success
     assert solution.violation == 0.0
     assert solution.status == "no start converged; the best feasible one search direction became too small"
@@ -86,49 +85,79 @@ def test_starts_from_where_a_row_has_no_value_do_not_hide_the_others() -> None:
 def test_a_row_without_a_value_is_violated_and_named() -> None:
     problem = toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit), row(y, upper=limit))))
     x = np.array([-1.0, 2.0])
-    assert math.isnan(float(exact_model(problem).function(x, problem.p)[1]))
+    assert math.isnan(exact_model(problem).at(x, problem.p).violation)
     rows = row_violations(problem, x)
     assert [violated.name for violated in rows] == ["row", "row"]
     assert math.isnan(rows[0].violation)
     assert rows[1].violation == pytest.approx(1.5)
 
 
-def end(status: str, cost: float, violation: float) -> End:
-    """An end with what its rank depends on."""
+def end(claimed: bool, cost: float, violation: float) -> Outcome:
+    """An outcome with what its rank depends on."""
     none = np.zeros(0)
-    return End(
+    return Outcome(
+        solver="any",
+        x0=none,
         x=none,
+        claimed=claimed,
+        status="",
+        objective=cost,
         cost=cost,
         violation=violation,
-        row_multipliers=none,
-        bound_multipliers=none,
-        return_status=status,
         iterations=0,
         evaluations=Evaluations(),
+        build_s=0.0,
+        compile_s=0.0,
         time_s=0.0,
-        guess=Guess(primal=none, bounds=none, rows=none, width=1.0),
     )
 
 
-def test_ends_rank_by_success_then_feasibility_then_violation() -> None:
+def test_outcomes_rank_by_success_then_feasibility_then_violation() -> None:
     ranked = [
-        end("Solve_Succeeded", 2.0, 0.0),
-        end("Solved_To_Acceptable_Level", 3.0, 1e-7),
-        end("Maximum_Iterations_Exceeded", 0.0, 0.0),
-        end("Restoration_Failed", 1.0, 1e-7),
-        end("Solve_Succeeded", 9.0, 0.1),
-        end("Restoration_Failed", 0.0, 0.2),
-        end("Invalid_Number_Detected", 0.0, math.nan),
+        end(True, 2.0, 0.0),
+        end(True, 3.0, 1e-7),
+        end(False, 0.0, 0.0),
+        end(False, 1.0, 1e-7),
+        end(True, 9.0, 0.1),
+        end(False, 0.0, 0.2),
+        end(False, 0.0, math.nan),
     ]
     ranks = [item.rank for item in ranked]
     assert ranks == sorted(ranks)
     assert len(set(ranks)) == len(ranks)
     assert [item.success for item in ranked] == [True, True, *[False] * 5]
-    assert not end("Solve_Succeeded", math.nan, 0.0).success
-    assert end("Solve_Succeeded", 9.0, 0.1).status == "converged, but the exact functions find it infeasible"
-    assert end("Restoration_Failed", 0.0, 0.2).status == "restoration of feasibility failed"
-    assert end("Insufficient_Memory", 0.0, 0.2).status == "insufficient memory"
+    assert not end(True, math.nan, 0.0).success
     assert set(CONVERGED) < set(STATUS_WORDS)
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        ("Solve_Succeeded", "converged, but the exact functions find it infeasible"),
+        ("Restoration_Failed", "restoration of feasibility failed"),
+        ("Insufficient_Memory", "insufficient memory"),
+    ],
+)
+def test_what_ipopt_returns_is_said_in_words(returned: str, words: str) -> None:
+    """The limit is out of reach, so that the exact functions find every point infeasible."""
+    problem = toy(corner, limit=2.5)
+    ready = IpoptSettings(iterations=1).ready_for(problem)
+    ready._cold = Returning(ready._cold, returned)  # type: ignore[assignment]
+    outcome = ready.run(problem, np.array([-2.0, -1.0]))
+    assert (outcome.success, outcome.claimed, outcome.status) == (False, False, words)
+
+
+class Returning:
+    """A solver of CasADi's that returns another status after its first iteration."""
+
+    def __init__(self, solver: ca.Function, status: str) -> None:
+        self.solver, self.status = solver, status
+
+    def __call__(self, **named: object) -> object:
+        return self.solver(**named)
+
+    def stats(self) -> dict[str, object]:
+        return {**self.solver.stats(), "return_status": self.status}
 
 
 def test_options_that_lie_in_the_working_folder_change_nothing(
@@ -151,4 +180,4 @@ def test_the_linear_solver_is_the_one_that_ipopt_names(capfd: pytest.CaptureFixt
     ca.nlpsol("loud", "ipopt", {"x": x, "f": x**2}, {"ipopt.option_file_name": ""})(x0=1.0)
     banner = capfd.readouterr().out
     assert f"running with linear solver {linear_solver()}" in banner
-    assert ipopt_for(toy(corner), IpoptSettings()).linear_solver == linear_solver()
+    assert IpoptSettings().ready_for(toy(corner)).linear_solver == linear_solver()

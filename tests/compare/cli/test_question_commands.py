@@ -111,6 +111,15 @@ def test_a_linear_solver_that_is_not_there_is_refused() -> None:
     assert "linear solver 'ma57' does not run in this installation" in error and "leave linear_solver out" in error
 
 
+def test_solve_takes_any_nlp_solver_by_name(tmp_path: Path) -> None:
+    out = tmp_path / "best.json"
+    shown = nlp_gait("solve", "walk12", "--starts", "1", "--solver", "slsqp", "--out", out).stdout
+    written = json.loads(out.read_text())
+    assert "; slsqp\n" in shown and written["solver"] == "slsqp" and written["linear_solver"] == ""
+    assert written["success"] and written["active_constraints"] == []
+    assert "unknown NLP solver 'simplex'" in one_sentence("solve", "walk12", "--solver", "simplex")
+
+
 def press(*_: object, **__: object) -> None:
     signal.raise_signal(signal.SIGINT)
 

@@ -19,10 +19,11 @@ WALK = ProblemSpec(name="walk12")
 
 
 def test_starts_are_those_of_one_solve_with_as_many() -> None:
-    solution = nlp_gait.solve(WALK.load(), starts=2, seed=5)
+    problem = WALK.load()
+    solution = nlp_gait.solve(problem, starts=2, seed=5)
     tasks = starts(WALK, 2, seed=5)
-    assert [task.start for task in tasks] == [start.x0 for start in solution.starts]
-    assert run_task(tasks[1]).x == solution.starts[1].x
+    assert [task.start for task in tasks] == [problem.by_name(start.x0) for start in solution.starts]
+    assert run_task(tasks[1]).x == problem.by_name(solution.starts[1].x)
 
 
 def test_the_best_run_succeeds_before_it_is_cheap() -> None:
@@ -45,8 +46,8 @@ def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path
         run_all(tmp_path, starts(WALK, 1), lambda note: None, no_luck)
 
 
-@pytest.mark.parametrize("algorithm", ["pso", "slsqp"])
-def test_a_start_point_is_for_nlp_solvers(algorithm: str) -> None:
+def test_a_start_point_is_for_nlp_solvers() -> None:
     point = starts(WALK, 1)[0].start
-    with pytest.raises(InputError, match=f"'{algorithm}' takes no start point"):
-        check_task(Task(problem=WALK, algorithm=algorithm, start=point))
+    check_task(Task(problem=WALK, algorithm="slsqp", start=point))
+    with pytest.raises(InputError, match="'pso' takes no start point"):
+        check_task(Task(problem=WALK, algorithm="pso", start=point))

@@ -10,9 +10,9 @@ from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty.branch_and_bound import certify
-from compare.questions.certainty.clusters import Optimum, cluster, unseen
+from compare.questions.certainty.clusters import LocalOptimum, cluster, unseen
 from compare.questions.certainty.multistart import Ends, multistart
-from compare.questions.certainty.report import write_certainty
+from compare.questions.certainty.report import certainty_answer
 from compare.questions.certainty.study import certainty
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Constraint
@@ -62,7 +62,6 @@ def ends(x: list[float], objective: list[float], success: list[bool]) -> Ends:
         objective=np.array(objective),
         success=np.array(success),
         status=("converged",) * len(x),
-        time_s=np.zeros(len(x)),
     )
 
 
@@ -77,38 +76,38 @@ def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_non
 
 def test_estimates_by_hand() -> None:
     counts = (6, 3, 1)
-    estimate = unseen([Optimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
+    estimate = unseen([LocalOptimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
     assert estimate.good_turing == pytest.approx(0.1)
     assert estimate.expected_optima == pytest.approx(3 * 9 / 5)
     assert estimate.expected_covered == pytest.approx(6 * 13 / 90)
     assert (1 - estimate.largest_missed) ** 10 == pytest.approx(0.05)
-    assert unseen([Optimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
+    assert unseen([LocalOptimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
 
 
 def test_an_interrupted_multistart_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.questions.certainty.multistart.BATCH", 4)
     problem = toy(two_valleys)
-    whole = multistart(problem, tmp_path / "whole", starts=8, progress=lambda count, note: None)
+    whole = multistart(problem, tmp_path / "whole", starts=8)
 
-    def interrupt(count: int, note: str) -> None:
-        if count:
+    def interrupt(note: str) -> None:
+        if note == "4 starts":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         multistart(problem, tmp_path / "cut", starts=8, progress=interrupt)
     notes: list[str] = []
-    resumed = multistart(problem, tmp_path / "cut", starts=8, progress=lambda count, note: notes.append(note))
+    resumed = multistart(problem, tmp_path / "cut", starts=8, progress=notes.append)
     assert "starts-0: kept from an earlier run" in notes
     np.testing.assert_array_equal(whole.x, resumed.x)
 
 
 def test_a_study_says_what_is_proven_and_what_is_supported(tmp_path: Path) -> None:
     problem = toy(two_valleys, limit=-9.0)
-    study = certainty(problem, tmp_path, starts=12, evaluations=2000, time_limit_s=20.0, progress=lambda n, note: None)
+    study = certainty(problem, tmp_path, starts=12, evaluations=2000, time_limit_s=20.0)
     assert len(study.optima) == 2
     assert study.optima[0].x[0] < 0.0 < study.optima[1].x[0]
     assert study.certificate is not None and study.certificate.closed
     assert "no feasible x falls below" in study.proven
     assert study.search is not None and study.search.gap == pytest.approx(0.0, abs=1e-6)
-    assert all(path.stat().st_size > 0 for path in write_certainty(tmp_path, study))
+    assert all(path.stat().st_size > 0 for path in certainty_answer(study).write(tmp_path))
     study.to_json()

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.judge import evaluate
 from compare.questions.motions import study as module
-from compare.questions.motions.report import rows, sentences
+from compare.questions.motions.report import motions_answer, sentences
 from compare.questions.motions.study import Motion, limit, motions
 from compare.questions.motions.tasks import tasks
 from compare.study.task import ProblemSpec
@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> list[Motion]:
-    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), folder / "motions")
+    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), folder)
 
 
 def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: list[Motion]) -> None:
@@ -51,10 +51,10 @@ def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], mon
     monkeypatch.setattr(module, "solve", never)
     again: list[str] = []
     study = tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0)
-    assert motions(study, folder / "motions", progress=again.append) == found
+    assert motions(study, folder, progress=again.append) == found
     assert again == ["planned-cubic-power", "planned-quintic-power", "coarse-quintic-power"]
-    with pytest.raises(InputError, match="another study"):
-        motions(study, folder / "motions", seed=1)
+    with pytest.raises(AssertionError, match="solved again"):
+        motions(study, folder, seed=1)
 
 
 def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
@@ -64,9 +64,10 @@ def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert [motion["power_W"] for motion in result["motions"]] == [motion.power_W for motion in found]
-    table, *pictures = (Path(name) for name in result["files"])
-    lines = list(csv.DictReader(table.read_text().splitlines()))
+    written = {Path(name).name: Path(name) for name in result["files"]}
+    lines = list(csv.DictReader(written["nao-dsp-motions.csv"].read_text().splitlines()))
     assert [float(line["power_W"]) for line in lines] == [motion.power_W for motion in found]
+    pictures = [path for path in written.values() if path.suffix in (".png", ".svg")]
     assert len(pictures) == 4 and all(picture.stat().st_size > 10_000 for picture in pictures)
     printed = RUN.invoke(app, command).stdout
     assert "11 samples: quintic" in printed and "never rises" in printed
@@ -86,7 +87,7 @@ def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
     cubic, quintic, coarse = found
     worse = replace(quintic, power_W=cubic.power_W + 0.01)
     assert "power rises by up to 0.01 W" in sentences([cubic, worse, coarse])[0]
-    assert rows([cubic, worse])[1][3].startswith("-")
+    assert "-" in motions_answer([cubic, worse], "nao-dsp").parts[0].rows[1][3]
 
 
 @pytest.mark.parametrize("phase", ["nao-ssp", "nao-dsp"])

@@ -28,9 +28,12 @@ def test_it_tells_what_each_feature_changes(tmp_path: Path, monkeypatch: pytest.
     assert heated["power_W"] < heated["unchanged_power_W"]
     assert heated["published_power_W"] > published["power_W"]
     assert 0.0 < published["uses"]["torque against speed"]["share"] < 1.0
-    table, *pictures = (Path(name) for name in answer["files"])
-    assert [row["variant"] for row in csv.DictReader(table.read_text().splitlines())] == list(names)
-    assert all(picture.stat().st_size > 0 for picture in pictures)
+    written = [Path(name) for name in answer["files"]]
+    assert [
+        row["variant"] for row in csv.DictReader((tmp_path / "nao-dsp-motors.csv").read_text().splitlines())
+    ] == list(names)
+    assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
+    assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_other_problems_have_no_motors(tmp_path: Path) -> None:

@@ -11,13 +11,13 @@ import pytest
 import nlp_gait
 from compare.judge import evaluate
 from compare.questions.pareto.compare import quality
-from compare.questions.pareto.criteria import criterion, parse_objectives
+from compare.questions.pareto.competing import competing_objective, parse_objectives
 from compare.questions.pareto.front import FrontPoint, nondominated, pareto_front
 from compare.questions.pareto.knees import bends
-from compare.questions.pareto.report import write_front
+from compare.questions.pareto.report import front_answer
 from compare.questions.pareto.search import SearchFront
 from compare.questions.pareto.study import ParetoStudy, pareto_study, parse_searches
-from compare.questions.pareto.surface import pareto_surface, write_surface
+from compare.questions.pareto.surface import pareto_surface, surface_answer
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import GaitProblem
 
@@ -71,10 +71,10 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
     judged = evaluate(problem, x)
     objective = nlp_gait.compile_objective(problem)
     for margin in ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min"):
-        beside = criterion(margin, problem)
+        beside = competing_objective(margin, problem)
         assert beside.value(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
         assert beside.values(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
-    speed = criterion("speed", problem)
+    speed = competing_objective("speed", problem)
     way = 0.06 if name == "nao-ssp" else 0.04  # of the hip, Tables 3 and 5
     assert speed.value(problem, x) == pytest.approx(way / x[-1])
     assert speed.limited(problem, 2 * way / x[-1]).upper[-1] == pytest.approx(x[-1] / 2)
@@ -83,7 +83,7 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
 def test_prices_are_the_fronts_slopes() -> None:
     problem = nlp_gait.load("nao-ssp")
     for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
-        beside = criterion(name, problem)
+        beside = competing_objective(name, problem)
         free = beside.freed(problem)
         below, here, above = (
             nlp_gait.solve(beside.limited(free, at + k * step), starts=1, x0=X).objective for k in (-1, 0, 1)
@@ -107,12 +107,12 @@ def test_objectives_are_parsed() -> None:
 
 def test_what_cannot_be_traded_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="objective beside power"):
-        criterion("dbm_z", nlp_gait.load("nao-ssp"))
+        competing_objective("dbm_z", nlp_gait.load("nao-ssp"))
     with pytest.raises(InputError, match="trades no power"):
-        criterion("speed", nlp_gait.load("walk12"))
+        competing_objective("speed", nlp_gait.load("walk12"))
     with pytest.raises(InputError, match="at least 5"):
         problem = nlp_gait.load("nao-ssp")
-        pareto_front(problem, criterion("speed", problem), points=2)
+        pareto_front(problem, competing_objective("speed", problem), points=2)
 
 
 def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothing() -> None:
@@ -171,11 +171,11 @@ def test_a_small_front_lies_below_what_searches_find_and_is_kept(small: GaitProb
     again = study(small, folder, notes)
     assert any("kept from an earlier run" in note for note in notes)
     assert [p.power_W for p in again.front] == list(powers)
-    table, *pictures = write_front(folder, found.front, found.bends, found.searches, found.problem, found.criterion)
-    with table.open(encoding="utf-8") as file:
+    written = front_answer(found, small).write(folder)
+    with (folder / "nao-ssp-front-dbm_y_mean.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["power_W"]) for row in rows] == list(powers)
-    assert all(path.stat().st_size > 0 for path in pictures)
+    assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> None:
@@ -184,4 +184,4 @@ def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> 
     for (margin, speed), power in powers.items():
         assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
     assert len(surface.points) + len(surface.infeasible) == 4
-    assert all(path.stat().st_size > 0 for path in write_surface(folder, surface))
+    assert all(path.stat().st_size > 0 for path in surface_answer(surface).write(folder))

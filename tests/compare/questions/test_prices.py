@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.prices.study import AGREEMENT, prices
 from compare.study.task import ProblemSpec
+from nlp_gait import solver
+from nlp_gait.errors import InputError
 
 RUN = CliRunner()
 
@@ -25,10 +27,11 @@ def test_the_command_prices_every_limit_and_writes_table_and_picture(tmp_path: P
     assert dearest["name"] == "f2max_m"
     # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
     assert dearest["slope"] == pytest.approx(-0.85 / 0.13, rel=1e-6)
-    table, *pictures = (Path(name) for name in answer["files"])
-    rows = list(csv.DictReader(table.read_text().splitlines()))
+    written = [Path(name) for name in answer["files"]]
+    rows = list(csv.DictReader((tmp_path / "walk12-prices.csv").read_text().splitlines()))
     assert [row["quantity"] for row in rows] == [price["name"] for price in answer["limits"]]
-    assert all(picture.stat().st_size > 0 for picture in pictures)
+    assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
+    assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_the_table_says_units_and_steps(tmp_path: Path) -> None:
@@ -46,6 +49,11 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
     turn = next(price for price in found.limits if price.name == "turn_rad")
     assert turn.error is None and turn.one_step is not None
     assert turn.one_step[0] is None and turn.one_step[1] == pytest.approx(turn.per_step, rel=0.05)
+
+
+def test_a_solver_without_multipliers_has_no_prices() -> None:
+    with pytest.raises(InputError, match="need multipliers, which slsqp does not give; solve with ipopt"):
+        prices(ProblemSpec(name="walk12"), starts=2, solver=solver("slsqp"))
 
 
 def test_a_fixed_variable_has_one_price() -> None:

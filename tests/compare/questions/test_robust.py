@@ -47,15 +47,18 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
     # It costs what its price says, and a little more where the price grows.
     price = 23.7325
     assert found["power_W"] - found["nominal_W"] == pytest.approx(0.002 * price, rel=0.01)
-    table, *pictures = (Path(name) for name in answer["files"])
-    assert [row["uncertain"] for row in csv.DictReader(table.read_text().splitlines())] == ["soles"]
-    assert all(picture.stat().st_size > 0 for picture in pictures)
+    written = [Path(name) for name in answer["files"]]
+    assert [row["uncertain"] for row in csv.DictReader((tmp_path / "nao-ssp-robust.csv").read_text().splitlines())] == [
+        "soles"
+    ]
+    assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
+    assert all(path.stat().st_size > 0 for path in written)
     # Solved independently: the nominal problem with a limit that is 2 mm stricter has the same optimum.
     x = np.array(list(found["x"].values()))
     stricter = load("nao-ssp").with_values(dbm_y_mean_limit_m=0.022)
-    cost, violation, *_ = exact_model(stricter).function(x, stricter.p)
-    assert float(violation) < 1e-6
-    assert float(cost) == pytest.approx(found["power_W"])
+    at = exact_model(stricter).at(x, stricter.p)
+    assert at.violation < 1e-6
+    assert at.cost == pytest.approx(found["power_W"])
 
 
 def test_boxes_grow_and_name_every_link() -> None:
@@ -67,4 +70,4 @@ def test_boxes_grow_and_name_every_link() -> None:
 def test_problems_without_a_robot_are_refused(tmp_path: Path) -> None:
     done = RUN.invoke(app, ["robust", "walk12", "--no-simulate", "--out", str(tmp_path)])
     assert done.exit_code == 1
-    assert done.stderr.startswith("nlp-gait: only the NAO problems have a robot")
+    assert done.stderr.startswith("nlp-gait: problem 'walk12' has no robot to be uncertain about")

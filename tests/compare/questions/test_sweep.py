@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from compare.drawing.labels import axis_label, quantity
-from compare.questions.sweep.report import sweep_figure, write_sweep
+from compare.questions.sweep.report import sweep_answer, sweep_figure
 from compare.questions.sweep.study import Axis, SweepPoint, count_solves, parse_axis, sweep
-from compare.study.runner import ProblemSpec
+from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError, UnknownNameError
 
 SSP, DSP = ProblemSpec(name="nao-ssp"), ProblemSpec(name="nao-dsp")
@@ -56,16 +56,24 @@ def test_true_price_of_time() -> None:
     assert {p.at["single_support_time_s"]: p.objective for p in points} == pytest.approx(DURATIONS_W, abs=AGREEMENT_W)
 
 
+def test_another_nlp_solver_walks_the_grid_too() -> None:
+    axes = [Axis(name="swing_height_m", values=(0.015, 0.018))]
+    calls: list[str] = []
+    points = sweep(SSP, axes, algorithm="slsqp", starts=1, progress=calls.append)
+    assert len(calls) == count_solves(axes, "slsqp") == 4
+    assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
+
+
 def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
     axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
-    calls: list[None] = []
-    points = sweep(DSP, axes, algorithm="pso", evaluations=300, progress=lambda: calls.append(None))
+    calls: list[str] = []
+    points = sweep(DSP, axes, algorithm="pso", evaluations=300, progress=calls.append)
     assert len(calls) == len(points) == count_solves(axes, "pso") == 4
     assert count_solves(axes, "ipopt") == 8
     assert [tuple(p.at.values()) for p in points] == [(0.3, 0.02), (0.3, 0.03), (0.31, 0.02), (0.31, 0.03)]
     assert [p.x["hip_height_m"] for p in points] == [0.3, 0.3, 0.31, 0.31]
-    written = write_sweep(tmp_path, points, DSP.load(), "pso")
-    assert [path.suffix for path in written] == [".csv", ".png", ".svg"]
+    written = sweep_answer(points, DSP.load(), "pso").write(tmp_path)
+    assert sorted(path.suffix for path in written) == [".csv", ".html", ".json", ".md", ".png", ".svg"]
     assert all(path.stat().st_size > 0 for path in written)
 
 
@@ -100,7 +108,8 @@ def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
             (0.09, 1.7, False, "in the way: dbm_y_mean (by 0.04 m)"),
         )
     ]
-    table, *_ = write_sweep(tmp_path, points, problem, "ipopt")
+    sweep_answer(points, problem, "ipopt").write(tmp_path)
+    table = tmp_path / "nao-ssp-sweep-dbm_y_mean_limit_m-ipopt.csv"
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [row["feasible"] for row in rows] == ["true", "true", "false"]
     assert [float(row["power_W"]) for row in rows] == [0.8459, 0.9, 1.7]

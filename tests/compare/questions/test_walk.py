@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.questions.sweep.study import parse_axis
-from compare.questions.walk.report import write_figures
-from compare.questions.walk.study import Gait, optimal_gaits, result_of, solves, walk_csv, write_walk
+from compare.questions.walk.report import walk_answer
+from compare.questions.walk.study import Gait, optimal_gaits
+from compare.report.document import Figure
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.problem import load_result
@@ -32,7 +33,6 @@ def gaits() -> list[Gait]:
 
 
 def test_gaits_hold_what_they_were_asked_for(gaits: list[Gait]) -> None:
-    assert solves(AXIS) == 4
     assert [gait.found.feasible for gait in gaits] == [True, True, False]
     for gait in gaits[:2]:
         assert gait.indexes["speed_m_s"] == pytest.approx(gait.at)
@@ -41,23 +41,24 @@ def test_gaits_hold_what_they_were_asked_for(gaits: list[Gait]) -> None:
 
 
 def test_the_table_and_the_results_can_be_read_back(gaits: list[Gait], tmp_path: Path) -> None:
-    written = write_walk(tmp_path, SPEC, gaits)
-    assert [path.suffix for path in written] == [".csv", ".json", ".json"]
-    rows = list(csv.DictReader(written[0].read_text().splitlines()))
+    walk_answer(SPEC, gaits).write(tmp_path)
+    rows = list(csv.DictReader((tmp_path / "nao-cycle-walk.csv").read_text().splitlines()))
     assert [float(row["at speed_m_s"]) for row in rows] == [0.04, 0.05, 1.0]
     assert rows[2]["feasible"] == "false" and rows[0]["engine_walked_m"] == ""
-    for gait, path in zip(gaits, written[1:], strict=False):
-        result = load_result(path)
+    assert not (tmp_path / "nao-cycle-speed_m_s-1.json").exists()
+    for gait in gaits[:2]:
+        result = load_result(tmp_path / f"nao-cycle-speed_m_s-{gait.at:g}.json")
         assert result.problem.value("speed_m_s") == gait.at
         assert result.problem.by_name(result.x) == gait.found.x
 
 
-def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait], tmp_path: Path) -> None:
-    problem = SPEC.load()
-    assert len(write_figures(tmp_path, gaits, problem, result_of(SPEC, gaits[0].found))) == 4
-    nothing = [replace(gait, found=replace(gait.found, feasible=False)) for gait in gaits]
-    assert len(write_figures(tmp_path, nothing, problem, None)) == 2
-    assert walk_csv(nothing).count("false") == 3
+def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait]) -> None:
+    def pictures(shown: list[Gait]) -> list[str]:
+        parts = walk_answer(SPEC, shown).parts
+        return [part.name for part in parts if isinstance(part, Figure)]
+
+    assert pictures(gaits) == ["nao-cycle-cost", "nao-cycle"]
+    assert pictures([replace(gait, found=replace(gait.found, feasible=False)) for gait in gaits]) == ["nao-cycle-cost"]
 
 
 def test_the_command_walks(tmp_path: Path) -> None:

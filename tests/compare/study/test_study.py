@@ -179,7 +179,7 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
         (Task(problem=SSP, algorithm="psoo"), "unknown algorithm 'psoo'; did you mean"),
         (Task(problem=SSP, algorithm="pso", settings={"inertial": 1}), "no setting 'inertial'"),
         (Task(problem=SSP, algorithm="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
-        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "slsqp has no settings"),
+        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
         (Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
         (Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
         (Task(problem=SSP, algorithm="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
@@ -247,17 +247,17 @@ def test_study_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("runs = 3", "runs = 0"), "runs must be a whole number of at least 1, got 0"),
+        (("runs = 3", "runs = 0"), "runs must be a whole number from 1 to 100000, got 0"),
         (("runs = 3", "runs = true"), "runs must be a whole number"),
-        (("runs = 3", "run = 3"), "unknown key of .*'run'; did you mean 'runs'"),
+        (("runs = 3", "run = 3"), "unknown key.*'run'"),
         (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
         (("target = 0.9", "target = nan"), "finite numbers"),
         (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
-        (('algorithm = "ipopt"', 'label = "x"'), "needs 'algorithm'"),
+        (('algorithm = "ipopt"', 'label = "x"'), "solver\\[0\\].algorithm is missing"),
         (("runs = 3", "runs = "), "is not valid TOML"),
-        (('name = "nao-ssp"', "name = 3"), "name must be a text, got 3"),
+        (('name = "nao-ssp"', "name = 3"), "problem\\[0\\].name must be a text, got 3"),
         (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
-        (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be a table"),
+        (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be an object"),
     ],
 )
 def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str, tmp_path: Path) -> None:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problems.nao.curves import SPANS
 from nlp_gait.symbolic.splines import finer
+from tests.backends.toys import row_violations
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 NAMES = ("nao-ssp", "nao-dsp")
@@ -39,8 +40,7 @@ def padded(problem: GaitProblem, coefficients: float | Array = 0.0) -> Array:
 
 
 def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    exact = exact_model(problem)
-    return dict(zip(exact.index_names, np.array(exact.function(x, problem.p)[5]).ravel().tolist(), strict=True))
+    return exact_model(problem).at(x, problem.p).indexes
 
 
 def some(problem: GaitProblem, seed: int = 0) -> Array:
@@ -139,7 +139,7 @@ def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, sign
     assert problem.signals is not None
     arrays = problem.signals(padded(problem)).arrays
     rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
-    cost = float(exact_model(problem).function(padded(problem), problem.p)[0])
+    cost = exact_model(problem).at(padded(problem), problem.p).cost
     assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)
 
 

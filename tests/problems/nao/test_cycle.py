@@ -82,8 +82,7 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
 
 
 def indexes(problem: GaitProblem, x: Array) -> dict[str, float]:
-    model = exact_model(problem)
-    return dict(zip(model.index_names, np.array(model.function(x, problem.p)[5]).ravel().tolist(), strict=True))
+    return exact_model(problem).at(x, problem.p).indexes
 
 
 def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
@@ -186,9 +185,9 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         for signals in halves:
             tau, qd, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
             energy += float(np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
-        power = float(exact_model(at_speed).function(x, at_speed.p)[0])
+        power = exact_model(at_speed).at(x, at_speed.p).cost
         assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
-        per_metre = float(exact_model(free).function(np.append(x, step), free.p)[0])
+        per_metre = exact_model(free).at(np.append(x, step), free.p).cost
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
         figures = indexes(at_speed, x)
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
@@ -209,9 +208,9 @@ def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
     x = candidates(at_speed)[0]
     fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
     model = exact_model(fast)
-    _, _, g, _, upper, _ = (np.array(value).ravel() for value in model.function(x, fast.p))
+    values = model.at(x, fast.p)
     row = model.row_names.index("step_length")
-    assert g[row] == pytest.approx(0.144) and upper[row] == pytest.approx(0.122)
+    assert values.g[row] == pytest.approx(0.144) and values.upper[row] == pytest.approx(0.122)
 
 
 def test_the_published_limits_are_the_defaults() -> None:

@@ -9,12 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.closed_chain import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
+from tests.backends.toys import row_violations
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
@@ -122,7 +123,7 @@ def test_the_objective_is_the_power_of_the_signals() -> None:
         arrays = signals_of(problem, leaning(seed)).arrays
         tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert float(exact_model(problem).function(leaning(seed), problem.p)[0]) == pytest.approx(power, rel=ROUNDING)
+        assert exact_model(problem).at(leaning(seed), problem.p).cost == pytest.approx(power, rel=ROUNDING)
 
 
 def test_without_a_lean_it_is_the_planned_motion() -> None:
@@ -132,7 +133,7 @@ def test_without_a_lean_it_is_the_planned_motion() -> None:
     mine, theirs = signals_of(free, x), signals_of(planned, x[: len(planned.names)])
     for signal, values in theirs.arrays.items():
         np.testing.assert_allclose(mine.arrays[signal], values, rtol=0, atol=1e-9, err_msg=signal)
-    cost, expected = (float(exact_model(p).function(x[: len(p.names)], p.p)[0]) for p in (free, planned))
+    cost, expected = (exact_model(p).at(x[: len(p.names)], p.p).cost for p in (free, planned))
     assert cost == pytest.approx(expected, rel=1e-9)
 
 

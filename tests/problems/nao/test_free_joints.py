@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model, row_violations
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.robots import load_robot
+from tests.backends.toys import row_violations
 from tests.pinocchio_oracle import floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
@@ -67,7 +68,7 @@ def test_the_objective_is_the_power_of_the_signals() -> None:
         arrays = signals_of(problem, leaning(seed)).arrays
         tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert float(exact_model(problem).function(leaning(seed), problem.p)[0]) == pytest.approx(power, rel=ROUNDING)
+        assert exact_model(problem).at(leaning(seed), problem.p).cost == pytest.approx(power, rel=ROUNDING)
 
 
 def test_both_yaw_pitch_joints_are_one_and_the_held_arm_joints_stay() -> None:
@@ -89,7 +90,7 @@ def test_the_ends_are_the_papers() -> None:
 def test_a_planned_motion_is_a_free_one_nearly() -> None:
     planned, free = load("nao-ssp"), problem_of("spline-8")
     x = fitted_start("spline-8", planned, np.array(PAPER))
-    power, expected = (float(exact_model(p).function(v, p.p)[0]) for p, v in ((free, x), (planned, PAPER)))
+    power, expected = (exact_model(p).at(v, p.p).cost for p, v in ((free, x), (planned, PAPER)))
     assert power == pytest.approx(expected, rel=FIT_SHARE)
     started = free.start_point(np.random.default_rng(0))
     assert len(started) == len(free.names) and np.isfinite(started).all()

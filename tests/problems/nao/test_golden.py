@@ -32,9 +32,7 @@ NAMES = ("nao-ssp", "nao-dsp")
 
 
 def indexes(problem: GaitProblem, x: Array | list[float]) -> dict[str, float]:
-    exact = exact_model(problem)
-    values = np.array(exact.function(x, problem.p)[5]).ravel()
-    return dict(zip(exact.index_names, map(float, values), strict=True))
+    return exact_model(problem).at(x, problem.p).indexes
 
 
 @pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
@@ -130,8 +128,8 @@ wild = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 1e-300, -1.0, 1e6])
 @example(x=[1e6] * 9)
 def test_the_exact_functions_are_finite_for_every_finite_x(x: list[float]) -> None:
     for problem in EVALUATED:
-        for output in exact_model(problem).function(x[: len(problem.names)], problem.p)[:3]:
-            assert np.isfinite(np.array(output)).all()
+        at = exact_model(problem).at(x[: len(problem.names)], problem.p)
+        assert np.isfinite([at.cost, at.violation, *at.g]).all()
 
 
 EVALUATED = [load(name, derivatives=kind) for name in NAMES for kind in ("analytic", "finite-difference")]
@@ -141,10 +139,10 @@ def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
     problem = load("nao-ssp")
     exact = exact_model(problem)
     x = np.array([0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
-    cost, violation, g, lower, upper, _ = (np.array(value).ravel() for value in exact.function(x, problem.p))
-    assert np.isfinite(cost[0])
-    assert violation[0] > 0
-    broken = {name for name, bad in zip(exact.row_names, (g < lower) | (g > upper), strict=True) if bad}
+    at = exact.at(x, problem.p)
+    assert np.isfinite(at.cost)
+    assert at.violation > 0
+    broken = {name for name, bad in zip(exact.row_names, (at.g < at.lower) | (at.g > at.upper), strict=True) if bad}
     assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in broken)
 
 

@@ -22,8 +22,8 @@ X = np.array([0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0])
 def exact(problem: GaitProblem, x: np.ndarray) -> tuple[float, dict[str, float]]:
     """Objective, and values of all rows by name."""
     model = exact_model(problem)
-    cost, _, rows, *_ = model.function(x, problem.p)
-    return float(cost), dict(zip(model.row_names, np.array(rows).ravel().tolist(), strict=True))
+    at = model.at(x, problem.p)
+    return at.cost, dict(zip(model.row_names, at.g.tolist(), strict=True))
 
 
 def mean(samples: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ def test_ankle_rows_mirror() -> None:
 def test_an_index_keeps_the_papers_power() -> None:
     problem = load("nao-ssp", motors="heat")
     model = exact_model(problem)
-    indexes = dict(zip(model.index_names, np.array(model.function(X, problem.p)[5]).ravel().tolist(), strict=True))
+    indexes = model.at(X, problem.p).indexes
     assert indexes["paper_power_W"] == pytest.approx(exact(load("nao-ssp"), X)[0])
     assert indexes["power_W"] == exact(problem, X)[0]
 

@@ -117,5 +117,5 @@ def test_power_of_the_signals_is_the_objective(name: str) -> None:
         signals = signals_of(problem, x)
         tau, qd, t = (signals.arrays[key] for key in ("tau", "qd", "t"))
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        cost = float(exact_model(problem).function(x, problem.p)[0])
+        cost = exact_model(problem).at(x, problem.p).cost
         assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order

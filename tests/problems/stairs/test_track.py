@@ -31,9 +31,8 @@ def problem() -> GaitProblem:
 
 def values(problem: GaitProblem, x: list[float]) -> tuple[float, float, dict[str, float]]:
     """Cost, violation and indexes."""
-    model = exact_model(problem)
-    cost, violation, *_, indexes = model.function(x, problem.p)
-    return float(cost), float(violation), dict(zip(model.index_names, np.array(indexes).ravel(), strict=True))
+    at = exact_model(problem).at(x, problem.p)
+    return at.cost, at.violation, at.indexes
 
 
 def test_stiff_gains_follow_the_plan(problem: GaitProblem) -> None:
@@ -70,7 +69,7 @@ def test_the_printed_explicit_scheme_diverges_and_says_when(problem: GaitProblem
 def test_multiple_shooting_meets_the_ants() -> None:
     """On the first 0.08 s, which solve in seconds."""
     short = nlp_gait.load("stairs-track", duration_s=0.08)
-    solution = nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], settings=INTERPRETED)
+    solution = nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED)
     assert solution.success, solution.status
     found = minimize(nlp_gait.compile_objective(short), AntColony(), evaluations=2_000, seed=0)
     assert found.feasible
@@ -99,7 +98,7 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
 
 def test_ipopt_solves_with_the_network() -> None:
     short = nlp_gait.load("stairs-track", duration_s=0.04, inverse_kinematics="network")
-    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], settings=INTERPRETED).success
+    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).success
 
 
 def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -> None:

@@ -30,16 +30,15 @@ def random_gaits(count: int, seed: int) -> list[Any]:
     found: list[Any] = []
     while len(found) < count:
         x = rng.uniform(DEFAULT.lower, DEFAULT.upper)
-        if float(model.function(x, DEFAULT.p)[1]) == 0.0:
+        if model.at(x, DEFAULT.p).violation == 0.0:
             found.append(x)
     return found
 
 
 def values(problem: GaitProblem, x: Any) -> tuple[float, float, dict[str, float]]:
     """f, violation and indexes."""
-    model = exact_model(problem)
-    cost, violation, *_, indexes = model.function(x, problem.p)
-    return -float(cost), float(violation), dict(zip(model.index_names, indexes.full().ravel(), strict=True))
+    at = exact_model(problem).at(x, problem.p)
+    return -at.cost, at.violation, at.indexes
 
 
 @pytest.mark.parametrize("row", oracle.TABLE_3, ids=lambda row: f"lambda={row[0]}")

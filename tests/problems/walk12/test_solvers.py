@@ -39,7 +39,7 @@ def test_between_the_plateaus() -> None:
 @pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
 def test_the_corner_is_no_trap(hessian: str) -> None:
     settings = nlp_gait.IpoptSettings(hessian=hessian)
-    solution = solve(PROBLEM.with_values(**{"lambda": 0.15}), x0=[0.13] * 4, settings=settings)
+    solution = solve(PROBLEM.with_values(**{"lambda": 0.15}), x0=[0.13] * 4, solver=settings)
     assert solution.objective == pytest.approx(0.9708, abs=OPTIMUM_TOLERANCE)
 
 

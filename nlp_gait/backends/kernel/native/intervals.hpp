@@ -6,6 +6,8 @@
 
 #include <math.h>
 
+#include <initializer_list>
+
 #define EXPORT __attribute__((visibility("default")))
 #define LIBM_UNITS 4.0
 

@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar, cast
 
 from compare.cli.common import end_interrupted
+from nlp_gait.backends.interrupts import Interrupted
+
+R = TypeVar("R")
+
+
+def until_interrupted(work: Callable[[], R], nothing: str = "nothing was written") -> tuple[R, str]:
+    """What some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
+
+    Args:
+        work: raises ``Interrupted`` with the part that was found.
+        nothing: what to add to the sentence if nothing was found; the command ends with it.
+    """
+    try:
+        return work(), ""
+    except Interrupted as interrupt:
+        if not interrupt.partial:
+            end_interrupted("; ".join(filter(None, (interrupt.sentence, nothing))))
+        return cast(R, interrupt.partial), interrupt.sentence
 
 
 @contextmanager

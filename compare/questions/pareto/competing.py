@@ -1,12 +1,10 @@
-"""What is traded against power: a balance margin or the walking speed, each as a limit, a number and an expression."""
+"""Objectives that compete with power, a balance margin or the walking speed: each as a limit, a number and an expression."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
-import numpy as np
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model
@@ -19,39 +17,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 POWER, SPEED = "power", "speed"
 MARGINS = ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min")
 REWARD = "reward_W_per_unit"
-
-
-class Criterion(Protocol):
-    """A quantity that is to be large, and whose least value can be demanded by a parameter."""
-
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-
-    @property
-    def unit(self) -> str:
-        """Of the values."""
-
-    def demanded(self, problem: GaitProblem) -> float:
-        """Least value that the problem as it is demands; -inf if none."""
-
-    def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The problem without a demand on it."""
-
-    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """The problem with a least value."""
-
-    def value(self, problem: GaitProblem, x: Array) -> float:
-        """Exact value at x (n,)."""
-
-    def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """(P,) values of candidates (P, n)."""
-
-    def expression(self, point: Point, assembly: Assembly) -> MX:
-        """Scalar."""
-
-    def price(self, solution: Solution) -> float:
-        """Change of the least power per unit of the demand [W/unit]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,37 +32,35 @@ class Margin:
         return f"{self.name}_limit_m"
 
     def demanded(self, problem: GaitProblem) -> float:
-        """See ``Criterion``."""
+        """Least value that the problem as it is demands."""
         return problem.value(self.parameter)
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
-        """Only zero is demanded: the ZMP within the soles' box."""
+        """The problem with the least demand: zero, which keeps the ZMP within the soles' box."""
         return problem.with_values(**{self.parameter: 0.0})
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """See ``Criterion``."""
+        """The problem with a least value."""
         return problem.with_values(**{self.parameter: least})
 
     def value(self, problem: GaitProblem, x: Array) -> float:
-        """See ``Criterion``."""
-        exact = exact_model(problem)
-        indexes = np.array(exact.function(x, problem.p)[-1]).ravel()
-        return float(indexes[exact.index_names.index(f"{self.name}_m")])
+        """Exact value at x (n,)."""
+        return exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """See ``Criterion``."""
+        """(P,) values of candidates (P, n)."""
         rows = [i for i, name in enumerate(objective.row_names) if name.partition("[")[0] == self._group]
         margins: Array = objective.constraints(X)[:, rows].min(axis=1)
         return margins
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
-        """See ``Criterion``; the mean margins only, which are smooth but for the jump that is smoothed anyway."""
+        """Scalar for the assembly of a problem, of the mean margins only: smooth but for the jump that is smoothed anyway."""
         if not self.name.endswith("_mean"):
             raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
         return assembly.group(self.name).value
 
     def price(self, solution: Solution) -> float:
-        """See ``Criterion``."""
+        """Change of the least power per unit of the demand [W/unit]."""
         return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self._group), 0.0)
 
     @property
@@ -108,56 +71,60 @@ class Margin:
 
 @dataclass(frozen=True, kw_only=True)
 class Speed:
-    """Mean speed of the hip over the phase: the way that the phase prescribes, divided by the time that it takes.
+    """Mean speed of the hip over the phase: the distance that the phase prescribes, divided by its duration.
 
     Attributes:
         duration: variable that holds the phase's duration.
-        way_m: of the hip along x.
+        distance_m: of the hip along x.
     """
 
     duration: str
-    way_m: float
+    distance_m: float
     name: str = SPEED
     unit: str = "m/s"
 
     def demanded(self, problem: GaitProblem) -> float:
-        """See ``Criterion``."""
-        return self.way_m / problem.value(f"{self.duration}.upper")
+        """Least value that the problem as it is demands."""
+        return self.distance_m / problem.value(f"{self.duration}.upper")
 
     def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The phase may last as long as the problem's own bound allows: no speed is demanded beyond that."""
+        """The problem itself: its bound on the duration stays, and no speed is demanded beyond that."""
         return problem
 
     def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """See ``Criterion``."""
+        """The problem with a least value."""
         end = f"{self.duration}.upper"
-        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.way_m / least)})
+        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.distance_m / least)})
 
     def value(self, problem: GaitProblem, x: Array) -> float:
-        """See ``Criterion``."""
-        return self.way_m / float(x[problem.variable_index(self.duration)])
+        """Exact value at x (n,)."""
+        return self.distance_m / float(x[problem.variable_index(self.duration)])
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """See ``Criterion``."""
-        return self.way_m / X[:, objective.names.index(self.duration)]
+        """(P,) values of candidates (P, n)."""
+        return self.distance_m / X[:, objective.names.index(self.duration)]
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
-        """See ``Criterion``."""
-        return self.way_m / point[self.duration]
+        """Scalar for the assembly of a problem."""
+        return self.distance_m / point[self.duration]
 
     def price(self, solution: Solution) -> float:
-        """See ``Criterion``: dP/dv = dP/dT dT/dv with T = way / v."""
+        """Change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
         per_second = sum(
             a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
         )
-        return -per_second * solution.x[self.duration] ** 2 / self.way_m
+        return -per_second * solution.x[self.duration] ** 2 / self.distance_m
 
 
-def criterion(name: str, problem: GaitProblem) -> Criterion:
-    """Criterion of a NAO phase by name.
+CompetingObjective = Margin | Speed
+"""A quantity that is to be large, and whose least value can be demanded by a parameter."""
+
+
+def competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
+    """What a NAO phase trades against power, by name.
 
     Raises:
-        UnknownNameError: no such criterion.
+        UnknownNameError: no such objective.
         InputError: the problem has no power, margins and duration to trade.
     """
     durations = problem.durations
@@ -169,10 +136,10 @@ def criterion(name: str, problem: GaitProblem) -> Criterion:
         raise unknown("objective beside power", name, (*MARGINS, SPEED))
     middle = (problem.lower + problem.upper) / 2
     hip = problem.signals(middle).arrays["hip"]
-    return Speed(duration=durations[0], way_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
+    return Speed(duration=durations[0], distance_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
-def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
+def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
     """The problem that minimises power less a reward for the criterion, whose size is the parameter ``reward_W_per_unit``."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
@@ -191,10 +158,10 @@ def rewarding(problem: GaitProblem, criterion: Criterion) -> GaitProblem:
 
 
 def parse_objectives(text: str) -> Sequence[str]:
-    """Criteria beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
+    """Objectives beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
 
     Raises:
-        InputError: power is missing, or a name stands twice, or there are less than two or more than three.
+        InputError: power is missing, or a name stands twice, or there are fewer than two or more than three.
     """
     names = [part.strip() for part in text.split(",")]
     others = [name for name in names if name != POWER]

@@ -1,0 +1,20 @@
+"""Numbers with their units, as tables and figures show them. The unit of a pure number is "1" and is not shown."""
+
+from __future__ import annotations
+
+
+def with_unit(value: float | None, unit: str, digits: str = ".6f") -> str:
+    """For example ``0.845868 W``; a dash for None."""
+    if value is None:
+        return "-"
+    return f"{value:{digits}}" + ("" if unit == "1" else f" {unit}")
+
+
+def heading(words: str, unit: str) -> str:
+    """For example ``power [W]``."""
+    return words if unit == "1" else f"{words} [{unit}]"
+
+
+def millimetres(value_m: float | None, digits: str = ".1f") -> str:
+    """A length [m], for example ``24.3 mm``; a dash for None."""
+    return with_unit(None if value_m is None else 1000 * value_m, "mm", digits)

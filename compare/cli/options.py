@@ -1,0 +1,191 @@
+"""Options that several commands take, alone and in groups; ``command`` says what a group is."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.task import Handling, ProblemSpec, Stop
+from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.problem.registry import problem_maker
+
+ResultFile = Annotated[
+    Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
+]
+ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
+Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
+Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
+AnswerFolder = Annotated[Path, typer.Option(help="Folder for report, tables, pictures and data.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+# Where results go unless --out names a folder.
+RESULTS = Path("results")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProblemOptions:
+    """How a problem is built, and its values."""
+
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Of NAO problems: nao-v5 (default), nao-v6, nao-v4, or a robot file (.json, .urdf)."),
+    ] = None
+    intervals: Annotated[
+        int | None,
+        typer.Option(help="Equal parts of the motion (default: the problem's own, see `nlp-gait list PROBLEM`)."),
+    ] = None
+    derivatives: Annotated[
+        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
+    ] = None
+    option: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Any other option of the problem; repeatable.")
+    ] = None
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="Parameter, or a variable's bound as NAME.lower=VALUE; repeatable."
+        ),
+    ] = None
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a variable at a value; repeatable.")
+    ] = None
+
+    def spec_of(self, name: str) -> ProblemSpec:
+        """The problem of that name with these options and values, checked.
+
+        Raises:
+            UnknownNameError: problem, option, parameter or variable.
+            InputError: a value that is not allowed.
+        """
+        named = {"robot": self.robot, "intervals": self.intervals, "derivatives": self.derivatives}
+        options: dict[str, Any] = {key: value for key, value in named.items() if value is not None}
+        known = inspect.signature(problem_maker(name)).parameters
+        for key, text in _pairs(self.option, "--option"):
+            if key not in known:
+                raise unknown(f"option of {name}", key, known)
+            options[key] = _typed(key, text, known[key].default)
+        problem = ProblemSpec(name=name, options=options, values=_numbers(self.values, "--set")).load()
+        fixed = problem.fix(**_numbers(self.fix, "--fix"))
+        return ProblemSpec(name=name, options=options, values=dict(fixed.values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedProblem(ProblemOptions):
+    """A problem by its name, how it is built, and its values."""
+
+    name: ProblemName
+
+    def spec(self) -> ProblemSpec:
+        """The problem, checked; raises as ``spec_of``."""
+        return self.spec_of(self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NaoPhase(NamedProblem):
+    """A problem that is nao-ssp unless another is named."""
+
+    name: ProblemName = "nao-ssp"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions:
+    """Runs of search algorithms: how many, how constraints are handled, and when a run ends."""
+
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search algorithm.")] = 11
+    seed: Seed = 0
+    evaluations: Evaluations = 10_000
+    handling: Annotated[
+        str, typer.Option(help="Constraints in searches: deb (feasibility rules), penalty or epsilon.")
+    ] = "deb"
+    penalty_weight: Annotated[
+        float | None, typer.Option(help="Objective units per unit of violation, for --handling penalty.")
+    ] = None
+    target: Annotated[float | None, typer.Option(help="End a search at a feasible objective at least this good.")] = (
+        None
+    )
+    stagnation: Annotated[
+        int | None, typer.Option(min=1, help="End a search after this many generations without progress.")
+    ] = None
+    time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
+    polish: Annotated[
+        bool, typer.Option("--polish", help="IPOPT from each search's result, as a solver of its own.")
+    ] = False
+
+    def study(self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20) -> StudySettings:
+        """Study of these problems by these solvers.
+
+        Args:
+            problems: at least one.
+            solvers: at least one.
+            starts: of each gradient method.
+
+        Raises:
+            InputError: a penalty without weight, or a weight without penalty.
+        """
+        if (self.handling == "penalty") != (self.penalty_weight is not None):
+            raise InputError("--handling penalty and --penalty-weight go together; no weight suits every problem")
+        weight = {} if self.penalty_weight is None else {"weight": self.penalty_weight}
+        return StudySettings(
+            problems=tuple(problems),
+            solvers=tuple(solvers),
+            runs=self.runs,
+            starts=starts,
+            handling=Handling(name=self.handling, settings=weight),
+            stop=Stop(
+                evaluations=self.evaluations,
+                target=self.target,
+                stagnation=self.stagnation,
+                time_limit_s=self.time_limit,
+            ),
+            seed=self.seed,
+        )
+
+
+def names_in(text: str) -> list[str]:
+    """Comma-separated names."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def numbers_in(text: str) -> list[float]:
+    """Comma-separated numbers.
+
+    Raises:
+        InputError: one of them is no number.
+    """
+    return [_number("x", part, "--x") for part in text.split(",")]
+
+
+def _pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:
+    pairs = []
+    for item in items or ():
+        name, equals, text = item.partition("=")
+        if not equals or not name:
+            raise InputError(f"{flag} takes NAME=VALUE, got {item!r}")
+        pairs.append((name.strip(), text.strip()))
+    return pairs
+
+
+def _numbers(items: Sequence[str] | None, flag: str) -> dict[str, float]:
+    return {name: _number(name, text, flag) for name, text in _pairs(items, flag)}
+
+
+def _number(name: str, text: str, flag: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{flag}: {name} must be a number, got {text!r}") from None
+
+
+def _typed(name: str, text: str, default: Any) -> str | int | float | bool:
+    """Text as the type of an option's default."""
+    kind = type(default)
+    try:
+        return {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
+    except (KeyError, ValueError):
+        raise InputError(f"--option {name} must be {kind_name(kind)}, got {text!r}") from None

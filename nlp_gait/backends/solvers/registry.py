@@ -1,0 +1,53 @@
+"""NLP solvers by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
+from nlp_gait.backends.solvers.slsqp import Slsqp
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import InputError, unknown
+
+# A solver joins by a line here.
+SOLVERS: Mapping[str, type[Solver]] = {
+    solver.name: solver
+    for solver in (
+        IpoptSettings,
+        Slsqp,
+        Fatrop,
+        Sqpmethod,
+        Uno,
+    )
+}
+
+
+def solver(name: str, /, **settings: Any) -> Solver:
+    """An NLP solver by name, with settings where they differ from the defaults.
+
+    Raises:
+        UnknownNameError: no such solver or setting.
+        InputError: a setting of another type, or a value that is not allowed.
+    """
+    known = setting_names(name)
+    for setting in settings:
+        if not known:
+            raise InputError(f"{name} has no settings, got {setting!r}")
+        if setting not in known:
+            raise unknown(f"setting of {name}", setting, known)
+    try:
+        decoded(SOLVERS[name], settings)
+    except ValueError as error:
+        raise InputError(f"setting of {name}: {error}") from error
+    return SOLVERS[name](**settings)
+
+
+def setting_names(name: str) -> tuple[str, ...]:
+    """Names of a solver's settings; raises UnknownNameError."""
+    if name not in SOLVERS:
+        raise unknown("NLP solver", name, SOLVERS)
+    return tuple(field.name for field in fields(SOLVERS[name]))  # type: ignore[arg-type]

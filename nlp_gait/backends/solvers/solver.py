@@ -1,0 +1,84 @@
+"""What an NLP solver is: one run of a problem from one start point."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, is_dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.interrupts import never
+from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Evaluations, Outcome
+
+
+class Solver(Protocol):
+    """An NLP solver with its settings, for any problem: a frozen dataclass, whose fields are the settings.
+
+    A new one derives from this class in a file of its own and is entered in ``registry.SOLVERS``. It needs ``name`` and ``run``;
+    the other methods are for solvers that can do more. Fields named ``evaluations`` and ``time_limit_s`` are limits that a
+    study sets.
+    """
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        """One run.
+
+        Args:
+            problem: with its current parameter values.
+            x0: (n,) start point within the bounds.
+            stop: asked between iterations whether to end at once. A run that nobody can stop raises KeyboardInterrupt on
+                Ctrl-C.
+        """
+
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        """A run that starts warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
+        return None
+
+    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        """The same solver, checked and made ready for a number of runs of a problem and its copies."""
+        self.check(problem)
+        return self
+
+    def check(self, problem: GaitProblem) -> None:
+        """Raise InputError where a run would fail: the solver is not installed, or does not suit the problem."""
+        return None
+
+    def plain(self) -> dict[str, Any]:
+        """Settings as a record keeps them."""
+        return {"kind": type(self).__name__, **(asdict(self) if is_dataclass(self) else {})}
+
+
+def judged(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any) -> Outcome:
+    """Outcome at x (n,), which is pushed to the bounds, with the exact functions' values there."""
+    x = np.clip(x, problem.lower, problem.upper)
+    exact = exact_model(problem).at(x, problem.p)
+    return Outcome(
+        solver=solver,
+        x0=x0,
+        x=x,
+        objective=problem.objective.sign * exact.cost,
+        cost=exact.cost,
+        violation=exact.violation,
+        **others,
+    )
+
+
+def counted(stats: Mapping[str, Any]) -> Evaluations:
+    """Calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
+
+    def calls(*names: str) -> int:
+        return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
+
+    return Evaluations(
+        f=calls("nlp_f", "nlp_fg"),
+        g=calls("nlp_g", "nlp_fg"),
+        gradient=calls("nlp_grad_f", "nlp_jac_fg", "fwd1_nlp_grad_l"),
+        jacobian=calls("nlp_jac_g", "nlp_jac_fg"),
+        hessian=calls("nlp_hess_l"),
+    )

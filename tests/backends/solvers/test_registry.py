@@ -1,0 +1,104 @@
+"""Every NLP solver of the registry, and one that is not in it, wherever a solver is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from compare.questions.certainty.multistart import multistart
+from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.optima.continuation import Continuation, best_success, solve_both_ways
+from nlp_gait.backends.optima.optimum import optimum
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.nlpsol import CasadiSolver, probe
+from nlp_gait.backends.solvers.registry import SOLVERS, solver
+from nlp_gait.backends.solvers.solver import Solver, judged
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Evaluations, Outcome
+from tests.backends.toys import corner, toy
+
+# Of the objective of the toy: fatrop relaxes bounds by 1e-8 of them, SLSQP differentiates by differences.
+TOLERANCE = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Corners(Solver):
+    """Tries the start point and the corner at the limit: all that a new solver must have."""
+
+    name: ClassVar[str] = "corners"
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        return judged(
+            self.name,
+            problem,
+            x0,
+            np.maximum(problem.value("limit"), np.ones(2)),
+            claimed=True,
+            status="tried",
+            iterations=1,
+            evaluations=Evaluations(f=1),
+            build_s=0.0,
+            compile_s=0.0,
+            time_s=0.0,
+        )
+
+
+def ready(name: str) -> Solver:
+    if issubclass(SOLVERS[name], CasadiSolver) and (reason := probe(name)):
+        pytest.skip(f"{name} does not run here: {reason}")
+    return solver(name)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_each_solver_of_the_registry_solves_and_accounts_for_it(name: str) -> None:
+    solution = solve(toy(corner, limit=1.5), starts=3, solver=ready(name))
+    assert solution.objective == pytest.approx(1.5, abs=TOLERANCE)
+    assert (solution.solver, len(solution.starts)) == (name, 3)
+    assert solution.evaluations.f >= 3
+    assert bool(solution.active_constraints) == (solution.starts[0].guess is not None)
+    assert solution.to_json()["starts"][2]["x0"] == dict(zip("xy", solution.starts[2].x0.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("chosen", [*SOLVERS, "corners"])
+def test_a_path_of_problems_is_followed_by_any_solver(chosen: str) -> None:
+    follower = Corners() if chosen == "corners" else ready(chosen)
+    problem = toy(corner)
+    problems = [problem.with_values(limit=limit) for limit in (1.2, 1.4, 1.6)]
+    found = solve_both_ways(problems, starts=2, solver=follower)
+    assert [solution.objective for solution in found] == pytest.approx([0.6, 1.2, 1.8], abs=TOLERANCE)
+
+
+def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
+    problem = toy(corner, limit=1.5)
+    solution = solve(problem, starts=2, solver=Corners())
+    assert solution.success and solution.status == "tried" and solution.objective == pytest.approx(1.5)
+    assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
+    ends = multistart(problem, tmp_path, starts=3, solver=Corners(), progress=lambda count, note: None)
+    assert ends.success.all() and ends.objective == pytest.approx([1.5] * 3)
+
+
+def test_what_needs_multipliers_says_which_solver_gives_none() -> None:
+    problem = toy(corner, limit=1.5)
+    near = best_success(Continuation(starts=1, solver=Corners()).run(problem))
+    assert near is not None
+    with pytest.raises(InputError, match="need multipliers, which corners does not give; solve with ipopt"):
+        optimum(problem, near)
+
+
+def test_unknown_names_and_settings_are_refused() -> None:
+    with pytest.raises(UnknownNameError, match="unknown NLP solver 'ipop'; did you mean 'ipopt'"):
+        solver("ipop")
+    with pytest.raises(UnknownNameError, match="unknown setting of uno 'tolerance'"):
+        solver("uno", tolerance=1e-6)
+    with pytest.raises(InputError, match="fatrop has no settings, got 'tolerance'"):
+        solver("fatrop", tolerance=1e-6)
+    with pytest.raises(InputError, match="setting of ipopt: tolerance must be a number"):
+        solver("ipopt", tolerance="small")
+    with pytest.raises(InputError, match="slsqp needs at least 3 evaluations"):
+        solve(toy(corner), solver=solver("slsqp", evaluations=2))

@@ -1,0 +1,51 @@
+"""What every question hands out: a page, tables, data, and what is printed of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from compare.cli.questions.answers import hand_out
+from compare.questions.answer import Answer, all_digits, optima_table
+from nlp_gait.errors import OutputError
+
+ANSWER = Answer(
+    stem="walk-question",
+    title="walk: the question",
+    verdict=("One third is enough.",),
+    parts=(
+        "A remark.",
+        optima_table({"first": {"a_m": 1.0 / 3.0}, "second": {"a_m": 2.0}}),
+        all_digits("walk-numbers", ["case", "a_m", "found", "price"], [["first", 1.0 / 3.0, True, None]]),
+    ),
+    data={"a_m": 1.0 / 3.0, "bound": math.inf},
+    results={"walk-first": {"problem": "walk"}},
+)
+
+
+def test_an_answer_is_a_page_a_table_with_every_digit_and_plain_data(tmp_path: Path) -> None:
+    written = ANSWER.write(tmp_path)
+    assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()}
+    assert (tmp_path / "walk-numbers.csv").read_text() == "case,a_m,found,price\nfirst,0.3333333333333333,true,\n"
+    assert json.loads((tmp_path / "walk-question.json").read_text()) == {"a_m": 1.0 / 3.0, "bound": None}
+    assert json.loads((tmp_path / "walk-first.json").read_text()) == {"problem": "walk"}
+    page = (tmp_path / "walk-question.md").read_text()
+    assert page.startswith("# walk: the question") and "0.333333 | yes | -" in page
+    assert "One third is enough." in (tmp_path / "walk-question.html").read_text()
+
+
+def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hand_out(ANSWER, tmp_path, as_json=False)
+    printed = capsys.readouterr().out
+    for words in ("walk: the question", "One third is enough.", "A remark.", "0.33333", "wrote "):
+        assert words in printed
+    assert "price" not in printed
+
+
+def test_an_answer_that_cannot_be_written_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(OutputError, match="cannot write"):
+        hand_out(ANSWER, tmp_path / "nowhere", as_json=True)
+    assert json.loads(capsys.readouterr().out) == {"a_m": 1.0 / 3.0, "bound": None, "files": []}
