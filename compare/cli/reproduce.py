@@ -24,7 +24,9 @@ REPRODUCTIONS = {
 @command
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
-    out: Annotated[Path, typer.Option(help="Folder for tables, figures and report.md; finished steps in it are kept.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the report, its tables and figures; finished steps in it are kept.")
+    ],
 ) -> None:
     """Compute a paper's tables and figures anew and put them beside the printed ones.
 
@@ -33,6 +35,6 @@ def reproduce(
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
     module = import_module(REPRODUCTIONS[paper])
-    with resumable(out), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
+    with resumable(out, "**/*.json"), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
         module.reproduce(out, progress=advance)
     print_written(out / "report.md")

@@ -18,6 +18,10 @@ Value = str | float | int | bool | None
 """Content of a cell; None where there is nothing to say."""
 
 
+Rows = Sequence[Sequence[Value]]
+"""One value for each column."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cell:
     """Text of a cell, and the number by which its column is sorted; None sorts by the text."""
@@ -31,15 +35,15 @@ class Table:
     """A table of values with all their digits, and how people read them.
 
     Attributes:
-        columns: heading, with its unit, to the format of its numbers on a page, for example ``".4f"``; "" shows all digits.
+        columns: heading, with its unit, to the format of its numbers on a page, such as ``".4f"``; an empty one shows all digits.
         rows: one value for each column.
         name: stem of its CSV file; empty for a table that stands on the page only.
         caption: what it shows.
-        prose: columns of sentences: all flush left, not only the first.
+        prose: the cells are sentences, so that all columns are set flush left, not only the first.
     """
 
     columns: Mapping[str, str]
-    rows: Sequence[Sequence[Value]]
+    rows: Rows
     name: str = ""
     caption: str = ""
     prose: bool = False
@@ -70,7 +74,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Prose:
-    """Text of the program's own in Markdown. What users wrote belongs into plain text or tables, which are shown literally."""
+    """Markdown that the program itself writes. Words of users belong in plain strings and tables, which are shown literally."""
 
     markdown: str
 
@@ -92,7 +96,7 @@ class Document:
 
     Attributes:
         title: of the page.
-        verdict: the essence, in at most three sentences; none if empty.
+        verdict: the essence, in at most three sentences; may be empty.
         parts: the rest, in this order.
     """
 

@@ -170,6 +170,7 @@ class _Definition:
     handling: Mapping[str, Any] | None = None
     stop: Mapping[str, Any] | None = None
     polishes: Mapping[str, Any] | None = None
+    start: Mapping[str, float] | None = None
 
 
 def read_record(path: Path) -> RunRecord:

@@ -9,6 +9,9 @@ from compare.study.runs.gradient_run import gradient_run
 from compare.study.runs.search_run import search_run
 from compare.study.task import Task
 
+Run = Callable[[Task, RunRecord | None], RunRecord]
+"""Does one run of a task, from the run that it polishes if it does; it crosses process borders."""
+
 
 def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., None] | None = None) -> RunRecord:
     """Do one run and judge it.
@@ -21,10 +24,10 @@ def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., 
     return search_run(task, observe) if task.is_search else gradient_run(task, start)
 
 
-def attempt(task: Task, start: RunRecord | None = None) -> RunRecord:
+def attempt(task: Task, start: RunRecord | None = None, run: Run = run_task) -> RunRecord:
     """Do one run; whatever goes wrong in it is its record, not the end of the study."""
     try:
-        return run_task(task, start)
+        return run(task, start)
     except Exception as error:
         return RunRecord(
             problem=task.problem.title,

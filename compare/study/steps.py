@@ -5,15 +5,28 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from compare.study.progress import Progress
+from compare.study.workers import default_jobs
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.interrupts import children_ignore_interrupts
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
 from nlp_gait.problem import GaitProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One of several steps that may run side by side: what ``Steps`` takes; ``compute`` must be picklable."""
+
+    name: str
+    inputs: Mapping[str, Any]
+    compute: Callable[[], Any]
 
 
 class Steps:
@@ -25,7 +38,7 @@ class Steps:
         code: modules that compute the results; steps run again when their text has changed.
     """
 
-    def __init__(self, out: Path, progress: Callable[[str], None], code: Sequence[ModuleType] = ()) -> None:
+    def __init__(self, out: Path, progress: Progress, code: Sequence[ModuleType] = ()) -> None:
         self._folder = writable_folder(out / "steps")
         self._progress = progress
         self._code = "".join(inspect.getsource(module) for module in code)
@@ -41,16 +54,41 @@ class Steps:
         Raises:
             OutputError: the result cannot be kept.
         """
-        path = self._folder / f"{name}.json"
-        digest = hashlib.sha256((json.dumps(inputs, sort_keys=True) + self._code).encode()).hexdigest()
-        if (kept := _kept(path, digest)) is not None:
-            self._progress(f"{name}: kept from an earlier run")
-            return kept["result"]
-        self._progress(name)
-        # As JSON gives it back, now and whenever it is read again.
-        result = json.loads(json.dumps(compute(), allow_nan=False))
-        write_json(path, {"inputs": inputs, "sha256": digest, "result": result, "result_sha256": _digest(result)})
+        (result,) = self.side_by_side([Step(name=name, inputs=inputs, compute=compute)], jobs=1)
         return result
+
+    def side_by_side(self, steps: Sequence[Step], jobs: int | None = None) -> list[Any]:
+        """Results of several steps, in their order; each is kept as soon as it is there.
+
+        Args:
+            steps: with different names.
+            jobs: worker processes; None for one on each processor, 1 for this process.
+
+        Raises:
+            OutputError: a result cannot be kept.
+        """
+        results: dict[int, Any] = {}
+        for k, step in enumerate(steps):
+            if (kept := _kept(self._path(step), self._digest_of(step))) is not None:
+                self._progress(f"{step.name}: kept from an earlier run")
+                results[k] = kept["result"]
+        waiting = [k for k in range(len(steps)) if k not in results]
+        workers = min(jobs or default_jobs(), len(waiting))
+        for k, computed in _computed([(k, steps[k]) for k in waiting], workers, self._progress):
+            # As JSON gives it back, now and whenever it is read again.
+            results[k] = json.loads(json.dumps(computed, allow_nan=False))
+            self._keep(steps[k], results[k])
+        return [results[k] for k in range(len(steps))]
+
+    def _keep(self, step: Step, result: Any) -> None:
+        digests = {"sha256": self._digest_of(step), "result_sha256": _digest(result)}
+        write_json(self._path(step), {"inputs": step.inputs, "result": result, **digests})
+
+    def _path(self, step: Step) -> Path:
+        return self._folder / f"{step.name}.json"
+
+    def _digest_of(self, step: Step) -> str:
+        return hashlib.sha256((json.dumps(step.inputs, sort_keys=True) + self._code).encode()).hexdigest()
 
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
@@ -62,6 +100,28 @@ def fingerprint(problem: GaitProblem) -> dict[str, Any]:
         "parameters": problem.p.tolist(),
         "mathematics_sha256": hashlib.sha256(mathematics.encode()).hexdigest(),
     }
+
+
+def _computed(steps: Sequence[tuple[int, Step]], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
+    """Number and result of each step, as it finishes."""
+    if workers <= 1:
+        for number, step in steps:
+            progress(step.name)
+            yield number, step.compute()
+        return
+    from joblib import Parallel, delayed  # costs 0.1 s to import
+
+    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+    with children_ignore_interrupts():
+        results = parallel(delayed(_numbered)(number, step) for number, step in steps)
+    names = dict(steps)
+    for number, result in results:
+        progress(names[number].name)
+        yield number, result
+
+
+def _numbered(number: int, step: Step) -> tuple[int, Any]:
+    return number, step.compute()
 
 
 def _kept(path: Path, digest: str) -> dict[str, Any] | None:

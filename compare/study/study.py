@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compare.study.record import RunRecord, read_record
+from compare.study.runner import Run, run_task
 from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
@@ -28,12 +29,14 @@ class Study:
         folder: where records go, see ``record_file``; None keeps nothing.
         jobs: worker processes; 1 runs in this one.
         scheduler: address of a Dask scheduler that takes their place.
+        run: does one run, and may keep more than its record.
     """
 
     tasks: tuple[Task, ...]
     folder: Path | None = None
     jobs: int = 1
     scheduler: str | None = None
+    run: Run = run_task
 
     def __post_init__(self) -> None:
         """Refuse what cannot run."""
@@ -93,7 +96,7 @@ def _run_waiting(
             (task, records[by_key[_polished(task)]] if polishing else None)
             for task in (study.tasks[i] for i in waiting)
         ]
-        for position, record in run_jobs(jobs, study.jobs, study.scheduler):
+        for position, record in run_jobs(jobs, study.jobs, study.scheduler, study.run):
             index = waiting[position]
             if study.folder is not None:
                 _keep(record, record_file(study.folder, study.tasks[index]), len(records))

@@ -103,6 +103,7 @@ class Task:
         run: number of the run; its own seed is ``seed + run``, so that equal runs of all algorithms start alike.
         label: what the study calls the solver; the algorithm's name if empty.
         polishes: label of the search whose equal run gives the start point; empty for a random one.
+        start: values of all variables by name, where IPOPT or another NLP solver begins; empty for a random point.
     """
 
     problem: ProblemSpec
@@ -114,6 +115,7 @@ class Task:
     run: int = 0
     label: str = ""
     polishes: str = ""
+    start: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def run_seed(self) -> int:
@@ -147,6 +149,8 @@ class Task:
             parts["stop"] = asdict(self.stop)
         elif self.stop.time_limit_s is not None:
             parts["stop"] = {"time_limit_s": self.stop.time_limit_s}
+        if self.start:
+            parts["start"] = dict(self.start)
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
         try:
@@ -194,6 +198,10 @@ def check_task(task: Task) -> None:
         metaheuristics.check_limits(
             task.search(), task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s
         )
+    if task.start:
+        if task.is_search:
+            raise InputError(f"{task.title!r} takes no start point; NLP solvers do")
+        problem.check_x(task.start)
 
 
 def plain_problem(problem: GaitProblem) -> dict[str, Any]:

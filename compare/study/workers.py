@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 
 from compare.study.record import RunRecord
-from compare.study.runner import attempt
+from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
 from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
@@ -25,13 +25,16 @@ def default_jobs() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[int, RunRecord]]:
+def run_jobs(
+    jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None, run: Run = run_task
+) -> Iterator[tuple[int, RunRecord]]:
     """Position and record of each job, as it finishes.
 
     Args:
         jobs: in the order in which they begin.
         workers: processes; with 1 all runs in this process.
         scheduler: address of a Dask scheduler, whose workers do the runs instead.
+        run: does one run.
 
     Raises:
         WorkerError: worker processes keep dying.
@@ -40,7 +43,7 @@ def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None
     if scheduler is None and (workers == 1 or len(jobs) <= 1):
         for position, job in enumerate(jobs):
             with remembered_interrupts() as check:
-                record = attempt(*job)
+                record = attempt(*job, run)
                 check()
             yield position, record
         return
@@ -53,7 +56,7 @@ def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None
             stack.enter_context(_dask(scheduler))
         while waiting:
             try:
-                for position, record in _parallel(list(waiting.items()), None if scheduler else workers):
+                for position, record in _parallel(list(waiting.items()), None if scheduler else workers, run):
                     del waiting[position]
                     deaths = 0
                     yield position, record
@@ -66,17 +69,17 @@ def run_jobs(jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None
                     ) from error
 
 
-def _parallel(jobs: list[tuple[int, Job]], workers: int | None) -> Iterator[tuple[int, RunRecord]]:
+def _parallel(jobs: list[tuple[int, Job]], workers: int | None, run: Run) -> Iterator[tuple[int, RunRecord]]:
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
     parallel = Parallel(n_jobs=workers if workers is not None else -1, return_as="generator_unordered", batch_size=1)
     with children_ignore_interrupts():
-        results = parallel(delayed(_numbered)(position, job) for position, job in jobs)
+        results = parallel(delayed(_numbered)(position, job, run) for position, job in jobs)
     yield from results
 
 
-def _numbered(position: int, job: Job) -> tuple[int, RunRecord]:
-    return position, attempt(*job)
+def _numbered(position: int, job: Job, run: Run) -> tuple[int, RunRecord]:
+    return position, attempt(*job, run)
 
 
 def _dask(address: str) -> AbstractContextManager[object]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from compare.analysis.statistics.tests import a12
-from compare.papers.nao.findings import ALGORITHMS, Findings, PhaseFindings
+from compare.papers.nao.findings import Findings, PhaseFindings
 from compare.papers.nao.paper import SWING_POWER_W, VELOCITY_RANGES, VelocityRange
+from compare.papers.nao.runs import ALGORITHMS, Held
 
 SIGNIFICANT = 0.05
 # A solution that costs this share more than the optimum is as good for a walker.
@@ -70,36 +71,36 @@ def _steadier(phase: PhaseFindings) -> Claim:
 
 
 def _higher_hip(phase: PhaseFindings) -> Claim:
-    sweep = [point for point in phase.sweeps[0] if point["feasible"]]
+    sweep = [point for point in phase.sweeps[0] if point.feasible]
     low, high = sweep[0], sweep[-1]
-    saved = 100 * (1 - high["power_W"] / low["power_W"])
-    price = next((b["price"] for b in phase.optimum["active"] if b["name"] == "bounds[hip_height_m]"), 0.0)
+    saved = 100 * (1 - high.power_W / low.power_W)
+    price = next(
+        (bound.price for bound in phase.optimum.active_constraints if bound.name == "bounds[hip_height_m]"), 0.0
+    )
     return Claim(
         section="5.1.2" if phase.paper.problem == "nao-ssp" else "5.2.2",
         text=f"A higher hip saves power in {phase.paper.title}",
         verdict=f"holds in our model by {saved:.0f} %" if _falls(sweep) else FAILS,
-        evidence=f"optimum {low['power_W']:.4f} W with the hip at {low['at']:.4f} m, {high['power_W']:.4f} W at "
-        f"{high['at']:.4f} m, {'falling all the way' if _falls(sweep) else 'not falling all the way'}; at the upper bound "
+        evidence=f"optimum {low.power_W:.4f} W with the hip at {low.at:.4f} m, {high.power_W:.4f} W at "
+        f"{high.at:.4f} m, {'falling all the way' if _falls(sweep) else 'not falling all the way'}; at the upper bound "
         f"one millimetre more is worth {-price:.2f} mW",
     )
 
 
 def _slower(phase: PhaseFindings) -> Claim:
-    sweep = [point for point in phase.sweeps[phase.paper.duration] if point["feasible"]]
+    sweep = [point for point in phase.sweeps[phase.paper.duration] if point.feasible]
     fast, slow = sweep[0], sweep[-1]
     return Claim(
         section="5.1.6" if phase.paper.problem == "nao-ssp" else "5.2.5",
         text=f"Slower saves power in {phase.paper.title}",
-        verdict=f"holds in our model by a factor of {fast['power_W'] / slow['power_W']:.1f}"
-        if _falls(sweep)
-        else FAILS,
-        evidence=f"optimum {fast['power_W']:.4f} W in {fast['at']:.2f} s, {slow['power_W']:.4f} W in {slow['at']:.2f} s"
+        verdict=f"holds in our model by a factor of {fast.power_W / slow.power_W:.1f}" if _falls(sweep) else FAILS,
+        evidence=f"optimum {fast.power_W:.4f} W in {fast.at:.2f} s, {slow.power_W:.4f} W in {slow.at:.2f} s"
         + (", falling all the way" if _falls(sweep) else ", not falling all the way"),
     )
 
 
-def _falls(sweep: list[dict[str, float]]) -> bool:
-    power = np.array([point["power_W"] for point in sweep])
+def _falls(sweep: Sequence[Held]) -> bool:
+    power = np.array([point.power_W for point in sweep])
     return bool(np.all(power[1:] <= power[:-1] * (1 + RIPPLE)))
 
 
@@ -114,7 +115,7 @@ def _torque_change(phase: PhaseFindings, claimed: str) -> Claim:
 
 
 def _swing_power(findings: Findings, height: float) -> float:
-    return float(next(point["power_W"] for point in findings.swing if point["at"] == height))
+    return next(point.power_W for point in findings.swing if point.at == height)
 
 
 def _swing_plateau(findings: Findings) -> Claim:
@@ -144,8 +145,9 @@ def _swing_rise(findings: Findings) -> Claim:
 def _velocity(findings: Findings, claimed: VelocityRange) -> Claim:
     phase = next(p for p in findings.phases if p.paper is claimed.phase)
     symbols = [f"x{i + 1}" for i in claimed.variables]
-    optimum = np.array([phase.optimum["x"][i] for i in claimed.variables])
-    ends = np.array([[run["x"][i] for i in claimed.variables] for runs in phase.searches.values() for run in runs])
+    names = [phase.problem.names[i] for i in claimed.variables]
+    optimum = np.array([phase.optimum.x[name] for name in names])
+    ends = np.array([[run.x[name] for name in names] for runs in phase.searches.values() for run in runs])
     within = float(np.mean((claimed.low <= ends) & (ends <= claimed.high)))
     good = bool(np.all((claimed.low <= optimum) & (optimum <= claimed.high)))
     ranges = [phase.range_within(i, NEARLY_OPTIMAL) for i in claimed.variables]
@@ -185,13 +187,13 @@ def _double_support(phase: PhaseFindings) -> Iterator[Claim]:
         evidence=f"medians over all runs PSO {pso:.4f} Nm, GA {ga:.4f} Nm",
     )
     durations = phase.sweeps[phase.paper.duration]
-    missing = [f"{point['at']:.2f} s" for point in durations if not point["feasible"]]
+    missing = [f"{point.at:.2f} s" for point in durations if not point.feasible]
     yield Claim(
         section="5.2.5",
         text="For some durations of double support there is no solution that keeps the mean balance margin",
         verdict=HOLDS if missing else FAILS,
         evidence=f"none is found at {', '.join(missing)}"
         if missing
-        else f"IPOPT finds a feasible optimum at each of {len(durations)} durations from {durations[0]['at']:.2f} to "
-        f"{durations[-1]['at']:.2f} s; gaps in the picture are gaps of the search",
+        else f"IPOPT finds a feasible optimum at each of {len(durations)} durations from {durations[0].at:.2f} to "
+        f"{durations[-1].at:.2f} s; gaps in the picture are gaps of the search",
     )

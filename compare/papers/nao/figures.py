@@ -11,8 +11,10 @@ from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
 from compare.drawing.skeletons import skeleton_of
 from compare.drawing.stick_figure import stick_figure
-from compare.papers.nao.findings import ALGORITHMS, NAMES, Findings, PhaseFindings, Points
+from compare.papers.nao.findings import NAMES, Findings, PhaseFindings, Points
 from compare.papers.nao.paper import SWING_HEIGHT, SWING_POWER_W
+from compare.papers.nao.runs import ALGORITHMS
+from compare.papers.runs import point
 from nlp_gait.problem import Array, Result
 
 if TYPE_CHECKING:
@@ -46,7 +48,7 @@ def convergence_figure(phase: PhaseFindings) -> Figure:
     with style():
         figure = new_figure(6.3, 2.9)
         for axes, name in zip(figure.subplots(1, 2, sharey=True), ALGORITHMS, strict=True):
-            best = np.array([run["history_W"] for run in phase.searches[name]], dtype=float)
+            best = np.array([run.history.objective for run in phase.searches[name]], dtype=float)
             generations = np.arange(1, best.shape[1] + 1)
             colour = COLOURS[name]
             axes.fill_between(generations, best.min(axis=0), best.max(axis=0), color=colour, alpha=0.15, linewidth=0)
@@ -101,8 +103,8 @@ def _cell(values: Array) -> Array:
 
 def _envelope(axes: Axes, phase: PhaseFindings, position: int) -> None:
     sweep = phase.sweeps[position]
-    power = [point["power_W"] if point["feasible"] else np.nan for point in sweep]
-    axes.plot([point["at"] for point in sweep], power, color=COLOURS["ipopt"], label="IPOPT", linewidth=1.2)
+    power = [held.power_W if held.feasible else np.nan for held in sweep]
+    axes.plot([held.at for held in sweep], power, color=COLOURS["ipopt"], label="IPOPT", linewidth=1.2)
 
 
 def swing_figure(findings: Findings) -> Figure:
@@ -111,9 +113,9 @@ def swing_figure(findings: Findings) -> Figure:
     with style():
         figure = new_figure(5.2, 3.2)
         axes = figure.subplots()
-        heights = [point["at"] for point in findings.swing]
+        heights = [held.at for held in findings.swing]
         axes.plot(
-            heights, _relative([p["power_W"] for p in findings.swing]), "o-", color=COLOURS["ipopt"], label="IPOPT"
+            heights, _relative([held.power_W for held in findings.swing]), "o-", color=COLOURS["ipopt"], label="IPOPT"
         )
         for name, marker in zip(ALGORITHMS, "sv", strict=True):
             printed = SWING_POWER_W[name]
@@ -145,7 +147,7 @@ def _relative(values: list[float]) -> Array:
 
 def poses_figure(phase: PhaseFindings) -> Figure:
     """Fig. 20: IPOPT's gait from the front and from the side."""
-    x = np.array(phase.optimum["x"])
+    x = np.array(point(phase.optimum))
     duration = float(x[phase.paper.duration])
     skeleton = skeleton_of(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)
     count = int(duration / POSES_EVERY_S[phase.problem.name] + 1e-6) + 1

@@ -10,11 +10,13 @@ from functools import cached_property
 import numpy as np
 
 from compare.analysis.statistics.rank_sum_normal import RankSum, rank_sum_normal
+from compare.judge import evaluate
 from compare.papers.nao.paper import PrintedPhase
-from compare.papers.nao.runs import Run, judged, power_with_legs_twice
+from compare.papers.nao.runs import Held, power_with_legs_twice
+from compare.papers.runs import best
+from compare.study.record import RunRecord, Verdict
 from nlp_gait.problem import Array, GaitProblem
 
-ALGORITHMS = ("pso", "ga")
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read
 # Solutions that cost at most this share more than the best one lie where IPOPT's line bends most.
@@ -52,43 +54,42 @@ class PhaseFindings:
 
     paper: PrintedPhase
     problem: GaitProblem
-    searches: Mapping[str, Sequence[Run]]
-    starts: Sequence[Run]
-    sweeps: Mapping[int, Sequence[Run]]
+    searches: Mapping[str, Sequence[RunRecord]]
+    starts: Sequence[RunRecord]
+    sweeps: Mapping[int, Sequence[Held]]
     points: Mapping[str, Points]
 
     @cached_property
-    def optimum(self) -> Run:
+    def optimum(self) -> RunRecord:
         """Best start of IPOPT."""
-        return best_start(self.starts)
+        return best(self.starts)
 
     @cached_property
     def converged(self) -> int:
         """Starts of IPOPT that end within 1e-5 of the best."""
-        best = self.optimum["power_W"]
-        return sum(start["success"] and start["power_W"] <= best * (1 + 1e-5) for start in self.starts)
+        return sum(start.success and start.verdict.objective <= self.best * (1 + 1e-5) for start in self.starts)
 
     def final_powers(self, algorithm: str) -> list[float]:
         """Power at the end of each run [W]; infinite without a feasible solution."""
-        return [run["power_W"] if run["feasible"] else math.inf for run in self.searches[algorithm]]
+        return [run.verdict.objective if run.verdict.feasible else math.inf for run in self.searches[algorithm]]
 
     def median_run(self, algorithm: str) -> int:
         """Number of the run of median power, which the paper tables."""
         powers = self.final_powers(algorithm)
         return int(np.argsort(powers, kind="stable")[(len(powers) - 1) // 2])
 
-    def median(self, algorithm: str) -> Run:
+    def median(self, algorithm: str) -> RunRecord:
         """Run of median power."""
         return self.searches[algorithm][self.median_run(algorithm)]
 
     def median_index(self, algorithm: str, name: str) -> float:
         """Median of a performance figure over the final solutions of all runs."""
-        return float(np.median([run["indexes"][name] for run in self.searches[algorithm]]))
+        return float(np.median([run.verdict.indexes[name] for run in self.searches[algorithm]]))
 
     @cached_property
-    def printed_here(self) -> dict[str, Run]:
+    def printed_here(self) -> dict[str, Verdict]:
         """The paper's solutions as the judge finds them here, by algorithm."""
-        return {name: judged(self.problem, optimum.x) for name, optimum in self.paper.optima.items()}
+        return {name: Verdict.of(evaluate(self.problem, optimum.x)) for name, optimum in self.paper.optima.items()}
 
     @cached_property
     def printed_with_legs_twice(self) -> dict[str, float]:
@@ -110,7 +111,7 @@ class PhaseFindings:
     @property
     def best(self) -> float:
         """Power of IPOPT's best start [W]."""
-        return float(self.optimum["power_W"])
+        return self.optimum.verdict.objective
 
     def share_below(self, position: int) -> float:
         """How far a feasible solution of a search lies below IPOPT's line at most, relative to it; 0 if none does.
@@ -123,7 +124,7 @@ class PhaseFindings:
 
     def _line(self, position: int) -> tuple[Array, Array]:
         """IPOPT's feasible optima over a variable: its values, ascending, and power [W]."""
-        line = [(p["at"], p["power_W"]) for p in self.sweeps[position] if p["feasible"]]
+        line = [(p.at, p.power_W) for p in self.sweeps[position] if p.feasible]
         at, power = np.array(line).T
         return at, power
 
@@ -142,19 +143,14 @@ class Findings:
 
     ssp: PhaseFindings
     dsp: PhaseFindings
-    swing: Sequence[Run]
-    durations: Sequence[Run]
-    lever: Sequence[Run]
+    swing: Sequence[Held]
+    durations: Sequence[Held]
+    lever: Sequence[RunRecord]
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:
         """Both phases."""
         return self.ssp, self.dsp
-
-
-def best_start(starts: Sequence[Run]) -> Run:
-    """Cheapest start of IPOPT that converged to a feasible point."""
-    return min(starts, key=lambda start: (not start["success"], start["power_W"]))
 
 
 def sweep_values(points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]) -> list[float]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import legend_below, new_figure, save, style
+from compare.drawing.figures import legend_below, new_figure, style
+from compare.papers.runs import point
 from compare.papers.stairs.motion import Leg, first_step, two_steps
 from compare.papers.stairs.paper import TABLE_4
-from compare.papers.stairs.runs import best_track, complete, plan_problem, tracked
+from compare.papers.stairs.runs import complete, plan_spec, tracked
+from compare.papers.stairs.tables import Findings
 from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.robot import toe_foot_biped
@@ -26,38 +27,35 @@ DRAWN_CASE = 2  # where the paper draws one case only
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 
-def write_figures(folder: Path, cases: Mapping[int, Mapping[str, Any]], network: Mapping[str, Any]) -> None:
-    """Write every figure as PNG and SVG."""
-    plans = {case: complete(case, found["plan"]["ipopt"]["x"]) for case, found in cases.items()}
-    drawn = {case: _planned(case, plan) for case, plan in plans.items()}
-    followed = {case: tracked(case, plans[case], best_track(found)) for case, found in cases.items()}
+def all_figures(findings: Findings) -> dict[str, Figure]:
+    """By the stem of their files."""
+    plans = {case: complete(findings.effort, case, findings.plan(case)) for case in findings.cases}
+    followed = {case: tracked(case, plans[case], point(findings.best_track(case))) for case in findings.cases}
+    plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
     step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
+    first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
+    following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
     with style():
-        save(_segments(drawn[DRAWN_CASE], plans[DRAWN_CASE], step), folder / "fig03")
-        for name, legs, start in (
-            ("fig06-07", first_step(plans[DRAWN_CASE], *step, np.linspace(0.0, 3.5, 29)), "first step"),
-            ("fig08-09", two_steps(plans[DRAWN_CASE], *step, _two_step_times(plans[DRAWN_CASE])), "next steps"),
-        ):
-            save(_sticks(legs, step, start, from_ground=name == "fig06-07"), folder / name)
-        save(_ankle(drawn[DRAWN_CASE]), folder / "fig10-11")
-        save(_stairs_compared(plans), folder / "fig12")
-        save(_pose_times(network), folder / "fig13")
-        save(_tracking(followed, "q", "angle [rad]"), folder / "fig14-20")
-        save(_tracking(followed, "qd", "rate [rad/s]"), folder / "fig21-27")
-        save(_zmp(followed, plans), folder / "fig28")
-        save(_torques(followed), folder / "fig29")
+        return {
+            "fig03": _segments(arrays, plan, step),
+            "fig06-07": _sticks(first, step, "first step", from_ground=True),
+            "fig08-09": _sticks(following, step, "next steps", from_ground=False),
+            "fig10-11": _ankle(arrays),
+            "fig12": _stairs_compared(plans),
+            "fig13": _pose_times(findings.steps["network"], findings.cases[0]),
+            "fig14-20": _tracking(followed, "q", "angle [rad]"),
+            "fig21-27": _tracking(followed, "qd", "rate [rad/s]"),
+            "fig28": _zmp(followed, plans),
+            "fig29": _torques(followed),
+        }
 
 
-def _planned(case: int, plan: Mapping[str, float]) -> Mapping[str, Array]:
-    problem = plan_problem(case).dense(DENSITY)
+def _planned(findings: Findings, case: int) -> Mapping[str, Array]:
+    problem = plan_spec(findings.effort, case).load().dense(DENSITY)
     if problem is None:
         raise TypeError("the planner has samples and signals")
-    return problem.signals(plan).arrays
-
-
-def _two_step_times(plan: Mapping[str, float]) -> Array:
-    return np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37)
+    return problem.signals(findings.plan(case)).arrays
 
 
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
@@ -134,7 +132,9 @@ def _ankle(arrays: Mapping[str, Array]) -> Figure:
 
 def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
     figure = new_figure(height_in=2.9)
-    for axes, (case, plan) in zip(figure.subplots(1, len(plans), sharey=True), plans.items(), strict=True):
+    for axes, (case, plan) in zip(
+        figure.subplots(1, len(plans), sharey=True, squeeze=False)[0], plans.items(), strict=True
+    ):
         tread = TABLE_4[case].stair_length_m / 2
         step = tread, tread * TABLE_4[case].rise_run_ratio
         swing, _ = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"], 201))
@@ -147,13 +147,13 @@ def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
     return figure
 
 
-def _pose_times(network: Mapping[str, Any]) -> Figure:
+def _pose_times(network: Mapping[str, Any], case: int) -> Figure:
     figure = new_figure()
     axes = figure.subplots()
     for rule, found in network.items():
         label = f"{rule}: {found['converged']} of {found['poses']} poses"
         axes.plot(np.array(found["time_s"]) * 1e3, label=label, linewidth=0.9)
-    axes.set(xlabel="pose", ylabel="time [ms]", yscale="log", title="Fig. 13: training time of each pose, case 1")
+    axes.set(xlabel="pose", ylabel="time [ms]", yscale="log", title=f"Fig. 13: training time of each pose, case {case}")
     legend_below(figure)
     return figure
 
@@ -195,7 +195,9 @@ def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mappin
 
 def _torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
     figure = new_figure(height_in=2.9)
-    for axes, (case, arrays) in zip(figure.subplots(1, len(followed), sharey=True), followed.items(), strict=True):
+    for axes, (case, arrays) in zip(
+        figure.subplots(1, len(followed), sharey=True, squeeze=False)[0], followed.items(), strict=True
+    ):
         for i, link in enumerate(LINKS):
             foot = link.startswith(("A'S", "S'"))
             axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)

@@ -1,21 +1,25 @@
-"""Runs of the stairs reproduction: plain results of one step each, fit to be kept as JSON."""
+"""Runs and other steps behind the stairs reproduction."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
 
 from compare.judge import evaluate
+from compare.papers.runs import Runs, best, point, searches, starts
 from compare.papers.stairs.motion import swing_leg
 from compare.papers.stairs.paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
 from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
-from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
+from compare.study.record import RunRecord
+from compare.study.steps import Step, fingerprint
+from compare.study.task import IPOPT, ProblemSpec, Task
+from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
-from nlp_gait import IpoptSettings, compile_objective, load, solve
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem import Array
 from nlp_gait.problems.stairs.closed_loop import InverseKinematics
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.network import LEGS, NetworkSettings, network_angles
@@ -23,129 +27,189 @@ from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import PAPER_TIMES
 from nlp_gait.problems.stairs.track import PLAN
 
-STARTS = 20  # of IPOPT on the planner
-IDEAL_STARTS = 3
-JERK_STARTS = 5
-SEEDS = (0, 1, 2)
-PLAN_EVALUATIONS = 10_000
-TRACK_EVALUATIONS = ANTS * ITERATIONS
 ALGORITHMS: Mapping[str, Algorithm] = {
     "aco": AntColony(population=ANTS, spread=EVAPORATION),
     "aco-grid": AntColonyGrid(population=ANTS, evaporation=EVAPORATION),
     "pso": ParticleSwarm(),
     "ga": GeneticAlgorithm(),
 }
-TRACK_START = (60.0, 60.0, 1.4)
-# A rollout has 16,000 variables once lifted: an iteration takes a second or more.
-TRACK_SETTINGS = IpoptSettings(time_limit_s=1200.0)
-# Stairs that the paper did not try: tread and rise of one step [m]; the last one is impossible.
-OTHER_STAIRS = ((0.30, 0.10), (0.30, 0.13), (0.28, 0.17), (0.26, 0.20), (0.254, 0.50))
+TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
 IMPOSSIBLE_RISE_M = 0.5
 LOST_RAD = 0.1  # a replayed pose that is so far from the planned one has lost it
+RULES = {
+    "adam": NetworkSettings(),
+    "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
+    "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
+    "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
+}
+PER_CASE = 5  # steps beside the runs: see ``case_steps``
 
 
-@cache
-def loaded(name: str, **options: str) -> GaitProblem:
-    """Problem, built once."""
-    return load(name, **options)
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is computed.
+
+    Attributes:
+        cases: of Table IV.
+        plan_starts: of IPOPT on the plan of least energy.
+        jerk_starts: on that of least peak jerk.
+        ideal_starts: on the ideal.
+        runs: of each search algorithm.
+        plan_evaluations: of a search for a plan.
+        track_evaluations: of a search for gains, as in the paper.
+        track_settings: of IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
+        other_stairs: tread and rise of one step that the paper did not try [m]; a rise of ``IMPOSSIBLE_RISE_M`` is impossible.
+        other_starts: of IPOPT on the plan there.
+        poses: of the swing leg for which the network is trained.
+        plan_intervals: between the samples of a plan.
+        ideal_intervals: between those of the ideal.
+    """
+
+    cases: tuple[int, ...] = tuple(TABLE_4)
+    plan_starts: int = 20
+    jerk_starts: int = 5
+    ideal_starts: int = 3
+    runs: int = 3
+    plan_evaluations: int = 10_000
+    track_evaluations: int = ANTS * ITERATIONS
+    track_settings: Mapping[str, float | str] = field(default_factory=lambda: {"time_limit_s": 1200.0})
+    other_stairs: tuple[tuple[float, float], ...] = (
+        (0.30, 0.10),
+        (0.30, 0.13),
+        (0.28, 0.17),
+        (0.26, 0.20),
+        (0.254, 0.50),
+    )
+    other_starts: int = 8
+    poses: int = 351
+    plan_intervals: int = 40
+    ideal_intervals: int = 70
+
+    @property
+    def steps(self) -> int:
+        """Runs, other steps of each case, the network, and the report."""
+        gradient = self.plan_starts + self.jerk_starts + self.ideal_starts + 1
+        case = gradient + 2 * len(ALGORITHMS) * self.runs + PER_CASE
+        others = sum(1 + _other_starts(self, rise) for _, rise in self.other_stairs)
+        return len(self.cases) * case + others + 2
 
 
-def on_stair(problem: GaitProblem, case: int) -> GaitProblem:
-    """A stairs problem on the stair of a case of Table IV."""
-    row = TABLE_4[case]
-    return problem.with_values(stair_length_m=row.stair_length_m, rise_run_ratio=row.rise_run_ratio)
-
-
-def plan_problem(case: int, minimise: str = "energy") -> GaitProblem:
+def plan_spec(effort: Effort, case: int, minimise: str = "energy") -> ProblemSpec:
     """Planner of a case."""
-    return on_stair(loaded("stairs-plan", minimise=minimise), case)
+    label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
+    options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
+    return ProblemSpec(name="stairs-plan", options=options, values=stair_of(case), label=label)
 
 
-def track_problem(case: int, plan: Mapping[str, float], **options: str) -> GaitProblem:
+def ideal_spec(effort: Effort, case: int) -> ProblemSpec:
+    """Full trajectory optimisation of a case."""
+    options = {"intervals": effort.ideal_intervals}
+    return ProblemSpec(name="stairs-ideal", options=options, values=stair_of(case), label=f"ideal-{case}")
+
+
+def track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemSpec:
     """Tracking of a plan, given by the planner's variables, in a case."""
-    values = {name: plan[name] for name in PLAN}
-    return on_stair(loaded("stairs-track", **options), case).with_values(**values)
+    values = {**stair_of(case), **{name: plan[name] for name in PLAN}}
+    return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
 
 
-def complete(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+def other_spec(effort: Effort, name: str, tread: float, rise: float) -> ProblemSpec:
+    """The planner or the ideal on a stair that the paper did not try."""
+    values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
+    intervals = {"stairs-plan": effort.plan_intervals, "stairs-ideal": effort.ideal_intervals}[name]
+    return ProblemSpec(name=name, options={"intervals": intervals}, values=values, label=f"{name}-{tread:g}-{rise:g}")
+
+
+def stair_of(case: int) -> dict[str, float]:
+    """Parameters of a case of Table IV."""
+    row = TABLE_4[case]
+    return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}
+
+
+def first_tasks(effort: Effort) -> Iterator[Task]:
+    """Ideals and plans, on the paper's stairs and on others."""
+    for case in effort.cases:
+        yield from starts(ideal_spec(effort, case), effort.ideal_starts, seed=case)
+        yield from starts(plan_spec(effort, case), effort.plan_starts)
+        yield from starts(plan_spec(effort, case, "jerk"), effort.jerk_starts)
+        for name, algorithm in ALGORITHMS.items():
+            yield from searches(plan_spec(effort, case), name, algorithm, effort.runs, effort.plan_evaluations)
+    for tread, rise in effort.other_stairs:
+        settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
+        for name, count in (("stairs-plan", _other_starts(effort, rise)), ("stairs-ideal", 1)):
+            yield from starts(other_spec(effort, name, tread, rise), count, settings=settings)
+
+
+def _other_starts(effort: Effort, rise: float) -> int:
+    return min(3, effort.other_starts) if rise >= IMPOSSIBLE_RISE_M else effort.other_starts
+
+
+def track_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
+    """Gains and torso pitch with which the plans of least energy are followed."""
+    for case in effort.cases:
+        spec = track_spec(case, plan_of(runs, case))
+        for name, algorithm in ALGORITHMS.items():
+            yield from searches(spec, name, algorithm, effort.runs, effort.track_evaluations)
+        yield Task(problem=spec, algorithm=IPOPT, settings=effort.track_settings, start=TRACK_START)
+
+
+def plan_of(runs: Runs, case: int, minimise: str = "energy") -> dict[str, float]:
+    """Best plan that IPOPT found in a case."""
+    return dict(best(runs[f"{'plan' if minimise == 'energy' else minimise}-{case}", IPOPT]).x)
+
+
+def best_track(runs: Runs, case: int) -> RunRecord:
+    """Best run of any solver on the track of a case, a feasible one if there is one."""
+    found = [record for name in (*ALGORITHMS, IPOPT) for record in runs[f"track-{case}", name]]
+    return min(found, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
+
+
+def complete(effort: Effort, case: int, plan: Mapping[str, float]) -> dict[str, float]:
     """A plan with the parameters that are not its variables."""
-    problem = plan_problem(case)
+    problem = plan_spec(effort, case).load()
     given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
     return {**plan, **given}
 
 
-def by_ipopt(problem: GaitProblem, starts: int, seed: int = 0, **more: Any) -> dict[str, Any]:
-    """Best of several starts, and how each ended."""
-    solution = solve(problem, starts=starts, seed=seed, **more)
-    return {
-        **_judged(problem, list(solution.x.values())),
-        "success": solution.success,
-        "status": solution.status,
-        "iterations": solution.iterations,
-        "time_s": solution.time_s.solve,
-        "starts": [
-            {"success": s.success, "objective": s.objective, "iterations": s.iterations, "time_s": s.time_s}
-            for s in solution.starts
-        ],
-        "violations": [{"name": v.name, "by": v.violation, "unit": v.unit} for v in solution.worst_violations],
-    }
+def other_steps(effort: Effort, runs: Runs) -> list[Step]:
+    """What is computed from the runs and is no run of a solver, so that it is kept as steps."""
+    first = effort.cases[0]
+    plan = complete(effort, first, plan_of(runs, first))
+    trained = Step(
+        name="network",
+        inputs={**fingerprint(plan_spec(effort, first).load()), "plan": plan, "poses": effort.poses},
+        compute=partial(network, first, plan, effort.poses),
+    )
+    return [trained, *(step for case in effort.cases for step in case_steps(effort, case, runs))]
 
 
-def by_search(problem: GaitProblem, algorithm: str, evaluations: int) -> dict[str, Any]:
-    """Best of one run for each seed, and all their values."""
-    objective = compile_objective(problem)
-    runs = [minimize(objective, ALGORITHMS[algorithm], evaluations=evaluations, seed=seed) for seed in SEEDS]
-    best = min(runs, key=lambda run: (run.violation, run.objective))
-    return {
-        **_judged(problem, best.x.tolist()),
-        "objectives": [run.objective for run in runs],
-        "violations": [run.violation for run in runs],
-        "time_s": [run.time_s for run in runs],
-    }
+def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Step]:
+    """Replay of the ideal, the printed scheme, differences of both plans, and the network in the loop."""
+    ideal, plan = point(best(runs[f"ideal-{case}", IPOPT])), plan_of(runs, case)
+    spec = ideal_spec(effort, case)
+    yield _step("replay", case, spec, partial(replayed, spec), x=ideal)
+    yield _step("printed", case, track_spec(case, plan), partial(printed_scheme, case), plan=plan)
+    for name in ("energy", "jerk"):
+        used = plan_of(runs, case, name)
+        yield _step(f"differences-{name}", case, track_spec(case, used), partial(differences, case), plan=used)
+    x = point(best_track(runs, case))
+    yield _step("learned", case, track_spec(case, plan), partial(with_network, case), plan=plan, x=x)
 
 
-def _judged(problem: GaitProblem, x: list[float]) -> dict[str, Any]:
-    verdict = evaluate(problem, x)
-    return {
-        "x": dict(verdict.x),
-        "objective": verdict.objective["value"],
-        "indexes": verdict.indexes,
-        "feasible": verdict.feasible,
-        "dense": verdict.dense,
-        "dense_violations": [{"name": row.name, "by": row.violation} for row in verdict.dense_violations[:3]],
-    }
+def _step(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Step:
+    inputs = {**fingerprint(spec.load()), **arguments}
+    return Step(name=f"{name}-{case}", inputs=inputs, compute=partial(compute, **arguments))
 
 
-def other_stairs() -> list[dict[str, Any]]:
-    """The planner and the ideal on stairs that the paper did not try."""
-    found = []
-    for tread, rise in OTHER_STAIRS:
-        impossible = rise >= IMPOSSIBLE_RISE_M
-        values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
-        solver = IpoptSettings(iterations=100) if impossible else None
-        row: dict[str, Any] = {"tread_m": tread, "rise_m": rise}
-        for name, starts in (("stairs-plan", 3 if impossible else 8), ("stairs-ideal", 1)):
-            run = by_ipopt(loaded(name).with_values(**values), starts, solver=solver)
-            row[name] = {key: run[key] for key in ("success", "status", "objective", "violations")}
-        found.append(row)
-    return found
-
-
-def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
-    """The network on the swing leg's 351 poses of a plan: convergence, time and error against the closed form."""
+def network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
+    """The network on poses of a plan's swing leg: convergence, time and error against the closed form."""
     tread = TABLE_4[case].stair_length_m / 2
-    times = np.linspace(0.0, plan["t3_s"], 351)
+    times = np.linspace(0.0, plan["t3_s"], poses)
     q, hip_to_ankle = swing_leg(plan, tread, tread * TABLE_4[case].rise_run_ratio, times)
     robot = toe_foot_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
-    rules = {
-        "adam": NetworkSettings(),
-        "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
-        "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
-        "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
-    }
     found = {}
-    for name, settings in rules.items():
+    for name, settings in RULES.items():
         path = network_angles(hip_to_ankle, *lengths, settings)
         error = np.abs(path.angles - q)
         found[name] = {
@@ -159,49 +223,40 @@ def network(case: int, plan: Mapping[str, float]) -> dict[str, Any]:
     return found
 
 
-def best_track(found: Mapping[str, Any]) -> list[float]:
-    """Gains and torso pitch of the best run of any solver, a feasible one if there is one."""
-    runs = found["track"].values()
-    return list(min(runs, key=lambda run: (not run["feasible"], run["objective"]))["x"].values())
-
-
 def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
     """Time histories of the closed loop with given gains and torso pitch."""
-    problem = track_problem(case, plan)
-    return problem.signals(np.array(x)).arrays
+    return track_spec(case, plan).load().signals(np.array(x)).arrays
 
 
 def printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
     """Quanta that the paper's gains survive in the explicit scheme, and what the implicit one makes of them."""
     row = TABLE_4[case]
     x = [row.kp, row.kd, row.torso_pitch_rad]
-    explicit = track_problem(case, plan, scheme="explicit").with_values(gravity_compensation=0.0)
-    implicit = track_problem(case, plan).with_values(gravity_compensation=0.0)
-    compensated = track_problem(case, plan)
+    compensated = track_spec(case, plan).load()
+    implicit = compensated.with_values(gravity_compensation=0.0)
+    explicit = track_spec(case, plan, scheme="explicit").load().with_values(gravity_compensation=0.0)
     return {
-        "explicit_quanta": evaluate_indexes(explicit, x)["quanta_before_divergence"],
-        "implicit_largest_error_rad": evaluate_indexes(implicit, x)["largest_error_rad"],
-        "compensated_largest_error_rad": evaluate_indexes(compensated, x)["largest_error_rad"],
+        "explicit_quanta": evaluate(explicit, x).indexes["quanta_before_divergence"],
+        "implicit_largest_error_rad": evaluate(implicit, x).indexes["largest_error_rad"],
+        "compensated_largest_error_rad": evaluate(compensated, x).indexes["largest_error_rad"],
     }
 
 
 def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[str, float]:
     """A tracked step whose desired leg angles come from the network, against the closed form: cost and angles."""
-    problems = {kind: track_problem(case, plan, inverse_kinematics=kind) for kind in get_args(InverseKinematics)}
     found: dict[str, float] = {}
     angles = []
-    for kind, problem in problems.items():
-        verdict = evaluate(problem, x)
-        found |= {f"{kind} cost": verdict.objective["value"], f"{kind} feasible": float(verdict.feasible)}
+    for kind in get_args(InverseKinematics):
+        problem = track_spec(case, plan, inverse_kinematics=kind).load()
+        found[f"{kind} cost"] = evaluate(problem, x).objective["value"]
         angles.append(problem.signals(np.array(x)).arrays["q_desired"])
     error = np.abs(angles[0] - angles[1])[:, [LINKS.index(link) for leg in LEGS for link in leg]]
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
 
 
-def replayed(case: int, x: list[float]) -> dict[str, float]:
+def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float]:
     """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
-    problem = on_stair(loaded("stairs-ideal"), case)
-    arrays = problem.signals(np.array(x)).arrays
+    arrays = ideal.load().signals(np.array(x)).arrays
     _, followed = replay(arrays, FEEDBACK)
     time, fallen = replay(arrays, OPEN_LOOP)
     off = np.maximum.accumulate(np.abs(fallen).max(axis=1))
@@ -212,11 +267,6 @@ def replayed(case: int, x: list[float]) -> dict[str, float]:
         "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]),
         "open_loop_end_rad": float(np.abs(fallen[-1]).max()),
     }
-
-
-def evaluate_indexes(problem: GaitProblem, x: list[float]) -> dict[str, float]:
-    """Exact indexes, those of a rollout that diverged too."""
-    return {name: float(value) for name, value in evaluate(problem, x).indexes.items()}
 
 
 def differences(case: int, plan: Mapping[str, float]) -> dict[str, float]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compare.drawing.figures import COLOURS, new_figure, style
-from compare.papers.walk12.runs import GA, Run
+from compare.papers.runs import point
+from compare.papers.walk12.paper import row_of
+from compare.papers.walk12.runs import GA, PAPER, PathPoint
+from compare.papers.walk12.tables import Findings
+from compare.study.record import RunRecord
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
 
@@ -20,27 +25,48 @@ PAPER_COLOUR = "#E69F00"
 MILLIMETRES = 1e3
 FIGURE_9 = ((1, 12), (2, 11), (3, 10))
 FIGURE_10 = ((4, 9), (5, 8), (6, 7))
+ZMP_FIGURES = {"fig12-13": 0.15, "fig14-15": 1.0, "fig16-17": 0.1}
+TURN_RAD = math.radians(8.0)  # the largest that the paper allows
+TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
 
 # Label of a gait to its x.
 Gaits = Mapping[str, Sequence[float]]
+
+
+def all_figures(findings: Findings) -> dict[str, Figure]:
+    """By the stem of their files."""
+    gaits = _gaits(findings, 0.15)
+    return {
+        "fig08": fitness_figure(findings.of(PAPER, 0.15, "ga"), findings.optimum(PAPER, 0.15)),
+        "fig09": angles_figure(gaits, FIGURE_9),
+        "fig10": angles_figure(gaits, FIGURE_10),
+        **{name: zmp_figure(_gaits(findings, weight)) for name, weight in ZMP_FIGURES.items()},
+        "tradeoff": tradeoff_figure(findings.front, findings.weighted),
+        "circle": circle_figure(point(findings.optimum(PAPER, TURNING_WEIGHT)), TURN_RAD),
+    }
+
+
+def _gaits(findings: Findings, weight: float) -> Gaits:
+    """The paper's gait and IPOPT's at a lambda, by label."""
+    return {"paper's gait": row_of(weight).x, "IPOPT": point(findings.optimum(PAPER, weight))}
 
 
 def _colour(label: str) -> str:
     return PAPER_COLOUR if label.startswith("paper") else COLOURS["ipopt"]
 
 
-def fitness_figure(ga: Run, ipopt: Run) -> Figure:
+def fitness_figure(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
     """Fig. 8: best f so far after each epoch of the GA of Table II, all seeds."""
     with style():
         figure = new_figure(4.2, 2.8)
         axes = figure.subplots()
-        runs = np.array(ga["histories"], dtype=float)
+        runs = np.array([run.history.objective for run in ga], dtype=float)
         epochs = np.arange(runs.shape[1])
         axes.step(epochs, runs.T, where="post", color=COLOURS["ga"], alpha=0.3, linewidth=0.8)
         axes.step(
             epochs, np.median(runs, axis=0), where="post", color=COLOURS["ga"], label=f"GA, median of {len(runs)} runs"
         )
-        axes.axhline(ipopt["f"], color=COLOURS["ipopt"], linestyle="--", label="IPOPT")
+        axes.axhline(optimum.verdict.objective, color=COLOURS["ipopt"], linestyle="--", label="IPOPT")
         axes.axvline(15, color="0.5", linewidth=0.8, linestyle=":", label="the paper: converged")
         axes.set(xlabel=f"epoch ({GA.population} evaluations each)", ylabel="best f so far [1]")
         axes.legend(loc="lower right")
@@ -100,32 +126,27 @@ def _sole(axes: Axes, robot: PointMassBiped) -> None:
     axes.plot(0, 0, color="0.4", marker="+")
 
 
-def tradeoff_figure(front: Sequence[Run], weighted: Sequence[Run]) -> Figure:
+def tradeoff_figure(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
     """The Pareto front of Q and s beside the optima of the weighted sum, and the latter over lambda."""
 
-    def column(runs: Sequence[Run], name: str) -> Any:
-        return np.array([run[name] for run in runs])
+    def plane_of(path: Sequence[PathPoint]) -> tuple[list[float], list[float]]:
+        return [MILLIMETRES * at.step_length_m for at in path], [1e3 * at.Q_m2s for at in path]
 
     with style():
         figure = new_figure(6.3, 3.0)
         plane, sweep = figure.subplots(1, 2)
-        lengths = MILLIMETRES * column(front, "step_length_m")
-        plane.plot(lengths, 1e3 * column(front, "Q_m2s"), color=COLOURS["pso"], label="Pareto front")
-        points = [run for run in weighted if run["weight"] > 0.0]  # at zero Q does not count
-        s = MILLIMETRES * np.array([run["x"][0] for run in points])
-        plane.plot(s, 1e3 * column(points, "Q_m2s"), "o", color=COLOURS["ga"], fillstyle="none", label="weighted sum")
-        for end, offset in ((s.min(), (12, -4)), (s.max(), (-8, -2))):
-            here = [run for run, length in zip(points, s, strict=True) if abs(length - end) < 0.01]
-            low, high = here[0]["weight"], here[-1]["weight"]
-            text = rf"$\lambda$ = {low:.3g} to {high:.3g}"
-            align = "left" if end == s.min() else "right"
-            at = (end, 1e3 * here[0]["Q_m2s"])
+        plane.plot(*plane_of(front), color=COLOURS["pso"], label="Pareto front")
+        points = [at for at in weighted if at.at > 0.0]  # at zero Q does not count
+        s, Q = plane_of(points)
+        plane.plot(s, Q, "o", color=COLOURS["ga"], fillstyle="none", label="weighted sum")
+        for end, offset, align in ((min(s), (12, -4), "left"), (max(s), (-8, -2), "right")):
+            here = [k for k, length in enumerate(s) if abs(length - end) < 0.01]
+            text = rf"$\lambda$ = {points[here[0]].at:.3g} to {points[here[-1]].at:.3g}"
+            at = (end, Q[here[0]])
             plane.annotate(text, at, xytext=offset, textcoords="offset points", ha=align, fontsize=8)
         plane.set(xlabel="step length s [mm]", ylabel=r"Q [$10^{-3}$ m$^2$ s]")
         plane.legend(loc="center left", bbox_to_anchor=(0.0, 0.7))
-        sweep.plot(
-            column(weighted, "weight"), MILLIMETRES * np.array([run["x"][0] for run in weighted]), color=COLOURS["ga"]
-        )
+        sweep.plot([at.at for at in weighted], plane_of(weighted)[0], color=COLOURS["ga"])
         sweep.set(xlabel=r"$\lambda$ [1]", ylabel="optimal step length s [mm]")
     return figure
 

@@ -1,92 +1,100 @@
-"""Report of the reproduced 12-joint walk: the text is ``walk12_report.md``, with every number filled in from the findings."""
+"""Report of the reproduced 12-joint walk: the text is ``report.md``, with numbers, tables and figures filled in."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from importlib import resources
-from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
-from compare.papers.walk12.paper import F1MAX, TABLE_3, row_of
-from compare.papers.walk12.runs import GA_EVALUATIONS, PSO_EVALUATIONS, RUNS, STARTS, Run
-from compare.papers.walk12.tables import MODEL, PAPER, Findings, f_of_papers_gaits, gaits, table_3, table_4
-from nlp_gait.files import write_text
+from compare.papers.runs import best, objectives
+from compare.papers.walk12.errata import corner_slopes, hip_miss
+from compare.papers.walk12.figures import all_figures
+from compare.papers.walk12.paper import F1MAX, TABLE_3, TABLE_4, row_of
+from compare.papers.walk12.runs import GA_EVALUATIONS, MODEL, MOMENT_FREE_WEIGHTS, PAPER, Effort, f1_of_gait
+from compare.papers.walk12.tables import Findings, all_tables, dense, f_of_runs
+from compare.report.document import Document
+from compare.report.template import document_from
+from compare.study.record import RunRecord
+from compare.study.task import IPOPT
+from nlp_gait.problems.walk12.model import Zmp
 
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
 
 
-def write_report(folder: Path, findings: Findings) -> None:
-    """Write all tables and ``report.md``."""
-    template = (resources.files("compare.papers.walk12") / "report.md").read_text(encoding="utf-8")
-    tables = {
-        "table_3_paper": table_3(folder, findings, PAPER),
-        "table_3_model": table_3(folder, findings, MODEL),
-        "gaits": gaits(folder, findings),
-        "table_4": table_4(folder, findings),
+def document(findings: Findings, effort: Effort) -> Document:
+    """The whole report."""
+    text = (resources.files("compare.papers.walk12") / "report.md").read_text(encoding="utf-8")
+    values = {
+        "ga_evaluations": GA_EVALUATIONS,
+        "pso_evaluations": effort.pso_evaluations,
+        "runs": effort.runs,
+        "starts": effort.starts,
+        **_normalisation(findings),
+        **_tradeoff(findings),
+        **_errata(findings),
     }
-    values = {**tables, **_settings(), **_normalisation(findings), **_tradeoff(findings), **_errata(findings)}
-    text = template.format_map({name: v.strip() if isinstance(v, str) else v for name, v in values.items()})
-    write_text(folder / "report.md", text)
-
-
-def _settings() -> dict[str, int]:
-    return {"ga_evaluations": GA_EVALUATIONS, "pso_evaluations": PSO_EVALUATIONS, "runs": RUNS, "starts": STARTS}
+    return document_from(text, values=values, tables=all_tables(findings), figures=all_figures(findings))
 
 
 def _normalisation(findings: Findings) -> dict[str, Any]:
-    most_stable = findings.runs(PAPER, 1.0)
-    gaps = {row.weight: row.f - run["f"] for row, run in zip(TABLE_3, _ipopt(findings, MODEL), strict=True)}
+    ga = f_of_runs(findings.of(PAPER, 1.0, "ga"))
+    optima = zip(TABLE_3, objectives(_optima(findings, MODEL)), strict=True)
+    gaps = {row.weight: row.f - f for row, f in optima}
     leads = {
         f"lead_{label}": _range(
-            run["dense"]["f"] - f
-            for run, f in zip(_ipopt(findings, label), f_of_papers_gaits(findings, label), strict=True)
+            dense(optimum)["f"] - f
+            for optimum, f in zip(_optima(findings, label), findings.f_of_papers_gaits(label), strict=True)
         )
         for label in (PAPER, MODEL)
     }
     return {
         **leads,
         "own_f1max": findings.own_f1max,
-        "dense_f1max": most_stable["ipopt"]["dense"]["f1_per_m2s"],
-        "ga_f1": (most_stable["ga"]["worst"] * F1MAX, most_stable["ga"]["best"] * F1MAX),
+        "dense_f1max": dense(findings.optimum(PAPER, 1.0))["f1_per_m2s"],
+        "ga_f1": (min(ga) * F1MAX, max(ga) * F1MAX),
         "printed_above": ", ".join(f"{w:g} (by {gap:.4f})" for w, gap in gaps.items() if gap > PRINTED_DIGIT),
     }
 
 
-def _ipopt(findings: Findings, label: str) -> list[Run]:
-    return [runs["ipopt"] for runs in findings.table_3[label]]
+def _optima(findings: Findings, label: str) -> list[RunRecord]:
+    return [findings.optimum(label, row.weight) for row in TABLE_3]
 
 
 def _tradeoff(findings: Findings) -> dict[str, Any]:
-    lengths = {run["weight"]: run["x"][0] for run in findings.weighted}
-    longest = max(weight for weight, s in lengths.items() if s > 0.13 - PLATEAU_M)
-    shortest = min(weight for weight, s in lengths.items() if s < 0.05 + PLATEAU_M)
-    s, Q = (np.array([run[name] for run in findings.front]) for name in ("step_length_m", "Q_m2s"))
+    weighted = findings.weighted
+    s, Q = np.array([(at.step_length_m, at.Q_m2s) for at in findings.front]).T
     rise = (1 / Q[:-1] - 1 / Q[-1]) / (s[-1] - s[:-1])  # of f1, from the longest step to each shorter one
     return {
-        "plateaus": (longest, shortest),
+        "plateaus": (
+            max(at.at for at in weighted if at.step_length_m > 0.13 - PLATEAU_M),
+            min(at.at for at in weighted if at.step_length_m < 0.05 + PLATEAU_M),
+        ),
         "tangent_mm": 1e3 * s[int(np.argmax(rise))],
-        "sweep_iterations": int(np.median([run["iterations"] for run in findings.weighted])),
+        "sweep_iterations": int(np.median([at.iterations for at in weighted])),
     }
 
 
 def _errata(findings: Findings) -> dict[str, Any]:
-    errata = findings.errata
-    exact = np.array(errata["f1"]["exact"])
-    changes = {reading: _range(100 * (np.array(f1) / exact - 1)) for reading, f1 in errata["f1"].items()}
-    seconds = [run for run in findings.table_4 if run["horizon"] == "1s"]
+    exact = np.array(findings.f1_of_table_3)
+    changes = {
+        zmp: _range(100 * (np.array([f1_of_gait(row, zmp=zmp) for row in TABLE_3]) / exact - 1))
+        for zmp in get_args(Zmp)
+    }
+    (corner,) = findings.runs["corner", IPOPT]
+    free = [best(findings.runs[f"moment-free-{weight:g}", IPOPT]) for weight in MOMENT_FREE_WEIGHTS]
     return {
-        "f1_change": {reading: f"{low:+.2f} % to {high:+.2f} %" for reading, (low, high) in changes.items()},
-        "free": [run["f"] for run in errata["moment_free_optimum"]],
-        "hip_miss_mm": 1e3 * errata["hip_miss_m"],
-        "corner_slopes": errata["corner_slopes"],
-        "corner_start": errata["corner_start"],
+        "f1_change": {zmp: f"{low:+.2f} % to {high:+.2f} %" for zmp, (low, high) in changes.items()},
+        "free": objectives(free),
+        "hip_miss_mm": 1e3 * hip_miss(),
+        "corner_slopes": corner_slopes(),
+        "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * row_of(0.15).x[1],
-        "stable": errata["stable"][-1],
-        "horizon_gap": _range(100 * abs(run["paper_f1"] / run["implied_f1"] - 1) for run in seconds),
+        "stable": findings.stable[-1],
+        "horizon_gap": _range(100 * abs(f1_of_gait(row, horizon="1s") / row.implied_f1 - 1) for row in TABLE_4),
     }
 
 

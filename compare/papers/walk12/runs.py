@@ -1,145 +1,176 @@
-"""Computations behind the reproduction of the 12-joint walk; results are plain data that can be kept as JSON."""
+"""Runs behind the reproduction of the 12-joint walk, and the two paths of neighbouring optima."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cache
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
 
-import metaheuristics
-import nlp_gait
 from compare.judge import evaluate
-from compare.papers.walk12.paper import TABLE_4
-from compare.study.steps import Steps, fingerprint
-from metaheuristics import Algorithm, GeneticAlgorithm, ParticleSwarm
+from compare.papers.runs import Runs, best, searches, starts
+from compare.papers.walk12.paper import F1MAX, TABLE_3, TABLE_4, PaperRow
+from compare.study.steps import Step, fingerprint
+from compare.study.task import IPOPT, ProblemSpec, Task
+from metaheuristics import GeneticAlgorithm, ParticleSwarm
 from nlp_gait.backends.optima.continuation import Continuation
 from nlp_gait.problem import GaitProblem
-from nlp_gait.problems.walk12.model import Zmp
 from nlp_gait.problems.walk12.problem import Horizon
 
+PAPER, MODEL = "paper", "model"  # whose f1max
 HORIZONS: tuple[Horizon, ...] = get_args(Horizon)
-STARTS = 20
-RUNS = 10
 # Table II: 30 epochs after the first population.
 GA, GA_EVALUATIONS = GeneticAlgorithm.goswami2008(), 930
-PSO, PSO_EVALUATIONS = ParticleSwarm(), 10_000
-SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
-
-# Weights of the trade-off curve: dense where the optimum moves from one plateau to the other.
-SWEEP_WEIGHTS = tuple(np.unique(np.round([*np.linspace(0, 1, 21), *np.linspace(0.66, 0.78, 49)], 4)).tolist())
-FRONT_LENGTHS_M = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())
-
-Run = dict[str, Any]
+CORNER_M = 0.13
+MOMENT_FREE_WEIGHTS = (0.15, 1.0)
+WEIGHTED, FRONT = "weighted-sum", "front"
 
 
-@cache
-def walk(horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
-    """Problem with its default parameters, built once."""
-    return nlp_gait.load("walk12", horizon=horizon, zmp=zmp)
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is computed.
 
-
-def weighted(weight: float, f1max: float, problem: GaitProblem | None = None) -> GaitProblem:
-    """Problem at a lambda under a normalisation."""
-    return (problem or walk()).with_values(**{"lambda": weight, "f1max": f1max})
-
-
-def best_by_ipopt(problem: GaitProblem) -> Run:
-    """Best of random starts, as the judge finds it, with how many starts agree."""
-    solution = nlp_gait.solve(problem, starts=STARTS, seed=0)
-    x = list(solution.x.values())
-    agreeing = sum(s.success and abs(s.objective - solution.objective) < SAME_OPTIMUM for s in solution.starts)
-    times = [start.time_s for start in solution.starts]
-    return {**judged(problem, x), "status": solution.status, "agreeing": agreeing, "time_s": float(np.median(times))}
-
-
-def best_by_search(problem: GaitProblem, algorithm: Algorithm, evaluations: int) -> Run:
-    """Best, median and worst f over seeds; x and the judge's dense value of the best run; best so far of every run."""
-    objective = nlp_gait.compile_objective(problem)
-    runs = [metaheuristics.minimize(objective, algorithm, evaluations=evaluations, seed=seed) for seed in range(RUNS)]
-    f = np.array([-run.objective if run.feasible else -np.inf for run in runs])
-    best = runs[int(f.argmax())]
-    spread = {"best": float(f.max()), "median": float(np.median(f)), "worst": float(f.min())}
-    histories = [[float(-v) if np.isfinite(v) else None for v in run.history.objective] for run in runs]
-    times = {"time_s": float(np.median([run.time_s for run in runs]))}
-    return {**judged(problem, best.x.tolist()), **spread, **times, "histories": histories}
-
-
-def judged(problem: GaitProblem, x: Iterable[float]) -> Run:
-    """A gait as the judge finds it, on its own samples and on the dense grid."""
-    verdict = evaluate(problem, list(x))
-    return {
-        "x": list(verdict.x.values()),
-        "f": verdict.objective["value"],
-        "feasible": verdict.feasible,
-        "dense": dict(verdict.dense or {}),
-        "dense_violation": max((row.violation for row in verdict.dense_violations), default=0.0),
-    }
-
-
-def model_f1max(problem: GaitProblem) -> float:
-    """Largest f1 of the model [1/(m^2 s)]: the problem at lambda = 1, solved by IPOPT from several starts.
-
-    With ``--set f1max=...`` it is the second normalisation: f of the most stable gait is then 1.
+    Attributes:
+        starts: of IPOPT on each problem.
+        runs: of each search algorithm.
+        pso_evaluations: of a run of PSO; the GA has the paper's.
+        weights: of the trade-off curve, dense where the optimum moves from one plateau to the other.
+        lengths_m: step lengths of the Pareto front.
     """
-    scale = problem.value("f1max")
-    solution = nlp_gait.solve(problem.with_values(**{"lambda": 1.0}), starts=STARTS, seed=0)
-    return solution.objective * scale
+
+    starts: int = 20
+    runs: int = 10
+    pso_evaluations: int = 10_000
+    weights: tuple[float, ...] = tuple(
+        np.unique(np.round([*np.linspace(0, 1, 21), *np.linspace(0.66, 0.78, 49)], 4)).tolist()
+    )
+    lengths_m: tuple[float, ...] = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())
+
+    @property
+    def steps(self) -> int:
+        """Runs, the two paths, and the report."""
+        table_3, table_4 = len(TABLE_3) * (self.starts + 2 * self.runs), len(TABLE_4) * len(HORIZONS) * self.starts
+        return 2 * (table_3 + table_4) + len(MOMENT_FREE_WEIGHTS) * self.starts + 1 + 2 + 1
 
 
-def table_3_runs(steps: Steps, label: str, weight: float, f1max: float) -> dict[str, Run]:
-    """IPOPT, GA and PSO at one lambda under one normalisation."""
-    problem = weighted(weight, f1max)
-    solvers: dict[str, Callable[[], Run]] = {
-        "ipopt": lambda: best_by_ipopt(problem),
-        "ga": lambda: best_by_search(problem, GA, GA_EVALUATIONS),
-        "pso": lambda: best_by_search(problem, PSO, PSO_EVALUATIONS),
-    }
-    settings = {"starts": STARTS, "runs": RUNS, "ga": repr(GA), "pso": repr(PSO), "pso_evaluations": PSO_EVALUATIONS}
-    inputs = {**fingerprint(problem), **settings}
-    return {
-        name: steps(f"table3-{label}-{weight:g}-{name}", {**inputs, "solver": name}, run)
-        for name, run in solvers.items()
-    }
+@dataclass(frozen=True, kw_only=True)
+class PathPoint:
+    """Optimum at a point of a path.
+
+    Attributes:
+        at: the weight, or the step length [m].
+        step_length_m: s at the optimum.
+        Q_m2s: Q there.
+        iterations: of IPOPT.
+    """
+
+    at: float
+    step_length_m: float
+    Q_m2s: float
+    iterations: int
 
 
-def table_4_runs() -> list[Run]:
-    """For every row and horizon: f1 of the paper's gait, the model's f1max, and the optimum under it."""
-    found = []
+def title(label: str, weight: float) -> str:
+    """Title of a row of Table III under a normalisation."""
+    return f"table3-{label}-{weight:g}"
+
+
+def title_of_table_4(row: PaperRow, horizon: Horizon, most_stable: bool = False) -> str:
+    """Title of a row of Table IV under a horizon of Q: its optimum, or its most stable gait, which gives f1max."""
+    return f"table4-{row.step_time_s:g}s-Q{horizon}" + "-stable" * most_stable
+
+
+def walk(**options: str) -> GaitProblem:
+    """The problem with its default parameters."""
+    return ProblemSpec(name="walk12", options=options).load()
+
+
+def first_tasks(effort: Effort) -> Iterator[Task]:
+    """Table III under the paper's f1max, the most stable gaits of Table IV, and the runs that errata are measured with."""
+    yield from _table_3(effort, PAPER, F1MAX)
     for row in TABLE_4:
         for horizon in HORIZONS:
-            problem = walk(horizon).with_values(step_time_s=row.step_time_s)
-            f1max = model_f1max(problem)
-            optimum = best_by_ipopt(weighted(row.weight, f1max, problem))
-            paper_f1 = judged(problem, row.x)["dense"]["f1_per_m2s"]
-            at = {"step_time_s": row.step_time_s, "horizon": horizon, "implied_f1": row.implied_f1}
-            found.append({**at, "paper_f1": paper_f1, "f1max": f1max, "optimum": optimum})
-    return found
+            yield from starts(_row_of_table_4(row, horizon), effort.starts)
+    for weight in MOMENT_FREE_WEIGHTS:
+        free = _spec(f"moment-free-{weight:g}", {"zmp": "moment-free"}, {"lambda": weight, "f1max": F1MAX})
+        yield from starts(free, effort.starts)
+    corner = _spec("corner", {}, {"lambda": 0.15, "f1max": F1MAX})
+    yield Task(problem=corner, algorithm=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
 
 
-def weighted_sum(f1max: float) -> list[Run]:
-    """Optimum at every weight, each from the end of the last one."""
-    path = Continuation(starts=STARTS)
-    return [_tradeoff(path, weighted(weight, f1max), weight=weight) for weight in SWEEP_WEIGHTS]
+def second_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
+    """What needs the model's own f1max: Table III under it, and Table IV."""
+    yield from _table_3(effort, MODEL, own_f1max(runs))
+    for row in TABLE_4:
+        for horizon in HORIZONS:
+            yield from starts(_row_of_table_4(row, horizon, f1max_of_table_4(runs, row, horizon)), effort.starts)
 
 
-def front() -> list[Run]:
-    """Largest f1 at every step length, each from the end of the last one: the Pareto front of Q and s."""
-    path = Continuation(starts=STARTS)
+def own_f1max(runs: Runs) -> float:
+    """Largest f1 of the model [1/(m^2 s)]: with ``--set f1max=...`` f of the most stable gait is 1."""
+    return best(runs[title(PAPER, 1.0), IPOPT]).verdict.objective * F1MAX
+
+
+def f1max_of_table_4(runs: Runs, row: PaperRow, horizon: Horizon) -> float:
+    """Likewise at a step time and a horizon of Q."""
+    return best(runs[title_of_table_4(row, horizon, most_stable=True), IPOPT]).verdict.objective * F1MAX
+
+
+def f1_of_gait(row: PaperRow, **options: str) -> float:
+    """f1 of a printed gait at its step time [1/(m^2 s)], on the dense grid."""
+    verdict = evaluate(walk(**options).with_values(step_time_s=row.step_time_s), row.x)
+    return (verdict.dense or {})["f1_per_m2s"]
+
+
+def _table_3(effort: Effort, label: str, f1max: float) -> Iterator[Task]:
+    for row in TABLE_3:
+        spec = _spec(title(label, row.weight), {}, {"lambda": row.weight, "f1max": f1max})
+        yield from starts(spec, effort.starts)
+        yield from searches(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from searches(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
+
+
+def _row_of_table_4(row: PaperRow, horizon: Horizon, f1max: float | None = None) -> ProblemSpec:
+    weight, normalisation = (1.0, F1MAX) if f1max is None else (row.weight, f1max)
+    values = {"step_time_s": row.step_time_s, "lambda": weight, "f1max": normalisation}
+    return _spec(title_of_table_4(row, horizon, most_stable=f1max is None), {"horizon": horizon}, values)
+
+
+def _spec(label: str, options: dict[str, str], values: dict[str, float]) -> ProblemSpec:
+    return ProblemSpec(name="walk12", options=options, values=values, label=label)
+
+
+def paths(effort: Effort) -> list[Step]:
+    """The weighted sum and the front, kept as steps: each optimum begins at the end of the last one and is no run of its own."""
+    computed = {WEIGHTED: (weighted_sum, effort.weights), FRONT: (front, effort.lengths_m)}
+    return [
+        Step(
+            name=name,
+            inputs={**fingerprint(walk()), "starts": effort.starts, "at": list(at)},
+            compute=partial(compute, at, effort.starts),
+        )
+        for name, (compute, at) in computed.items()
+    ]
+
+
+def weighted_sum(weights: Sequence[float], count: int) -> list[dict[str, Any]]:
+    """Fields of ``PathPoint`` at every weight."""
+    return _follow([(w, walk().with_values(**{"lambda": w, "f1max": F1MAX})) for w in weights], count)
+
+
+def front(lengths_m: Sequence[float], count: int) -> list[dict[str, Any]]:
+    """Fields of ``PathPoint`` at every step length, of the largest f1 there: the Pareto front of Q and s."""
     most_stable = walk().with_values(**{"lambda": 1.0})
-    return [_tradeoff(path, most_stable.fix(step_length_m=s), step_length_m=s) for s in FRONT_LENGTHS_M]
+    return _follow([(s, most_stable.fix(step_length_m=s)) for s in lengths_m], count)
 
 
-def _tradeoff(path: Continuation, problem: GaitProblem, **at: float) -> Run:
-    solution = path.solve(problem)
-    verdict = evaluate(problem, list(solution.x.values()))
-    return {
-        **at,
-        "success": solution.success,
-        "x": list(solution.x.values()),
-        "f": solution.objective,
-        "Q_m2s": verdict.indexes["Q_m2s"],
-        "dense_Q_m2s": (verdict.dense or {})["Q_m2s"],
-        "iterations": solution.iterations,
-    }
+def _follow(problems: Sequence[tuple[float, GaitProblem]], count: int) -> list[dict[str, Any]]:
+    path, found = Continuation(starts=count), []
+    for at, problem in problems:
+        solution = path.solve(problem)
+        Q = evaluate(problem, list(solution.x.values())).indexes["Q_m2s"]
+        s = solution.x["step_length_m"]
+        found.append({"at": at, "step_length_m": s, "Q_m2s": Q, "iterations": solution.iterations})
+    return found

@@ -2,93 +2,131 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
+from functools import cached_property
 
-from compare.papers.tables import Cell, write_table
+import numpy as np
+
+from compare.papers.runs import Runs, best, point
+from compare.papers.walk12.errata import StablePart, stable_part
 from compare.papers.walk12.paper import F1MAX, F2MAX, TABLE_3, TABLE_4
-from compare.papers.walk12.runs import Run
+from compare.papers.walk12.runs import (
+    HORIZONS,
+    MODEL,
+    PAPER,
+    PathPoint,
+    f1_of_gait,
+    f1max_of_table_4,
+    own_f1max,
+    title,
+    title_of_table_4,
+)
+from compare.report.document import Rows, Value
+from compare.study.record import RunRecord
+from compare.study.task import IPOPT
 
-PAPER, MODEL = "paper", "model"  # whose f1max
+SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
+SEARCHES = ("ga", "pso")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """All results, as kept in the steps.
+    """All results.
 
     Attributes:
-        own_f1max: the model's largest f1 [1/(m^2 s)].
-        table_3: by normalisation, one entry for each row of Table III: runs by solver.
-        table_4: one entry for each row of Table IV and horizon.
+        runs: by title of the problem and solver.
         weighted: optima of the weighted sum over lambda.
         front: largest f1 for each step length.
-        errata: see ``walk12_errata``.
     """
 
-    own_f1max: float
-    table_3: Mapping[str, Sequence[Mapping[str, Run]]]
-    table_4: Sequence[Run]
-    weighted: Sequence[Run]
-    front: Sequence[Run]
-    errata: Run
+    runs: Runs
+    weighted: Sequence[PathPoint]
+    front: Sequence[PathPoint]
+    f1_of_table_3: Sequence[float] = field(default_factory=lambda: [f1_of_gait(row) for row in TABLE_3])
 
-    def runs(self, label: str, weight: float) -> Mapping[str, Run]:
-        """Runs by solver at a lambda under a normalisation."""
-        return self.table_3[label][[row.weight for row in TABLE_3].index(weight)]
+    def of(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:
+        """Runs of a solver at a lambda under a normalisation."""
+        return self.runs[title(label, weight), solver]
 
-    def f1max(self, label: str) -> float:
-        """f1 that counts as 1 under a normalisation."""
-        return F1MAX if label == PAPER else self.own_f1max
+    def optimum(self, label: str, weight: float) -> RunRecord:
+        """IPOPT's best start at a lambda under a normalisation."""
+        return best(self.of(label, weight, IPOPT))
+
+    @cached_property
+    def own_f1max(self) -> float:
+        """The model's largest f1 [1/(m^2 s)]."""
+        return own_f1max(self.runs)
+
+    @cached_property
+    def stable(self) -> Sequence[StablePart]:
+        """When (8) holds for each gait of Table III."""
+        return [stable_part(row.x) for row in TABLE_3]
+
+    def f_of_papers_gaits(self, label: str) -> list[float]:
+        """f of the paper's gaits in the model under a normalisation, on the dense grid."""
+        f1max = F1MAX if label == PAPER else self.own_f1max
+        known = zip(TABLE_3, self.f1_of_table_3, strict=True)
+        return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
 
 
-def f_of_papers_gaits(findings: Findings, label: str) -> list[float]:
-    """f of the paper's gaits in the model under a normalisation, on the dense grid."""
-    f1max = findings.f1max(label)
-    known = zip(TABLE_3, findings.errata["f1"]["exact"], strict=True)
-    return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
+def dense(record: RunRecord) -> Mapping[str, float]:
+    """The judge's figures on the dense grid, which this problem has."""
+    return record.verdict.dense or {}
 
 
-def table_3(folder: Path, findings: Findings, label: str) -> str:
+def f_of_runs(records: Sequence[RunRecord]) -> list[float]:
+    """f at the end of each run; minus infinity without a feasible gait."""
+    return [r.verdict.objective if r.verdict.feasible else -math.inf for r in records]
+
+
+def all_tables(findings: Findings) -> dict[str, Rows]:
+    """Rows by name; headings and formats stand in ``report.md``."""
+    return {
+        "table3-paper": _table_3(findings, PAPER),
+        "table3-model": _table_3(findings, MODEL),
+        "gaits": _gaits(findings),
+        "table4": _table_4(findings),
+    }
+
+
+def _table_3(findings: Findings, label: str) -> Rows:
     """f of the paper's gait and of every solver under one normalisation."""
-    spread = [(solver, which) for solver in ("ga", "pso") for which in ("best", "median", "worst")]
-    columns = {"lambda": ".2f", "paper: f as printed": ".3f", "model: f of the paper's gait": ".4f"}
-    columns |= {f"{solver.upper()} {which}": ".4f" for solver, which in spread}
-    columns |= {"IPOPT": ".4f", "IPOPT, dense grid": ".4f", "starts that agree": "d", "time of a start [s]": ".3f"}
-    rows: list[list[Cell]] = []
-    for row, model, runs in zip(TABLE_3, f_of_papers_gaits(findings, label), findings.table_3[label], strict=True):
-        ipopt = runs["ipopt"]
-        searches = [runs[solver][which] for solver, which in spread]
-        end = [ipopt["f"], ipopt["dense"]["f"], ipopt["agreeing"], ipopt["time_s"]]
-        rows.append([row.weight, row.f, model, *searches, *end])
-    return write_table(folder / f"table3-{label}", columns, rows)
+    rows = []
+    for row, of_papers_gait in zip(TABLE_3, findings.f_of_papers_gaits(label), strict=True):
+        cells: list[Value] = [row.weight, row.f, of_papers_gait]
+        for name in SEARCHES:
+            f = f_of_runs(findings.of(label, row.weight, name))
+            cells += [max(f), float(np.median(f)), min(f)]
+        begun, optimum = findings.of(label, row.weight, IPOPT), findings.optimum(label, row.weight)
+        f_best = optimum.verdict.objective
+        agreeing = sum(r.success and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
+        time_s = float(np.median([r.time_s.solve for r in begun]))
+        rows.append([*cells, f_best, dense(optimum)["f"], agreeing, time_s])
+    return rows
 
 
-def gaits(folder: Path, findings: Findings) -> str:
+def _gaits(findings: Findings) -> Rows:
     """Gaits behind Table III under the paper's normalisation, and how long each is statically stable."""
-    columns = {"lambda": ".2f", "by": ""} | {f"{name} [m]": ".4f" for name in "snHh"}
-    columns |= {"f1 [1/(m^2 s)]": ".1f", "share of the step with (8)": ".3f"}
-    rows: list[list[Cell]] = []
-    known = zip(
-        TABLE_3, findings.errata["f1"]["exact"], findings.errata["stable"], findings.table_3[PAPER], strict=True
-    )
-    for row, f1, stable, runs in known:
-        rows.append([row.weight, "paper", *row.x, f1, stable["share"]])
-        for solver in ("ga", "pso", "ipopt"):
-            dense = runs[solver]["dense"]
-            rows.append([row.weight, solver.upper(), *runs[solver]["x"], dense["f1_per_m2s"], dense["stable_share"]])
-    return write_table(folder / "gaits", columns, rows)
+    rows: list[Sequence[Value]] = []
+    for row, f1, stable in zip(TABLE_3, findings.f1_of_table_3, findings.stable, strict=True):
+        rows.append([row.weight, "paper", *row.x, f1, stable.share])
+        for solver in (*SEARCHES, IPOPT):
+            found = best(findings.of(PAPER, row.weight, solver))
+            figures = dense(found)
+            rows.append([row.weight, solver.upper(), *point(found), figures["f1_per_m2s"], figures["stable_share"]])
+    return rows
 
 
-def table_4(folder: Path, findings: Findings) -> str:
+def _table_4(findings: Findings) -> Rows:
     """The paper's step times under both horizons of Q."""
-    columns = {"T [s]": ".1f", "horizon of Q": "", "paper: f1max": ".1f", "paper: f": ".4f"}
-    columns |= {"paper: f1 implied": ".0f", "model: f1 of the paper's gait": ".0f"}
-    columns |= {"model: f1max": ".1f", "IPOPT: f": ".4f"} | {f"{name} [m]": ".4f" for name in "snHh"}
-    rows: list[list[Cell]] = []
-    for run in findings.table_4:
-        row = next(row for row in TABLE_4 if row.step_time_s == run["step_time_s"])
-        horizon = {"step": "0 to T", "1s": "1 s"}[run["horizon"]]
-        ours = [run["paper_f1"], run["f1max"], run["optimum"]["f"], *run["optimum"]["x"]]
-        rows.append([row.step_time_s, horizon, row.f1max, row.f, run["implied_f1"], *ours])
-    return write_table(folder / "table4", columns, rows)
+    rows: list[Sequence[Value]] = []
+    for row in TABLE_4:
+        for horizon in HORIZONS:
+            optimum = best(findings.runs[title_of_table_4(row, horizon), IPOPT])
+            words = {"step": "0 to T", "1s": "1 s"}[horizon]
+            ours = [f1_of_gait(row, horizon=horizon), f1max_of_table_4(findings.runs, row, horizon)]
+            ours += [optimum.verdict.objective, *point(optimum)]
+            rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
+    return rows

@@ -27,7 +27,9 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     """
     started = time.perf_counter()
     problem, solver = task.problem.load(), task.solver()
-    if start is None:
+    if task.start:
+        x0 = np.clip(problem.check_x(task.start), problem.lower, problem.upper)
+    elif start is None:
         x0 = problem.start_point(np.random.default_rng(task.run_seed))
     elif not start.x:
         raise InputError(f"{start.algorithm}, run {start.run}, has no point to polish: {start.status}")

@@ -38,7 +38,7 @@ def test_sweep_over_nonsense_is_one_sentence(tmp_path: Path) -> None:
 
 def test_every_reproduction_can_be_called_alike() -> None:
     for name in REPRODUCTIONS.values():
-        assert list(signature(import_module(name).reproduce).parameters) == ["out", "progress"]
+        assert list(signature(import_module(name).reproduce).parameters)[:2] == ["out", "progress"]
 
 
 def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:

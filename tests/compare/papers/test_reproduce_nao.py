@@ -1,78 +1,50 @@
-"""The reproduction of the NAO paper: from end to end with few runs, and its parts."""
+"""The reproduction of the NAO paper: from end to end with few runs on few samples, and its parts."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import nlp_gait
+from compare.judge import evaluate
 from compare.papers.nao import report as nao_report
 from compare.papers.nao import reproduce as nao
 from compare.papers.nao.claims import claims
-from compare.papers.nao.findings import Findings, Points, sweep_values
+from compare.papers.nao.findings import Findings, PhaseFindings, Points, sweep_values
 from compare.papers.nao.paper import DSP, PHASES, SSP
-from compare.papers.nao.runs import judged, power_with_legs_twice, search
+from compare.papers.nao.runs import Effort, Held, power_with_legs_twice
 from compare.papers.nao.tables import implied_a12
-from compare.study import parallel
+from compare.report.document import Document
+from compare.study.record import RunRecord, read_record
 from nlp_gait.errors import OutputError
 
-RUNS, STARTS = 3, 2
-
-
-def quick_sweep(problem: str, variable: str, values: list[float], starts: int) -> list[dict[str, Any]]:
-    """What IPOPT's sweeps look like, without their cost: power falls with height and time."""
-    falling = variable in ("hip_height_m", "single_support_time_s", "double_support_time_s")
-    best = 0.5319 if problem == "nao-dsp" else 0.8459
-    power = best * (np.linspace(2.0, 1.0, len(values)) if falling else np.linspace(1.0, 1.05, len(values)))
-    return [
-        {"at": at, "power_W": p, "feasible": True, "status": "converged", "x": []}
-        for at, p in zip(values, power.tolist(), strict=True)
-    ]
-
-
-def coarse_save(figure: Figure, stem: Path) -> None:
-    """Drawn in full, but of few pixels."""
-    figure.savefig(stem.with_name(f"{stem.name}.png"), dpi=30)
+SMALL = Effort(runs=3, evaluations=1000, starts=1, lever_starts=1, intervals=4, sweep_starts=1, sweep_points=(0, 0))
 
 
 @pytest.fixture(scope="module")
-def small() -> Iterator[pytest.MonkeyPatch]:
-    """Few runs, in this process, without sweeps."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in {"RUNS": RUNS, "EVALUATIONS": 1000, "STARTS": STARTS, "LEVER_STARTS": 1}.items():
-            patch.setattr(nao, name, value)
-        patch.setattr(nao, "sweep", quick_sweep)
-        patch.setattr(parallel, "default_jobs", lambda: 1)
-        patch.setattr(nao, "save", coarse_save)
-        yield patch
-
-
-@pytest.fixture(scope="module")
-def done(small: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Findings]:
-    """Folder and findings of a finished reproduction."""
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Findings, list[str]]:
+    """Folder, findings and notes of a finished reproduction."""
     out = tmp_path_factory.mktemp("nao")
     kept: list[Findings] = []
+    told: list[str] = []
 
-    def write_report(folder: Path, findings: Findings) -> None:
+    def document(findings: Findings) -> Document:
         kept.append(findings)
-        nao_report.write_report(folder, findings)
+        return nao_report.document(findings)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nao, "write_report", write_report)
-        nao.reproduce(out, progress=lambda note: None)
-    return out, kept[0]
+        patch.setattr(nao, "document", document)
+        nao.reproduce(out, progress=told.append, effort=SMALL)
+    return out, kept[0], told
 
 
-def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings]) -> None:
-    out, _ = done
+def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings, list[str]]) -> None:
+    out, _, told = done
     report = (out / "report.md").read_text()
     assert "{" not in report and "nan" not in report
     figures = re.findall(r"\((\S+)\.png\)", report)
@@ -80,62 +52,68 @@ def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings]) -> N
     assert figures[7:] == ["swing-height", "fig15", "fig16", "fig17", "fig18", "fig19", "fig20b"]
     for name in figures:
         assert (out / f"{name}.png").stat().st_size > 0
-    for table in ("table6", "table7", "table7-swing-heights", "table8", "table9", "rank-sum-tests", "power-gap"):
-        assert (out / f"{table}.md").read_text().strip() in report
-        assert (out / f"{table}.csv").exists()
+    names = ("table6", "table7", "table7-swing-heights", "table8", "table9", "rank-sum-tests", "power-gap", "claims")
+    assert all(len((out / f"{table}.csv").read_text().splitlines()) > 1 for table in names)
+    assert (out / "report.html").read_text().count("<svg") == len(figures)
+    assert len(told) == SMALL.steps
 
 
-def test_every_feasible_solution_is_kept(done: tuple[Path, Findings]) -> None:
-    out, findings = done
-    problem = nlp_gait.load("nao-dsp")
+def test_every_feasible_solution_is_kept(done: tuple[Path, Findings, list[str]]) -> None:
+    out, findings, _ = done
     with np.load(out / "points" / "nao-dsp-ga-02.npz") as archive:
         x, power = archive["x"], archive["power_W"]
-    f, violation = nlp_gait.compile_objective(problem)(x)
+    f, violation = nlp_gait.compile_objective(findings.dsp.problem)(x)
     assert len(x) > 100 and np.all(violation == 0.0)
     np.testing.assert_allclose(f, power, rtol=1e-12)
-    assert power.min() == pytest.approx(findings.dsp.searches["ga"][2]["power_W"], rel=1e-9)
+    assert power.min() == pytest.approx(findings.dsp.searches["ga"][2].verdict.objective, rel=1e-9)
 
 
-def test_paired_runs_start_alike(done: tuple[Path, Findings]) -> None:
-    _, findings = done
-    for phase in findings.phases:
+def test_paired_runs_start_alike(done: tuple[Path, Findings, list[str]]) -> None:
+    for phase in done[1].phases:
         for pso, ga in zip(phase.searches["pso"], phase.searches["ga"], strict=True):
-            assert pso["history_W"][0] == ga["history_W"][0]
+            assert pso.history.objective[0] == ga.history.objective[0]
 
 
-def test_interrupted_and_started_again_it_continues(
-    done: tuple[Path, Findings], small: pytest.MonkeyPatch, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out, _ = done
-    report = (out / "report.md").read_text()
-    (out / "steps" / "nao-ssp-pso-01.json").write_text('{"inputs": ')  # torn by a crash
+def test_nothing_lies_below_ipopts_optimum(done: tuple[Path, Findings, list[str]]) -> None:
+    """Neither where a search ends, nor an optimum with a variable held."""
+    for phase in done[1].phases:
+        assert min(phase.final_powers("pso") + phase.final_powers("ga")) > phase.best
+        for sweep in phase.sweeps.values():
+            assert all(held.power_W > phase.best * (1 - 1e-6) for held in sweep if held.feasible)
+
+
+def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, list[str]]) -> None:
+    out, findings, _ = done
+    step = out / "steps" / "nao-dsp-sweep-x1.json"
+    swept = step.read_text()
+    (out / "records" / "nao-ssp" / "pso-0001.json").unlink()
     (out / "points" / "nao-dsp-ga-00.npz").unlink()
-    (out / "steps" / "nao-dsp-ipopt-01.json").unlink()
-    again: list[str] = []
+    step.write_text(swept[: len(swept) // 2])  # torn by a crash
+    told: list[str] = []
 
-    def counted(**arguments: Any) -> Any:
-        again.append(f"{arguments['problem']}-{arguments['algorithm']}-{arguments['seed']:02d}")
-        return search(**arguments)
+    def stop_at_news(note: str) -> None:
+        told.append(note)
+        if "kept" not in note:
+            raise KeyboardInterrupt
 
-    counted.__module__ = search.__module__  # it is the same code for the steps
-    monkeypatch.setattr(nao, "search", counted)
-    monkeypatch.setattr(nao.figures, "all_figures", lambda findings: iter(()))  # the slow part, seen above
-    stopped: list[str] = []
+    for news in ("nao-dsp, ga 0", "nao-ssp, pso 1", "nao-dsp-sweep-x1"):
+        with pytest.raises(KeyboardInterrupt):
+            nao.reproduce(out, progress=stop_at_news, effort=SMALL)
+        assert told[-1] == news
+    told.clear()
 
-    def stop_early(note: str) -> None:
-        stopped.append(note)
-        if len(stopped) == 4:
+    def stop_at_figures(note: str) -> None:
+        told.append(note)
+        if note.startswith("figures"):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        nao.reproduce(out, progress=stop_early)
-    assert again == ["nao-ssp-pso-01"]
-    nao.reproduce(out, progress=lambda note: None)
-    assert again == ["nao-ssp-pso-01", "nao-dsp-ga-00"]
-    ran_anew = json.loads((out / "steps" / "nao-dsp-ipopt-01.json").read_text())
-    assert ran_anew["result"]["success"]
-    times = re.compile(r"\d+\.\d\d \|$", re.MULTILINE)  # all else is repeated to the last digit
-    assert times.sub("", (out / "report.md").read_text()) == times.sub("", report)
+        nao.reproduce(out, progress=stop_at_figures, effort=SMALL)
+    assert [note for note in told if "kept" not in note] == ["nao-dsp-sweep-x1", "figures, tables and report"]
+    assert step.read_text() == swept
+    again = read_record(out / "records" / "nao-ssp" / "pso-0001.json")
+    assert again.x == findings.ssp.searches["pso"][1].x
+    assert (out / "points" / "nao-dsp-ga-00.npz").exists()
 
 
 def test_progress_is_told_as_often_as_announced() -> None:
@@ -156,36 +134,45 @@ def verdict(findings: Findings, start: str) -> str:
     return found
 
 
-def test_claims_follow_the_numbers(done: tuple[Path, Findings]) -> None:
-    _, findings = done
-    ssp = findings.ssp
-    assert verdict(findings, "A higher hip saves power in single").startswith("holds in our model by 50 %")
-    assert verdict(findings, "Slower saves power in double") == "holds in our model by a factor of 2.0"
-    assert verdict(findings, "Beyond 0.024 m") == "does not hold"
-    assert verdict(findings, "For some durations") == "does not hold"
+def with_sweep(findings: Findings, position: int, powers: Sequence[float]) -> Findings:
+    """With a line of IPOPT in single support that has these powers; infinity where nothing is feasible."""
+    line = [Held(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)]
+    phases = [replace(phase, sweeps={**phase.sweeps, position: line}) for phase in findings.phases]
+    return replace(findings, ssp=phases[0], dsp=phases[1])
 
-    runs = [{**ssp.searches["pso"][0], "power_W": power} for power in (0.85, 0.86, 0.87, 0.88, 0.89)]
-    worse = [{**run, "power_W": run["power_W"] + 0.1} for run in runs]
-    pso_wins = replace(findings, ssp=replace(ssp, searches={"pso": runs, "ga": worse}))
-    ga_wins = replace(findings, ssp=replace(ssp, searches={"pso": worse, "ga": runs}))
+
+def with_powers(phase: PhaseFindings, powers: Mapping[str, Sequence[float]]) -> PhaseFindings:
+    """With these powers at the ends of the searches; infinity for an infeasible end."""
+
+    def run(power: float) -> RunRecord:
+        known = phase.searches["pso"][0]
+        return replace(known, verdict=replace(known.verdict, objective=power, feasible=np.isfinite(power)))
+
+    return replace(phase, searches={name: [run(power) for power in ends] for name, ends in powers.items()})
+
+
+def test_claims_follow_the_numbers(done: tuple[Path, Findings, list[str]]) -> None:
+    findings = done[1]
+    ssp = findings.ssp
+    low = [0.85, 0.86, 0.87, 0.88, 0.89]
+    high = [power + 0.1 for power in low]
+    pso_wins = replace(findings, ssp=with_powers(ssp, {"pso": low, "ga": high}))
+    ga_wins = replace(findings, ssp=with_powers(ssp, {"pso": high, "ga": low}))
     assert verdict(pso_wins, "PSO is better than GA in single").startswith("holds in our model by 11.49 %")
     assert verdict(ga_wins, "PSO is better than GA in single") == "does not hold"
 
-    rising = [{**point, "power_W": 3.0 - point["power_W"]} for point in ssp.sweeps[0]]
-    dear = replace(findings, ssp=replace(ssp, sweeps={**ssp.sweeps, 0: rising}))
-    assert verdict(dear, "A higher hip saves power in single") == "does not hold"
+    falling, rising = (with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0)))
+    assert verdict(falling, "A higher hip saves power in single").startswith("holds in our model by 50 %")
+    assert verdict(rising, "A higher hip saves power in single") == "does not hold"
 
-    gap = [{**point, "feasible": k != 3} for k, point in enumerate(findings.dsp.sweeps[DSP.duration])]
-    broken = replace(findings, dsp=replace(findings.dsp, sweeps={**findings.dsp.sweeps, DSP.duration: gap}))
-    assert verdict(broken, "For some durations") == "holds"
+    whole, gap = (with_sweep(findings, DSP.duration, (2.0, middle, 1.0)) for middle in (1.5, np.inf))
+    assert verdict(whole, "Slower saves power in double") == "holds in our model by a factor of 2.0"
+    assert verdict(whole, "For some durations") == "does not hold"
+    assert verdict(gap, "For some durations") == "holds"
 
 
-def test_infeasible_runs_rank_last(done: tuple[Path, Findings]) -> None:
-    ssp = done[1].ssp
-    runs = [
-        {**ssp.searches["pso"][0], "power_W": p, "feasible": ok} for p, ok in ((0.1, False), (0.9, True), (0.8, True))
-    ]
-    phase = replace(ssp, searches={"pso": runs, "ga": runs})
+def test_infeasible_runs_rank_last(done: tuple[Path, Findings, list[str]]) -> None:
+    phase = with_powers(done[1].ssp, {"pso": [np.inf, 0.9, 0.8]})
     assert phase.final_powers("pso") == [float("inf"), 0.9, 0.8]
     assert phase.median_run("pso") == 1
 
@@ -195,15 +182,15 @@ def test_the_remark_on_the_gap_is_computed() -> None:
     here, twice = [], []
     for phase in PHASES:
         problem = nlp_gait.load(phase.problem)
-        here += [judged(problem, optimum.x)["power_W"] for optimum in phase.optima.values()]
+        here += [evaluate(problem, optimum.x).objective["value"] for optimum in phase.optima.values()]
         twice += [power_with_legs_twice(problem, optimum.x) for optimum in phase.optima.values()]
     assert here == pytest.approx([0.866844, 0.891966, 0.626506, 0.626492], abs=2e-6)
     assert twice == pytest.approx([1.306, 1.355, 1.084, 1.084], abs=5e-4)
 
 
-def test_effect_size_of_the_printed_rank_sums(done: tuple[Path, Findings]) -> None:
-    eleven = [{}] * 11
-    found = [implied_a12(replace(done[1].ssp, paper=paper, searches={"pso": eleven})) for paper in (SSP, DSP)]
+def test_effect_size_of_the_printed_rank_sums(done: tuple[Path, Findings, list[str]]) -> None:
+    eleven = with_powers(done[1].ssp, {"pso": [1.0] * 11})
+    found = [implied_a12(replace(eleven, paper=paper)) for paper in (SSP, DSP)]
     assert found == pytest.approx([117 / 121, 97 / 121])  # W = 66 would be a win in all 121 pairs
 
 

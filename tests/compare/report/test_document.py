@@ -17,6 +17,8 @@ TEXT = """
 Found {count} *gaits* {low:.2f}.
 
 {powers}
+| solver | power [W] | {third} |
+| | .2f | |
 
 ## A heading of {count}
 
@@ -42,7 +44,10 @@ POWERS = Table(
 
 def made() -> Document:
     return document_from(
-        TEXT, values={"count": 3, "low": 0.125}, tables={"powers": POWERS}, figures={"empty": new_figure(1.0, 1.0)}
+        TEXT,
+        values={"count": 3, "low": 0.125, "third": "feasible"},
+        tables={"powers": POWERS.rows},
+        figures={"empty": new_figure(1.0, 1.0)},
     )
 
 
@@ -50,7 +55,7 @@ def test_a_text_with_places_becomes_a_document() -> None:
     document = made()
     assert document.title == "A title"
     first, table, heading, end = document.parts
-    assert first == Prose("Found 3 *gaits* 0.12.") and table is POWERS
+    assert first == Prose("Found 3 *gaits* 0.12.") and table == POWERS
     assert isinstance(heading, Section) and heading.title == "A heading of 3"
     below = heading.parts[1]
     assert isinstance(below, Section) and isinstance(below.parts[0], Figure)

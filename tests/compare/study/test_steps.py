@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import nlp_gait
-from compare.papers.tables import write_table
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Step, Steps, fingerprint
 
 
 def test_a_step_runs_once_for_equal_inputs(tmp_path: Path) -> None:
@@ -60,8 +61,12 @@ def test_fingerprint_tells_values_and_mathematics_apart() -> None:
     assert one["mathematics_sha256"] != other["mathematics_sha256"]
 
 
-def test_tables_are_rounded_for_people_only(tmp_path: Path) -> None:
-    text = write_table(tmp_path / "a.b", {"solver": "", "f [1]": ".2f"}, [["ga", 1 / 3]])
-    assert "| ga | 0.33 |" in text
-    assert (tmp_path / "a.b.md").read_text() == text
-    assert (tmp_path / "a.b.csv").read_text() == f"solver,f [1]\nga,{1 / 3!r}\n"
+def test_steps_side_by_side_are_kept_one_by_one(tmp_path: Path) -> None:
+    """In two processes; what is there already is not computed again."""
+    todo = [Step(name=f"root-{k}", inputs={"k": k}, compute=partial(math.sqrt, k)) for k in range(4)]
+    told: list[str] = []
+    Steps(tmp_path, print)("root-1", {"k": 1}, lambda: 7.0)
+    assert Steps(tmp_path, told.append).side_by_side(todo, jobs=2) == [0.0, 7.0, math.sqrt(2), math.sqrt(3)]
+    assert sorted(told) == ["root-0", "root-1: kept from an earlier run", "root-2", "root-3"]
+    assert Steps(tmp_path, told.append).side_by_side(todo, jobs=2)[3] == math.sqrt(3)
+    assert all("kept" in note for note in told[4:])

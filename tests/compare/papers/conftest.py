@@ -1,0 +1,19 @@
+"""Settings of the tests of reproductions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from compare.papers import runs
+from compare.study import steps
+
+
+@pytest.fixture(scope="package", autouse=True)
+def in_this_process() -> Iterator[None]:
+    """No worker processes: each would build every problem again."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (steps, runs):
+            patch.setattr(module, "default_jobs", lambda: 1)
+        yield
