@@ -97,7 +97,7 @@ def _header(line: str, where: str, motors: Collection[str] | None) -> tuple[str,
         raise InputError(f"{where}: a motor has no name")
     for joint in joints:
         if joints.count(joint) > 1:
-            raise InputError(f"{where}: motor {joint!r} stands there twice")
+            raise InputError(f"{where}: motor {joint!r} appears twice")
         if motors is not None and joint not in motors:
             raise InputError(f"{where}: the robot has no motor {joint!r}")
     return tuple(joints)

@@ -99,7 +99,7 @@ def test_what_webots_accepts_is_accepted():
         (GOOD.replace("V1.0", "V2.0"), r"line 1: must begin"),
         ("#WEBOTS_MOTION,V1.0\n0,P,1\n", r"line 1: a motor has no name"),
         (GOOD.replace("RKneePitch", ""), r"line 1: a motor has no name"),
-        (GOOD.replace("RKneePitch", "LKneePitch"), r"line 1: motor 'LKneePitch' stands there twice"),
+        (GOOD.replace("RKneePitch", "LKneePitch"), r"line 1: motor 'LKneePitch' appears twice"),
         (GOOD.replace("RKneePitch", "RKneeBend"), r"line 1: the robot has no motor 'RKneeBend'"),
         (GOOD.replace("0.1,-0.2", "0.1"), r"line 2: 1 values for 2 motors"),
         (GOOD.replace("0.1,-0.2", "0.1,-0.2,0.3"), r"line 2: 3 values for 2 motors"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Optimum:
+class PrintedOptimum:
     """A solution as printed.
 
     Attributes:
@@ -53,7 +53,7 @@ class PrintedPhase:
 
     problem: str
     title: str
-    optima: Mapping[str, Optimum]
+    optima: Mapping[str, PrintedOptimum]
     test: PrintedTest
     tables: tuple[int, int]
     convergence_figure: int
@@ -70,12 +70,12 @@ SSP = PrintedPhase(
     problem="nao-ssp",
     title="single support",
     optima={
-        "pso": Optimum(
+        "pso": PrintedOptimum(
             x=(0.31, -0.0020, 0.0034, 0.0080, 0.0025, 0.0243, -0.0256, 0.015, 4.0),
             power_W=1.283,
             indexes=_indexes(0.4492, 0.0307, 0.0085, 0.0641, 0.0200),
         ),
-        "ga": Optimum(
+        "ga": PrintedOptimum(
             x=(0.31, -0.005, 0.000, 0.0031, 0.0017, 0.0364, -0.0135, 0.015, 4.0),
             power_W=1.303,
             indexes=_indexes(0.5143, 0.0308, 0.0084, 0.0591, 0.0200),
@@ -91,12 +91,12 @@ DSP = PrintedPhase(
     problem="nao-dsp",
     title="double support",
     optima={
-        "pso": Optimum(
+        "pso": PrintedOptimum(
             x=(0.31, -0.0008, -0.0055, 0.0520, 0.0010, -0.0367, -0.0424, 2.0),
             power_W=1.0682,
             indexes=_indexes(0.6751, 0.0734, 0.0700, 0.0926, 0.0809),
         ),
-        "ga": Optimum(
+        "ga": PrintedOptimum(
             x=(0.31, 0.0002, -0.0052, 0.0582, 0.0010, -0.0384, -0.0405, 2.0),
             power_W=1.0685,
             indexes=_indexes(0.6554, 0.0731, 0.0699, 0.0928, 0.0811),

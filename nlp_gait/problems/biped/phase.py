@@ -42,7 +42,7 @@ COLUMNS = {
 }
 
 
-class Plan(NamedTuple):
+class PlannedInstant(NamedTuple):
     """Motion of the whole robot at one instant.
 
     Attributes:
@@ -71,7 +71,7 @@ class Loads(NamedTuple):
 
 
 # From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
-Planner = Callable[[InstantPoint, SX, Nonsmooth], Plan]
+Planner = Callable[[InstantPoint, SX, Nonsmooth], PlannedInstant]
 # From joint motions by name, the hip's position (3,), and points (2,) on the ground under the ankles by side.
 Loader = Callable[[Mapping[str, Motion], SX, Mapping[str, SX]], Loads]
 
@@ -200,7 +200,7 @@ class Phase:
     def _reads_motion(self) -> bool:
         return self.goal.reads_motion or any(part.reads_motion for part in self.parts)
 
-    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Plan, InstantPoint]:
+    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], PlannedInstant, InstantPoint]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
         at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
         return [x, margin, phase], self.plan(at, phase, ops), at
@@ -231,7 +231,7 @@ class Phase:
         seen = [trace(at, inputs[2]) for trace in traces.values()]
         return ca.Function("kinematics", inputs, [*self._motion(plan), plan.hip, planned, plan.reach, world, *seen])
 
-    def _motion(self, plan: Plan) -> list[SX]:
+    def _motion(self, plan: PlannedInstant) -> list[SX]:
         """Angles of the joints that move, and both derivatives."""
         return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
 

@@ -8,7 +8,7 @@ from casadi import DM, SX, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import InstantPoint
-from nlp_gait.problems.biped.phase import Plan
+from nlp_gait.problems.biped.phase import PlannedInstant
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
@@ -87,7 +87,7 @@ def hip_motion(
 
 def upright_plan(
     robot: Robot, hip: Motion, ankles: Mapping[str, Motion], arms: Mapping[str, Motion], margin: SX, ops: Nonsmooth
-) -> Plan:
+) -> PlannedInstant:
     """Motion of the whole robot under an upright torso: legs in closed form between the hip and both ankles by side."""
     joints: dict[str, Motion] = {}
     reach = []
@@ -103,7 +103,7 @@ def upright_plan(
         joints |= {f"{side}HipYawPitch": constant(0.0)}
         joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
         reach.append(leg.reach)
-    return Plan(
+    return PlannedInstant(
         joints={**joints, **arms},
         hip=hip.position,
         ankles={side: ankle.position for side, ankle in ankles.items()},

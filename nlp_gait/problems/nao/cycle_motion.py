@@ -13,7 +13,7 @@ from casadi import SX, fmax, vertcat, vertsplit
 
 from nlp_gait.problem import InstantPoint, Variable
 from nlp_gait.problems.biped.parts import REACH_MARGIN
-from nlp_gait.problems.biped.phase import Plan, Planner
+from nlp_gait.problems.biped.phase import PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, upright_plan
 from nlp_gait.problems.nao.legs import hip_variables, leg_geometry
@@ -137,7 +137,7 @@ def single_support_planner(robot: Robot) -> Planner:
     """From lift-off to touch-down over the left foot."""
     left, (right_y, right_z) = _standing(robot, "L"), _place(robot, "R")
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
         cycle = cycle_from(at)
         swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
         hip, arms = _between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
@@ -150,7 +150,7 @@ def double_support_planner(robot: Robot) -> Planner:
     """From touch-down to the mirror image of lift-off over both feet."""
     left, right = _standing(robot, "L"), _standing(robot, "R")
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
         cycle = cycle_from(at)
         ahead = right._replace(position=right.position + vertcat(cycle.step, 0, 0))
         hip, arms = _between(cycle.touch_down, cycle.end, cycle.double, phase)

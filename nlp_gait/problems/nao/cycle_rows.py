@@ -79,7 +79,7 @@ class WalkingCycle:
         )
 
     def motion(self, at: Point) -> Point:
-        """The point with the step length as a variable, where it is none yet."""
+        """The point with the step length as a variable, where it is not one yet."""
         if not self.at_given_speed:
             return at
         return at.extended(STEP, at[SPEED] * (at[TIMES["ssp"]] + at[TIMES["dsp"]]))

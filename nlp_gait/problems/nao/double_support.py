@@ -13,7 +13,7 @@ from casadi import DM, MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
-from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.problems.nao.curves import (
@@ -159,7 +159,7 @@ def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Pla
     """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
     ankles = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in standing_ankles(robot, soles).items()}
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
         duration = double_support_duration(at)
         more = splines.motions(at, duration, phase)
         hip = double_support_hip(at, more, soles, phase)

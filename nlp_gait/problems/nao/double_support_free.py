@@ -10,7 +10,7 @@ from casadi import MX, SX
 from nlp_gait.problem import GaitProblem, Grid, InstantPoint, Point, maker
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.parts import REACH_MARGIN, AngleLimits, Contribution, Part, rows
-from nlp_gait.problems.biped.phase import Phase, Plan
+from nlp_gait.problems.biped.phase import Phase, PlannedInstant
 from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.closed_chain import YAW_PITCHES, check_yaw_pitches, closure, leaning_legs
@@ -78,10 +78,10 @@ def nao_dsp_free(
         hip = double_support_hip(at, more, soles, s)
         return hip, stack(*(more[name] for name in LEAN)), arm_motions(more, ARM_SWING, duration, s)
 
-    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Plan:
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> PlannedInstant:
         hip, lean, arms = torso(at, s)
         legs = leaning_legs(model, hip, lean, ankles, at[REACH_MARGIN], ops)
-        return Plan(joints={**legs.joints, **arms}, hip=hip.position, ankles=ankles, reach=legs.reach)
+        return PlannedInstant(joints={**legs.joints, **arms}, hip=hip.position, ankles=ankles, reach=legs.reach)
 
     def pose(at: InstantPoint, s: SX) -> SX:
         hip, lean, _ = torso(at, s)

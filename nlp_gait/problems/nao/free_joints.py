@@ -27,7 +27,7 @@ from nlp_gait.problems.biped.parts import (
     limit_rows,
     rows,
 )
-from nlp_gait.problems.biped.phase import Loader, Phase, Plan, Planner
+from nlp_gait.problems.biped.phase import Loader, Phase, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.curves import Splines, Trajectory
@@ -48,7 +48,7 @@ MOVING = (*YAW_PITCHES, *CURVES[1:])
 KNEES = ("LKneePitch", "RKneePitch")
 
 
-class Body(NamedTuple):
+class FreeParts(NamedTuple):
     """Where the free parts are.
 
     Attributes:
@@ -97,18 +97,18 @@ class FreeMotion:
             moved[name] = plus(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
         return {**start, **moved}
 
-    def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
         """Motion of the whole robot."""
         joints = self.joints(at, phase, ops)
         body = self.body({name: motion.position for name, motion in joints.items()})
-        return Plan(
+        return PlannedInstant(
             joints=joints,
             hip=body.torso,
             ankles={"L": SX(DM(self.support)), "R": body.ankle},
             reach=ca.vertcat(*(ca.cos(joints[knee].position) for knee in KNEES)),
         )
 
-    def body(self, q: Mapping[str, SX]) -> Body:
+    def body(self, q: Mapping[str, SX]) -> FreeParts:
         """Where torso and right foot are, from angles by joint name."""
         poses = self._poses(q)
         torso = poses[self.robot.root]
@@ -121,7 +121,7 @@ class FreeMotion:
             for along in (-foot.back_m, foot.front_m)
             for across in (-foot.right_m, foot.left_m)
         ]
-        return Body(
+        return FreeParts(
             torso.position - torso.rotation @ DM(entry.origin_m),
             ankle.position,
             ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),

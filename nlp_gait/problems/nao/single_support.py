@@ -9,7 +9,7 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
-from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, Plan, Planner
+from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.problems.nao.curves import (
@@ -129,7 +129,7 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
     """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
     ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Plan:
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
         duration = single_support_duration(at)
         more = splines.motions(at, duration, phase)
         hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, duration, phase)
