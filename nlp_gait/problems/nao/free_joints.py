@@ -33,8 +33,7 @@ from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.curves import Splines, Trajectory
 from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body as TreeBody
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.economy import economical, tabulated
 from nlp_gait.symbolic.kinematics import Pose, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -143,7 +142,7 @@ class FreeMotion:
         return ca.Function("instant", [v], economical([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
 
     @cached_property
-    def _tree(self) -> tuple[TreeBody, ...]:
+    def _tree(self) -> tuple[Body, ...]:
         return tree_from(self.robot, self.robot.feet["left"].link)
 
     def _poses(self, q: Mapping[str, SX]) -> dict[str, Pose]:

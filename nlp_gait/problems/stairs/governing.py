@@ -48,5 +48,5 @@ def governing(point: Point) -> MX:
 
 
 def stair_plan(values: SX) -> StairPlan:
-    """PlannedInstant from its governing parameters (14,)."""
+    """Plan from its governing parameters (14,)."""
     return StairPlan(*ca.vertsplit(values))

@@ -34,7 +34,7 @@ from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
 
-# PlannedInstant of least energy for case 2 of Table IV: the optimum of stairs-plan.
+# Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
 PLAN = {
     "hip_height_m": 0.6926,
     "hip_start_m": 0.0918,
