@@ -6,8 +6,7 @@ A number that is not finite is written as null: where the dataclass has a ``floa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -15,7 +14,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from nlp_gait.errors import GaitError, unknown
-from nlp_gait.files import read_json
+from nlp_gait.files import read_json, refusing
 
 T = TypeVar("T")
 
@@ -73,15 +72,6 @@ def read_decoded(cls: Callable[..., T], path: Path, what: str, *, error: type[Ga
     raw = read_json(path, what, error=error)
     with refusing(f"{what} {str(path)!r}", error):
         return decoded(cls, raw)
-
-
-@contextmanager
-def refusing(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
-    """Raises a ValueError of this module as another error, which says whose data it is about and what to do."""
-    try:
-        yield
-    except ValueError as reason:
-        raise error(f"{owner}: {reason}{remedy and f'; {remedy}'}") from reason
 
 
 @cache

@@ -48,7 +48,7 @@ def read_bytes(
     Raises:
         GaitError: of that class: it cannot be read, is not a regular file, or is too long.
     """
-    with _refusing(path, what, "cannot be read", error, remedy):
+    with refusing(f"{what} {str(path)!r} cannot be read", error, remedy):
         # Opening a pipe would wait for its writer.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
         with open(descriptor, "rb") as file:
@@ -66,7 +66,7 @@ def read_text(
 ) -> str:
     """Content of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
     content = read_bytes(path, what, error=error, at_most=at_most, remedy=remedy)
-    with _refusing(path, what, "cannot be read", error, remedy):
+    with refusing(f"{what} {str(path)!r} cannot be read", error, remedy):
         text = content.decode("utf-8")
         if text.startswith(BYTE_ORDER_MARK):
             raise ValueError("it begins with a byte-order mark; save it as UTF-8 without one")
@@ -86,7 +86,7 @@ def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, rem
         GaitError: of that class.
     """
     text = read_text(path, what, error=error, remedy=remedy)
-    with _refusing(path, what, "is not valid JSON", error, remedy):
+    with refusing(f"{what} {str(path)!r} is not valid JSON", error, remedy):
         data = json.loads(text, object_pairs_hook=_without_twins)
         check_plain(data)
     return data
@@ -148,17 +148,15 @@ def new_file(path: Path) -> Iterator[Path]:
     """
     temporary = None
     try:
-        if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
-            raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
-        unused = path.parent / f".{secrets.token_hex(8)}.tmp"
-        # With O_EXCL it cannot be a file or a link that somebody has put there.
-        os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        temporary = unused
-        yield temporary
-        temporary.replace(path)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise OutputError(f"cannot write {str(path)!r}: {reason}") from error
+        with refusing(f"cannot write {str(path)!r}", OutputError):
+            if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
+                raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
+            unused = path.parent / f".{secrets.token_hex(8)}.tmp"
+            # With O_EXCL it cannot be a file or a link that somebody has put there.
+            os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            temporary = unused
+            yield temporary
+            temporary.replace(path)
     finally:
         if temporary is not None:
             with contextlib.suppress(OSError):
@@ -177,12 +175,13 @@ def without_nan(data: Any) -> Any:
 
 
 @contextmanager
-def _refusing(path: Path, what: str, wrong: str, error: type[GaitError], remedy: str) -> Iterator[None]:
+def refusing(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
+    """Raises what is wrong with a file or its content as another error, which says whose data it is and what to do."""
     try:
         yield
     except (OSError, ValueError, RecursionError) as reason:
-        said = getattr(reason, "strerror", None) or _shortened(str(reason))
-        raise error(f"{what} {str(path)!r} {wrong}: {said}{remedy and f'; {remedy}'}") from reason
+        said = getattr(reason, "strerror", None) or reason
+        raise error(f"{owner}: {said}{remedy and f'; {remedy}'}") from reason
 
 
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -220,14 +219,9 @@ def writable_folder(path: Path) -> Path:
     Raises:
         OutputError: it cannot be made or written to.
     """
-    try:
+    with refusing(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise OutputError(
-            f"cannot write to {str(path)!r}: {error.strerror}; choose another folder with --out"
-        ) from error
+        tempfile.TemporaryFile(dir=path).close()
     return path
 
 

@@ -18,7 +18,9 @@ from compare.analysis.statistics.run_length import (
     relative_gap,
 )
 from compare.study.record import RunRecord
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
+from nlp_gait.files import refusing
 from nlp_gait.problem import Objective
 
 DEFAULT_WEIGHTING = Weighting()
@@ -139,12 +141,7 @@ def objective_of(record: RunRecord) -> Objective:
     """Objective that a record was made for.
 
     Raises:
-        InputError: the record does not say.
+        InputError: the record does not say, or what it says is not an objective.
     """
-    try:
-        objective = Objective(**record.definition["objective"])
-    except (KeyError, TypeError) as error:
-        raise InputError(f"record of {record.algorithm}, run {record.run}: no objective in its definition") from error
-    if objective.sense not in ("minimise", "maximise"):
-        raise InputError(f"record of {record.algorithm}, run {record.run}: unknown sense {objective.sense!r}")
-    return objective
+    with refusing(f"record of {record.algorithm}, run {record.run}", InputError):
+        return decoded(Objective, record.definition.get("objective"), "objective")

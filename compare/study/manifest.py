@@ -10,14 +10,15 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from compare.study.settings import StudySettings, settings_from
+from compare.study.workers import default_jobs
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.files import read_json, write_json
+from nlp_gait.files import read_json, refusing, write_json
 
 SCHEMA = 1
 FILE = "study.json"
@@ -54,7 +55,7 @@ class Session:
             machine={
                 "processor": _processor(),
                 "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-                "processors": str(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()),
+                "processors": str(default_jobs()),
             },
             versions={"python": sys.version.split()[0], **_versions()},
             kernel=_kernel(),
@@ -74,7 +75,7 @@ class Manifest:
 class _Kept:
     """Content of the file."""
 
-    schema: int
+    schema: Literal[1]
     study: Mapping[str, Any]
     sessions: tuple[Session, ...]
 
@@ -108,13 +109,8 @@ def read_manifest(folder: Path) -> Manifest:
     if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())
     raw = read_json(path, "manifest", remedy=REMEDY)
-    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-    if type(found) is not int or found != SCHEMA:
-        raise InputError(f"manifest {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {REMEDY}")
-    try:
+    with refusing(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
         kept = decoded(_Kept, raw)
-    except ValueError as error:
-        raise InputError(f"manifest {str(path)!r} is damaged: {error}; {REMEDY}") from error
     return Manifest(settings=settings_from(kept.study, f"manifest {str(path)!r}"), sessions=kept.sessions)
 
 

@@ -11,9 +11,9 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL
-from nlp_gait.decoding import decoded, refusing
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, without_nan, write_json
+from nlp_gait.files import read_json, refusing, without_nan, write_json
 from nlp_gait.problem import Objective
 from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations

@@ -11,7 +11,7 @@ from typing import Any
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
-from nlp_gait.files import check_plain, read_text
+from nlp_gait.files import check_plain, read_text, refusing
 
 SCHEMA = 1  # of study files; they may leave it out
 LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
@@ -118,10 +118,8 @@ def read_settings(path: Path) -> StudySettings:
         InputError: the file cannot be read, or something in it is not allowed; the message says what and where.
     """
     text = read_text(path, "study file", at_most=LARGEST_FILE)
-    try:
+    with refusing(f"study file {str(path)!r} is not valid TOML", InputError):
         raw = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"study file {str(path)!r} is not valid TOML: {error}") from error
     return settings_from(raw, f"study file {str(path)!r}")
 
 
@@ -136,17 +134,13 @@ def settings_from(raw: Any, source: str) -> StudySettings:
         InputError: a key that does not exist, or a value of the wrong kind or that is not allowed.
         UnknownNameError: a problem, or a variable to fix, that does not exist.
     """
-    try:
+    with refusing(f"{source} may hold finite numbers, texts, lists and tables only", InputError):
         check_plain(raw)
-    except ValueError as error:
-        raise InputError(f"{source} may hold finite numbers, texts, lists and tables only: {error}") from error
     for name in ("problem", "solver"):
         if isinstance(raw, Mapping) and not (isinstance(raw.get(name), list) and raw[name]):
             raise InputError(f"{source} needs at least one [[{name}]]")
-    try:
+    with refusing(source, InputError):
         study = decoded(_Study, raw)
-    except ValueError as error:
-        raise InputError(f"{source}: {error}") from error
     if study.schema != SCHEMA:
         raise InputError(
             f"{source}: schema must be {SCHEMA}, got {study.schema}; a newer version of nlp-gait may read it"

@@ -13,7 +13,7 @@ from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import remove_leftovers, writable_folder
+from nlp_gait.files import refusing, remove_leftovers, writable_folder
 
 __all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
 
@@ -136,12 +136,8 @@ def read_records(folder: Path) -> list[RunRecord]:
     Raises:
         InputError: there are none, or one is damaged.
     """
-    try:
+    with refusing(f"folder {str(folder)!r} cannot be read", InputError):
         paths = sorted((folder / RECORDS).glob("*/*.json"))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"folder {str(folder)!r} cannot be read: {getattr(error, 'strerror', None) or error}"
-        ) from error
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
     return [_named_alike(path, read_record(path)) for path in paths]

@@ -11,6 +11,7 @@ from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
 from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
+from nlp_gait.files import refusing
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
@@ -91,11 +92,7 @@ def _dask(address: str) -> AbstractContextManager[object]:
     from joblib import parallel_config
 
     stack = ExitStack()
-    try:
+    with refusing(f"no Dask scheduler answers at {address!r}", InputError, "start one with `dask scheduler`"):
         stack.enter_context(Client(address, timeout=CONNECT_TIMEOUT, set_as_default=True))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"no Dask scheduler answers at {address!r}: {error}; start one with `dask scheduler`"
-        ) from error
     stack.enter_context(parallel_config(backend="dask"))
     return stack

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import fields
 from typing import Any
+
+import numpy as np
 
 from nlp_gait.errors import RobotDataError
 
@@ -34,16 +35,12 @@ def check_numbers(owner: str, record: Any, positive: Collection[str]) -> None:
         value = getattr(record, field.name)
         if field.name in positive and not value > 0.0:  # NaN fails too
             raise RobotDataError(f"{owner}: {field.name} must be > 0, got {value}")
-        if not all(math.isfinite(number) and abs(number) <= LARGEST_NUMBER for number in _numbers(value)):
+        if isinstance(value, (int, float, tuple)) and not sound(value):
             raise RobotDataError(
                 f"{owner}: {field.name} must be finite numbers within {LARGEST_NUMBER:g}, got {value!r}"
             )
 
 
-def _numbers(value: Any) -> Iterator[float]:
-    """Numbers in a field, also in tuples of tuples."""
-    if isinstance(value, tuple):
-        for part in value:
-            yield from _numbers(part)
-    elif isinstance(value, (int, float)):
-        yield value
+def sound(numbers: Any) -> bool:
+    """Whether a number, or all in a sequence or array of any depth, are finite and no larger than a robot's are."""
+    return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not

@@ -9,7 +9,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import inertia_matrix, inertia_moments, point_inertia
+from nlp_gait.robots.tree import inertia_moments, point_inertia
 
 # A tensor about the joint gives ratios below 1 (see ``joint_distance_ratio``); printed digits may lift one by some percent.
 GREATEST_JOINT_RATIO = 1.05
@@ -27,7 +27,7 @@ def joint_distance_ratio(link: Link) -> float:
     With s for a tensor about the centre of mass, the same link described by the tensor about its joint has s / (1 + s), which
     is below 1. A uniform rod held at its end has s = 3, and 0.75 with the wrong tensor.
     """
-    inertia, com = inertia_matrix(link), np.array(link.com_m)
+    inertia, com = link.inertia_matrix, np.array(link.com_m)
     second_moments, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     return float(link.mass_kg * np.sum((com @ axes) ** 2 / np.maximum(second_moments, LEAST_MOMENT)))
 
@@ -60,5 +60,5 @@ def shifted_to_com(link: Link) -> Link:
     Raises:
         RobotDataError: no rigid body has such a tensor about its joint.
     """
-    about_com = inertia_matrix(link) - point_inertia(link.mass_kg, np.array(link.com_m))
+    about_com = link.inertia_matrix - point_inertia(link.mass_kg, np.array(link.com_m))
     return replace(link, inertia_com_kgm2=inertia_moments(about_com))

@@ -11,8 +11,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
-from nlp_gait.decoding import decoded, decoded_value, read_decoded, refusing
+from nlp_gait.decoding import decoded, decoded_value, read_decoded
 from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.files import refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.perturbation import perturbed, split_name

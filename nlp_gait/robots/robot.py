@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from nlp_gait.errors import RobotDataError, unknown
 from nlp_gait.robots.fields import check_numbers
 
@@ -36,7 +38,7 @@ class Link:
         """Refuse what no rigid body can have."""
         owner = f"link {self.name!r}"
         check_numbers(owner, self, positive=("mass_kg",))
-        low, middle, high = _principal_moments(self.inertia_com_kgm2)
+        low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
         slack = TRIANGLE_TOLERANCE * high
         if low < -slack or low + middle < high - slack:
             raise RobotDataError(
@@ -45,13 +47,11 @@ class Link:
                 "the centre of mass is the usual cause: subtract m (c.c I - c c^T)"
             )
 
-
-def _principal_moments(inertia: tuple[float, ...]) -> tuple[float, float, float]:
-    import numpy as np
-
-    ixx, iyy, izz, ixy, ixz, iyz = inertia
-    moments = np.linalg.eigvalsh(np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]))
-    return float(moments[0]), float(moments[1]), float(moments[2])
+    @property
+    def inertia_matrix(self) -> np.ndarray:
+        """(3, 3) inertia about the centre of mass, link axes [kg m^2]."""
+        ixx, iyy, izz, ixy, ixz, iyz = self.inertia_com_kgm2
+        return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -103,12 +103,6 @@ def point_masses(robot: Robot) -> Robot:
     return replace(robot, links=links)
 
 
-def inertia_matrix(link: Link) -> np.ndarray:
-    """(3, 3) inertia about the centre of mass, link axes [kg m^2]."""
-    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-
-
 def inertia_moments(matrix: np.ndarray) -> tuple[float, float, float, float, float, float]:
     """(ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as ``Link`` has them."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
@@ -127,7 +121,7 @@ def _welded(parent: Link, child: Link, origin: Vector) -> Link:
     com = (parent.mass_kg * coms[0] + child.mass_kg * coms[1]) / mass
     inertia = np.zeros((3, 3))
     for link, c in zip((parent, child), coms, strict=True):
-        inertia += inertia_matrix(link) + point_inertia(link.mass_kg, c - com)
+        inertia += link.inertia_matrix + point_inertia(link.mass_kg, c - com)
     x, y, z = com.tolist()
     return Link(name=parent.name, mass_kg=mass, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(inertia))
 

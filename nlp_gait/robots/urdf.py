@@ -6,7 +6,6 @@ The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.robots.fields import LARGEST_NUMBER
+from nlp_gait.robots.fields import LARGEST_NUMBER, sound
 from nlp_gait.robots.tree import inertia_moments, point_inertia
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -38,11 +37,12 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
 
     Raises:
         MissingExtraError: the parser is not installed.
-        RobotDataError: the file cannot be read, is not a URDF, or its links do not form a tree.
+        RobotDataError: the file cannot be read, or is not a URDF.
+        ValueError: its links do not form a tree, or one of its values is missing or not allowed.
     """
     model = _parsed(path)
     joints = {joint.child: joint for joint in model.joints}
-    frames = _zero_pose(model, joints, path)
+    frames = _zero_pose(model, joints)
     carriers = {name: _carrier(name, joints) for name in frames}
     bodies: dict[str, list[tuple[float, Array, Array]]] = {}
     for link in model.links:
@@ -72,7 +72,7 @@ def _parsed(path: str) -> Any:
     except (etree.XMLSyntaxError, ValueError) as error:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {' '.join(str(error).split())}") from error
     if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
-        raise RobotDataError(f"robot file {path!r}: a URDF must not have a DOCTYPE or entities; remove them")
+        raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
     for element in list(root):
         kept = READ.get(element.tag)
         if kept is None:
@@ -96,36 +96,30 @@ def _refuse(message: str) -> None:
     raise RobotDataError(message)
 
 
-def _zero_pose(model: Any, joints: dict[str, Any], path: str) -> dict[str, Array]:
+def _zero_pose(model: Any, joints: dict[str, Any]) -> dict[str, Array]:
     """(4, 4) pose of each link's frame in the root's at zero angles, parents first; refuses links that do not form a tree."""
     names = [link.name for link in model.links]
     for kind, found in (("link", names), ("joint", [joint.name for joint in model.joints])):
         twice = sorted({name for name in found if found.count(name) > 1})
         if twice:
-            raise RobotDataError(f"robot file {path!r}: {kind} {twice[0]!r} appears twice")
+            raise ValueError(f"{kind} {twice[0]!r} appears twice")
     for joint in model.joints:
         for end in (joint.parent, joint.child):
             if end not in names:
-                raise RobotDataError(f"robot file {path!r}: joint {joint.name!r}: link {end!r} does not exist")
+                raise ValueError(f"joint {joint.name!r}: link {end!r} does not exist")
         if joints[joint.child] is not joint:
-            raise RobotDataError(
-                f"robot file {path!r}: joint {joint.name!r}: link {joint.child!r} already has a parent"
-            )
+            raise ValueError(f"joint {joint.name!r}: link {joint.child!r} already has a parent")
     roots = [name for name in names if name not in joints]
     if len(roots) != 1:
-        raise RobotDataError(
-            f"robot file {path!r}: exactly one link must have no parent, got {', '.join(roots) or 'none'}"
-        )
+        raise ValueError(f"exactly one link must have no parent, got {', '.join(roots) or 'none'}")
     frames: dict[str, Array] = {roots[0]: np.eye(4)}
     waiting = list(model.joints)
     while waiting:
         ready = [joint for joint in waiting if joint.parent in frames]
         if not ready:
-            raise RobotDataError(f"robot file {path!r}: joint {waiting[0].name!r} is part of a ring of joints")
+            raise ValueError(f"joint {waiting[0].name!r} is part of a ring of joints")
         for joint in ready:
-            frames[joint.child] = frames[joint.parent] @ _pose(
-                joint.origin, f"robot file {path!r}: joint {joint.name!r}"
-            )
+            frames[joint.child] = frames[joint.parent] @ _pose(joint.origin, f"joint {joint.name!r}")
         waiting = [joint for joint in waiting if joint.child not in frames]
     return frames
 
@@ -143,11 +137,9 @@ def _matter(link: Any, frame: Array, about_joint: bool) -> tuple[float, Array, A
     if inertial is None:
         return 0.0, frame[:3, 3], np.zeros((3, 3))
     if inertial.mass is None or inertial.inertia is None:
-        raise RobotDataError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
-    if not _sound([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
-        raise RobotDataError(
-            f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}"
-        )
+        raise ValueError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
+    if not sound([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
+        raise ValueError(f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}")
     pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
@@ -166,11 +158,11 @@ def _link(parts: list[tuple[float, Array, Array]], origin: Array) -> dict[str, A
 def _joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
     limit = joint.limit
     if limit is None:
-        raise RobotDataError(
+        raise ValueError(
             f"joint {joint.name!r}: <limit> must give effort and velocity, and lower and upper if revolute"
         )
-    if not _sound(joint.axis or ()):
-        raise RobotDataError(
+    if not sound(joint.axis or ()):
+        raise ValueError(
             f"joint {joint.name!r}: <axis> must hold finite numbers within {LARGEST_NUMBER:g}, got {joint.axis}"
         )
     frame, parent = frames[joint.child], carriers[joint.parent]
@@ -191,17 +183,12 @@ def _pose(origin: Any, owner: str) -> Array:
     pose = np.eye(4)
     if origin is None:
         return pose
-    if not _sound([*(origin.rpy or ()), *(origin.xyz or ())]):
-        raise RobotDataError(f"{owner}: <origin> must hold finite numbers, got xyz {origin.xyz}, rpy {origin.rpy}")
+    if not sound([*(origin.rpy or ()), *(origin.xyz or ())]):
+        raise ValueError(f"{owner}: <origin> must hold finite numbers, got xyz {origin.xyz}, rpy {origin.rpy}")
     roll, pitch, yaw = origin.rpy or (0.0, 0.0, 0.0)
     pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
     pose[:3, 3] = origin.xyz or (0.0, 0.0, 0.0)
     return pose
-
-
-def _sound(numbers: Sequence[float]) -> bool:
-    """Whether all are finite, and no larger than a robot's are."""
-    return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
 
 
 def _turn(axis: int, angle: float) -> Array:

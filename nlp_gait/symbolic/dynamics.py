@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
-from nlp_gait.robots.tree import Body, inertia_matrix
+from nlp_gait.robots.tree import Body
 from nlp_gait.symbolic.kinematics import relative_rotation
 
 
@@ -107,7 +107,7 @@ def regrouped_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list
 
 
 def _inertia(body: Body) -> Inertia:
-    mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), inertia_matrix(body.link)
+    mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix
     spread = np.trace(about_com) / 2 * np.eye(3) - about_com  # second moments about the centre of mass
     return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
 

@@ -11,7 +11,6 @@ import pytest
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import Link, load_robot, robot_names
 from nlp_gait.robots.inertia import check_inertias, joint_distance_ratio, shifted_to_com
-from nlp_gait.robots.tree import inertia_matrix
 from tests.robots.custom import about_joints, humanoid, nao, six
 from tests.robots.files import written
 
@@ -58,14 +57,14 @@ def test_tensors_about_the_joints_are_found_and_shifted_on_request(tmp_path: Pat
     right = load_robot(written(tmp_path, make()))
     for name, link in right.links.items():
         np.testing.assert_allclose(
-            inertia_matrix(shifted.links[name]), inertia_matrix(link), rtol=0, atol=TOLERANCE, err_msg=name
+            shifted.links[name].inertia_matrix, link.inertia_matrix, rtol=0, atol=TOLERANCE, err_msg=name
         )
 
 
 def test_who_says_that_they_are_right_is_believed(tmp_path: Path) -> None:
     wrong = about_joints(nao())
     robot = load_robot(written(tmp_path, wrong | {"inertia_about": "com"}))
-    assert six(inertia_matrix(robot.links["LThigh"])) == wrong["links"]["LThigh"]["inertia_com_kgm2"]
+    assert six(robot.links["LThigh"].inertia_matrix) == wrong["links"]["LThigh"]["inertia_com_kgm2"]
 
 
 def test_the_statement_holds_for_the_links_of_its_own_file_only(tmp_path: Path) -> None:
@@ -73,7 +72,7 @@ def test_the_statement_holds_for_the_links_of_its_own_file_only(tmp_path: Path) 
     raw = {"schema": 1, "name": "mixed", "extends": "nao-v5", "inertia_about": "joint", "links": links}
     mixed, plain = load_robot(written(tmp_path, raw)), load_robot("nao-v5")
     for name, link in plain.links.items():
-        np.testing.assert_allclose(inertia_matrix(mixed.links[name]), inertia_matrix(link), rtol=0, atol=TOLERANCE)
+        np.testing.assert_allclose(mixed.links[name].inertia_matrix, link.inertia_matrix, rtol=0, atol=TOLERANCE)
 
 
 def test_another_statement_is_refused(tmp_path: Path) -> None:

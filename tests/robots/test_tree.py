@@ -11,7 +11,7 @@ from casadi import SX
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import inertia_matrix, point_masses, tree_from, weld
+from nlp_gait.robots.tree import point_masses, tree_from, weld
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from tests.pinocchio_oracle import floating_model, inertia
 
@@ -87,7 +87,7 @@ def test_a_welded_head_is_pinocchios_sum_of_inertias() -> None:
         total += pin.SE3(np.eye(3), offset).act(inertia(ROBOT.links[ROBOT.joint(name).child]))
     assert torso.mass_kg == pytest.approx(total.mass, abs=TOLERANCE)
     np.testing.assert_allclose(torso.com_m, total.lever, rtol=0, atol=TOLERANCE)
-    np.testing.assert_allclose(inertia_matrix(torso), total.inertia, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(torso.inertia_matrix, total.inertia, rtol=0, atol=TOLERANCE)
 
 
 def test_welding_inner_joints_moves_no_mass() -> None:
@@ -106,4 +106,4 @@ def test_point_masses_keep_mass_and_centre_and_lose_inertia() -> None:
     points = point_masses(ROBOT)
     for name, link in ROBOT.links.items():
         assert (points.links[name].mass_kg, points.links[name].com_m) == (link.mass_kg, link.com_m)
-        assert not inertia_matrix(points.links[name]).any()
+        assert not points.links[name].inertia_matrix.any()

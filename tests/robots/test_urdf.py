@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import GaitError, MissingExtraError, RobotDataError
 from nlp_gait.robots import Robot, load_robot, urdf
-from nlp_gait.robots.tree import inertia_matrix
 from nlp_gait.robots.urdf import urdf_record
 from tests.robots.custom import about_joints, as_urdf, humanoid, nao, partner
 from tests.robots.files import written
@@ -33,7 +32,7 @@ def assert_same(one: Robot, other: Robot) -> None:
         assert link.mass_kg == pytest.approx(other.links[name].mass_kg, rel=TOLERANCE)
         np.testing.assert_allclose(link.com_m, other.links[name].com_m, rtol=0, atol=TOLERANCE)
         np.testing.assert_allclose(
-            inertia_matrix(link), inertia_matrix(other.links[name]), rtol=0, atol=TOLERANCE, err_msg=name
+            link.inertia_matrix, other.links[name].inertia_matrix, rtol=0, atol=TOLERANCE, err_msg=name
         )
     for name, joint in one.joints.items():
         twin = other.joints[name]
@@ -100,7 +99,7 @@ def test_links_behind_joints_that_do_not_turn_become_one_with_those_before(tmp_p
     assert head.mass_kg == pytest.approx(before.mass_kg + 0.2)
     assert head.com_m[0] == pytest.approx((before.mass_kg * before.com_m[0] + 0.2 * 0.1) / head.mass_kg)
     between = before.mass_kg * 0.2 / head.mass_kg * ((0.1 - before.com_m[0]) ** 2 + before.com_m[2] ** 2)
-    assert inertia_matrix(head)[1, 1] == pytest.approx(inertia_matrix(before)[1, 1] + between)
+    assert head.inertia_matrix[1, 1] == pytest.approx(before.inertia_matrix[1, 1] + between)
     assert robot.links["l_wrist"].mass_kg == pytest.approx(plain.links["l_wrist"].mass_kg + 0.1)
     assert robot.links["base_link"].com_m == pytest.approx(plain.links["torso"].com_m)
 

@@ -11,7 +11,7 @@ from casadi import SX
 
 from nlp_gait.problem import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import Body, inertia_matrix, tree_from, weld
+from nlp_gait.robots.tree import Body, tree_from, weld
 from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regrouped_inertias
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
@@ -92,7 +92,7 @@ def energy(q: Array, qd: Array) -> float:
         omega = np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
         mass = body.link.mass_kg
         total += 0.5 * mass * cd[:, i] @ cd[:, i] + mass * GRAVITY * c[2, i]
-        total += 0.5 * omega @ inertia_matrix(body.link) @ omega
+        total += 0.5 * omega @ body.link.inertia_matrix @ omega
     return total
 
 
