@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -74,7 +75,7 @@ def simulate(
     walk = None if steps is None else measure_walk(plan, trace, drive, steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
     survival = None
-    data = {"schema": 1, **report.to_json(), **({} if walk is None else {"walk": walk.course()})}
+    data = {"schema": 1, **asdict(report), **({} if walk is None else {"walk": walk.course()})}
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
         write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
@@ -90,7 +91,7 @@ def simulate(
                 else f"the playback is kept in {folder}"
             )
             end_interrupted(f"interrupted in the tests of robustness; {kept}")
-        data["robustness"] = survival.to_json()
+        data["robustness"] = asdict(survival)
         if folder is not None:
             write_json(folder / "report.json", without_nan(data))
     if as_json:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,34 +51,34 @@ def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
     Raises:
         OutputError: the file cannot be written.
     """
-    chosen = np.linspace(0, len(skeleton.t) - 1, poses).round().astype(int)
-    views = ["side"] if skeleton.planar else list(VIEWS)
+    times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
+    with style(), new_file(path) as file:
+        figure = poses_figure(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
+        figure.savefig(file, format="png", dpi=SHEET_DPI)
+
+
+def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str]) -> Figure:
+    """One row for each view, one column for each instant: the sample nearest to it."""
+    chosen = [int(np.abs(skeleton.t - time).argmin()) for time in times_s]
     low, high = skeleton.box()
-    heights = [float((high - low)[VIEWS[view][1]] + 2 * MARGIN) for view in views]
+    widths, heights = ([float((high - low)[VIEWS[view][i]] + 2 * MARGIN) for view in views] for i in (0, 1))
     with style():
-        figure = new_figure(
-            1.6 * poses, 0.7 + sum(0.35 + 1.45 * height / _width(skeleton, views) for height in heights)
-        )
-        axes = figure.subplots(len(views), poses, squeeze=False, sharey="row", height_ratios=heights)
+        rows_in = [0.35 + 1.45 * height / max(widths) for height in heights]
+        figure = new_figure(1.6 * len(chosen), 0.7 + sum(rows_in))
+        axes = figure.subplots(len(views), len(chosen), squeeze=False, sharey="row", height_ratios=heights)
         for row, view in zip(axes, views, strict=True):
             for axis, k in zip(row, chosen, strict=True):
-                _draw_view(axis, skeleton, int(k), view)
+                _draw_view(axis, skeleton, k, view)
                 if axis is not row[0]:
                     axis.set_ylabel("")
         for axis, k in zip(axes[0], chosen, strict=True):
             axis.set_title(f"{skeleton.t[k]:.2f} s")
-        figure.suptitle(f"{skeleton.title}: {_legend(skeleton)}", fontsize=9)
-        with new_file(path) as file:
-            figure.savefig(file, format="png", dpi=SHEET_DPI)
-
-
-def _width(skeleton: Skeleton, views: list[str]) -> float:
-    low, high = skeleton.box()
-    return max(float((high - low)[VIEWS[view][0]] + 2 * MARGIN) for view in views)
+        figure.suptitle(f"{skeleton.title}: {_legend(skeleton, views)}", fontsize=9)
+    return figure
 
 
 def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
-    figure.suptitle(f"{skeleton.title}, {skeleton.t[k]:.2f} s: {_legend(skeleton)}", fontsize=8)
+    figure.suptitle(f"{skeleton.title}, {skeleton.t[k]:.2f} s: {_legend(skeleton, VIEWS)}", fontsize=8)
     if skeleton.planar:
         _draw_view(figure.add_axes((0.1, 0.1, 0.85, 0.8)), skeleton, k, "side")
         return
@@ -135,18 +135,17 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
         axis.add_collection3d(Poly3DCollection([corners], color=SUPPORT, alpha=0.3, lw=0))
     _draw_pose(axis, skeleton, k, (0, 1, 2))
     low, high = skeleton.box()
-    low = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN
-    high = high + MARGIN
+    low, high = np.minimum(low, (np.inf, np.inf, 0.0)) - MARGIN, high + MARGIN
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axis.set_box_aspect(high - low, zoom=1.1)
     axis.view_init(elev=15, azim=-55)
     axis.set(xticklabels=[], yticklabels=[], zticklabels=[])
 
 
-def _legend(skeleton: Skeleton) -> str:
+def _legend(skeleton: Skeleton, views: Collection[str]) -> str:
     marks = [
         "left blue, right orange",
-        "support polygon green" if skeleton.soles else "",
+        "support polygon green" if skeleton.soles and "above" in views else "",
         "ZMP cross" if skeleton.zmp is not None else "",
         "centre of mass dot" if skeleton.com is not None else "",
     ]

@@ -13,7 +13,7 @@ from compare.judge import Evaluation
 from compare.study.task import LABEL
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, refusing, without_nan, write_json
+from nlp_gait.files import read_json, refusing, without_nan
 from nlp_gait.problem import Objective
 from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
@@ -152,10 +152,6 @@ class RunRecord:
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
         return {"schema": SCHEMA, **without_nan(asdict(self))}
-
-    def write(self, path: Path) -> None:
-        """One file, whole or absent."""
-        write_json(path, self.to_json())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import refusing, remove_leftovers, writable_folder
+from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
 
 __all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
 
@@ -88,15 +88,14 @@ def _run_waiting(
     study: Study, records: dict[int, RunRecord], progress: Callable[[Task, RunRecord], None] | None
 ) -> None:
     """Run what is not among the records, by index of the task, and add it."""
-    by_key = {_key(task): index for index, task in enumerate(study.tasks)}
+    by_title = {(task.problem.title, task.title, task.run): index for index, task in enumerate(study.tasks)}
     for polishing in (False, True):
         waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
-        waiting.sort(key=lambda i: _begins(study.tasks[i]))
-        jobs = [
-            (task, records[by_key[_polished(task)]] if polishing else None)
-            for task in (study.tasks[i] for i in waiting)
-        ]
-        for position, record in run_jobs(jobs, study.jobs, study.scheduler, study.run):
+        # Long runs first, so that no worker is left alone with one at the end; and runs of all problems in turn.
+        waiting.sort(key=lambda i: (study.tasks[i].is_search, study.tasks[i].run))
+        tasks = [study.tasks[i] for i in waiting]
+        starts = [records[by_title[t.problem.title, t.polishes, t.run]] if polishing else None for t in tasks]
+        for position, record in run_jobs(list(zip(tasks, starts, strict=True)), study.jobs, study.scheduler, study.run):
             index = waiting[position]
             if study.folder is not None:
                 _keep(record, record_file(study.folder, study.tasks[index]), len(records))
@@ -107,7 +106,7 @@ def _run_waiting(
 
 def _keep(record: RunRecord, path: Path, before: int) -> None:
     try:
-        record.write(path)
+        write_json(path, record.to_json())
     except OutputError as error:
         raise OutputError(
             f"{error}; the {before} runs before it are kept: mend that, and the same call continues"
@@ -178,16 +177,3 @@ def _matching(path: Path, task: Task) -> RunRecord:
             "another folder with --out, or delete it"
         )
     return record
-
-
-def _key(task: Task) -> tuple[str, str, int]:
-    return task.problem.title, task.title, task.run
-
-
-def _polished(task: Task) -> tuple[str, str, int]:
-    return task.problem.title, task.polishes, task.run
-
-
-def _begins(task: Task) -> tuple[int, int]:
-    """Long runs first, so that no worker is left alone with one at the end; and runs of all problems in turn."""
-    return int(task.is_search), task.run

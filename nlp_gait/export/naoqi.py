@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from nlp_gait.export.setpoints import SetPoints
-from nlp_gait.files import write_text
+from nlp_gait.files import write_json
 
 APPROACH_S = 2.0  # to the first pose, from wherever the robot stands: a key needs a time after zero
 # Both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name.
@@ -24,4 +23,4 @@ def naoqi_arguments(points: SetPoints) -> dict[str, Any]:
 
 def write_naoqi(path: Path, points: SetPoints) -> None:
     """Write the arguments to a JSON file; raises OutputError."""
-    write_text(path, json.dumps(naoqi_arguments(points), indent=1) + "\n")
+    write_json(path, naoqi_arguments(points))

@@ -14,7 +14,7 @@ Written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it can stand w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 from nlp_gait.errors import InputError, UnknownNameError, unknown
@@ -48,7 +48,7 @@ def perturbed(robot: Robot, changes: Mapping[str, float]) -> Robot:
     for name, value in changes.items():
         if not math.isfinite(value):
             raise InputError(f"robot {robot.name!r}: {name} must be a finite number, got {value}")
-        robot = _change(name, robot)(robot, value)
+        robot = _changed(robot, name, value)
     return replace(robot, name=perturbed_name(robot.name, changes)) if changes else robot
 
 
@@ -84,22 +84,16 @@ def quantities(robot: Robot) -> tuple[str, ...]:
     return (MASS, *(f"{link}.{MASS}" for link in robot.links), *LENGTHS, *SOLES)
 
 
-def _change(name: str, robot: Robot) -> Callable[[Robot, float], Robot]:
-    if name == MASS:
-        return lambda robot, factor: _with_masses(robot, dict.fromkeys(robot.links, factor))
+def _changed(robot: Robot, name: str, value: float) -> Robot:
     if name in LENGTHS:
-        return lambda robot, metres: _with_length(robot, LENGTHS[name], metres)
+        return _with_length(robot, LENGTHS[name], value)
     if name in SOLES:
-        return lambda robot, metres: _with_soles(robot, SOLES[name], metres)
-    link, dot, quantity = name.rpartition(".")
-    if dot and quantity == MASS and link in robot.links:
-        return lambda robot, factor: _with_masses(robot, {link: factor})
-    raise unknown(f"quantity of robot {robot.name}", name, quantities(robot))
-
-
-def _with_masses(robot: Robot, factors: Mapping[str, float]) -> Robot:
-    links = {name: _heavier(link, factors.get(name, 1.0)) for name, link in robot.links.items()}
-    return replace(robot, links=links)
+        feet = {side: _with_sole(foot, SOLES[name], value) for side, foot in robot.feet.items()}
+        return replace(robot, feet=feet)
+    heavier = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
+    if not heavier:
+        raise unknown(f"quantity of robot {robot.name}", name, quantities(robot))
+    return replace(robot, links={**robot.links, **{link: _heavier(robot.links[link], value) for link in heavier}})
 
 
 def _heavier(link: Link, factor: float) -> Link:
@@ -124,10 +118,6 @@ def _with_length(robot: Robot, joint: str, metres: float) -> Robot:
         x, y, z = (value * (1.0 + metres / length) for value in origin)
         joints[name] = replace(joints[name], origin_m=(x, y, z))
     return replace(robot, joints=joints)
-
-
-def _with_soles(robot: Robot, shares: Mapping[str, int], metres: float) -> Robot:
-    return replace(robot, feet={side: _with_sole(foot, shares, metres) for side, foot in robot.feet.items()})
 
 
 def _with_sole(foot: Foot, shares: Mapping[str, int], metres: float) -> Foot:

@@ -85,7 +85,7 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
         joint = kept.pop(name)
         links[joint.parent] = _welded(links[joint.parent], links.pop(joint.child), joint.origin_m)
         for other in [j for j in kept.values() if j.parent == joint.child]:
-            kept[other.name] = replace(other, parent=joint.parent, origin_m=_plus(joint.origin_m, other.origin_m))
+            kept[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
     return replace(robot, links=links, joints=kept)
 
 
@@ -127,8 +127,9 @@ def _welded(parent: Link, child: Link, origin: Vector) -> Link:
 
 
 def _minus(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+    return plus(a, (-b[0], -b[1], -b[2]))
 
 
-def _plus(a: Vector, b: Vector) -> Vector:
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

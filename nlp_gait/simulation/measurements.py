@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -84,10 +84,6 @@ class Measurements:
     def power_error(self) -> float:
         """Measured total power over the predicted one, minus one."""
         return self.measured.total_W / self.predicted.total_W - 1.0
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers."""
-        return asdict(self)
 
 
 def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:

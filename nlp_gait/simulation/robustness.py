@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive
@@ -36,10 +35,6 @@ class Robustness:
     slope_deg: Mapping[str, float]
     friction: Mapping[float, bool]
     mass_factor: Mapping[float, bool]
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries and numbers."""
-        return asdict(self)
 
 
 def robustness(plan: Plan, drive: Drive | None = None) -> Robustness:

@@ -11,6 +11,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.robot import Vector
+from nlp_gait.robots.tree import plus
 
 SOLES = ("rectangle", "polygon")  # what balance margins are measured to, or the true outline
 
@@ -30,7 +31,7 @@ class Capsule:
 
     def shifted(self, by: Vector) -> Capsule:
         """The same shape elsewhere."""
-        return replace(self, start=_sum(self.start, by), end=_sum(self.end, by))
+        return replace(self, start=plus(self.start, by), end=plus(self.end, by))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,19 +71,14 @@ def link_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] =
     parents = {joint.parent for joint in robot.joints.values()}
     for name, link in robot.links.items():
         if name in soles:
-            shapes[name].append(sole_prism(soles[name], sole))
+            outline, bottom = sole_outline(soles[name], sole), -soles[name].ankle_height_m
+            shapes[name].append(Prism(outline=outline, bottom=bottom, thickness=SOLE_THICKNESS))
         elif name not in parents:  # a hand or a head, about its centre of mass
             radius = TRUNK_RADIUS if np.linalg.norm(link.com_m) > SHORTEST_LIMB + LIMB_RADIUS else LIMB_RADIUS
             shapes[name].append(Capsule(start=link.com_m, end=link.com_m, radius=radius))
     for joint in sorted((robot.joint(name) for name in welded), key=lambda j: -len(robot.path_to_root(j.child))):
         shapes[joint.parent] += [shape.shifted(joint.origin_m) for shape in shapes.pop(joint.child)]
     return shapes
-
-
-def sole_prism(foot: Foot, sole: str) -> Prism:
-    """Sole under the ankle, in the foot link's axes."""
-    outline = sole_outline(foot, sole)
-    return Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS)
 
 
 def sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
@@ -99,7 +95,3 @@ def sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
     if not foot.sole_polygon_m:
         raise InputError(f"foot {foot.link!r} has no sole_polygon_m in the robot's data; use --sole rectangle")
     return foot.sole_polygon_m
-
-
-def _sum(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -36,13 +36,9 @@ class Walk:
     energy_J_per_m: float | None
     measurements: Measurements
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers."""
-        return asdict(self)
-
     def course(self) -> dict[str, Any]:
-        """The same without the measurements."""
-        return {name: value for name, value in self.to_json().items() if name != "measurements"}
+        """As plain data, without the measurements."""
+        return {name: value for name, value in asdict(self).items() if name != "measurements"}
 
 
 def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
@@ -50,28 +46,17 @@ def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
     measurements = measure(plan, trace, drive)
     feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
     planned = float(feet[-1, 0] - feet[0, 0]) / 2
-    if trace.fell_at_s is not None:
-        done = min(steps, math.floor(steps * trace.fell_at_s / plan.duration_s))
-        return Walk(
-            steps=steps,
-            steps_done=done,
-            planned_m=planned,
-            walked_m=None,
-            drift_m=None,
-            heading_deg=None,
-            energy_J_per_m=None,
-            measurements=measurements,
-        )
     middle = trace.feet.mean(axis=1)
     walked, drift = (float(value) for value in (middle[-1] - middle[0])[:2])
     energy = measurements.measured.total_W * plan.duration_s
+    fell = trace.fell_at_s
     return Walk(
         steps=steps,
-        steps_done=steps,
+        steps_done=steps if fell is None else min(steps, math.floor(steps * fell / plan.duration_s)),
         planned_m=planned,
-        walked_m=walked,
-        drift_m=drift,
-        heading_deg=math.degrees(float(trace.heading[-1])),
-        energy_J_per_m=energy / walked if walked > 0.0 else None,
+        walked_m=walked if fell is None else None,
+        drift_m=drift if fell is None else None,
+        heading_deg=math.degrees(float(trace.heading[-1])) if fell is None else None,
+        energy_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
         measurements=measurements,
     )

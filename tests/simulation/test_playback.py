@@ -85,7 +85,7 @@ def test_an_infeasible_gait_falls_and_is_reported(gait):
     m = measure(plan, trace, Drive())
     assert m.fallen and 0.5 < m.fell_at_s < 5.0
     assert m.largest_tilt_deg > 45.0
-    assert m.to_json()["fallen"] is True
+    assert dataclasses.asdict(m)["fallen"] is True
 
 
 def test_twice_the_same_numbers(played):

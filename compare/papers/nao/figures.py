@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.drawing.animation import poses_figure
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
 from compare.drawing.skeletons import skeleton_of
-from compare.drawing.stick_figure import stick_figure
 from compare.papers.nao.findings import NAMES, Findings, PhaseFindings, Points
 from compare.papers.nao.paper import SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.runs import ALGORITHMS
@@ -36,7 +36,7 @@ def all_figures(findings: Findings) -> Iterator[tuple[str, Figure]]:
         yield f"fig{phase.paper.convergence_figure:02d}", convergence_figure(phase)
         for number, positions in phase.paper.scatter_figures.items():
             yield f"fig{number}", scatter_figure(phase, positions)
-        yield f"fig20{letter}", poses_figure(phase)
+        yield f"fig20{letter}", gait_figure(phase)
     yield "swing-height", swing_figure(findings)
 
 
@@ -145,13 +145,13 @@ def _relative(values: list[float]) -> Array:
     return np.array(values) / values[0]
 
 
-def poses_figure(phase: PhaseFindings) -> Figure:
-    """Fig. 20: IPOPT's gait from the front and from the side."""
+def gait_figure(phase: PhaseFindings) -> Figure:
+    """Fig. 20: IPOPT's gait from behind and from the side."""
     x = np.array(point(phase.optimum))
     duration = float(x[phase.paper.duration])
     skeleton = skeleton_of(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)
     count = int(duration / POSES_EVERY_S[phase.problem.name] + 1e-6) + 1
-    return stick_figure(skeleton, [k * POSES_EVERY_S[phase.problem.name] for k in range(count)])
+    return poses_figure(skeleton, [k * POSES_EVERY_S[phase.problem.name] for k in range(count)], ("front", "side"))
 
 
 def _power_scale(axes: Axes) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
@@ -47,7 +47,7 @@ class Gait:
             "status": self.found.status,
             "x": dict(self.found.x),
             "indexes": dict(self.indexes),
-            "walk": None if self.walk is None else self.walk.to_json(),
+            "walk": None if self.walk is None else asdict(self.walk),
         }
 
 

@@ -200,7 +200,7 @@ def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
     for r in study():
         path = tmp_path / RECORDS / r.problem / f"{r.algorithm}-{r.run:04d}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
-        r.write(path)
+        write_json(path, r.to_json())
     rebuild_report(tmp_path)
     first, again = (Tables((f / "report.html").read_text(encoding="utf-8")).rows for f in (folder, tmp_path))
     assert again == first[: first.index(["what", "value"])]
