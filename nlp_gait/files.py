@@ -74,17 +74,7 @@ def read_text(
 
 
 def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:
-    """Content of a JSON file, see ``check_plain``; an object that repeats a key is refused too.
-
-    Args:
-        path: of the file.
-        what: kind of file, for messages.
-        error: class to raise.
-        remedy: what to do about it, appended to the message.
-
-    Raises:
-        GaitError: of that class.
-    """
+    """Content of a JSON file, see ``check_plain``; a repeated key is refused too; arguments and errors as ``read_bytes``."""
     text = read_text(path, what, error=error, remedy=remedy)
     with refusing(f"{what} {str(path)!r} is not valid JSON", error, remedy):
         data = json.loads(text, object_pairs_hook=_without_twins)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -124,14 +123,3 @@ def percent(share: float | None) -> str:
 def count(number: float) -> str:
     """Number of evaluations; a dash if it is infinite."""
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
-
-
-def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown table; the first column is left-aligned, the others right. Text in cells is taken literally."""
-    rule = [":--", *["--:"] * (len(header) - 1)]
-    literal = [[_escaped(cell) for cell in row] for row in rows]
-    return "\n".join("| " + " | ".join(row) + " |" for row in (header, rule, *literal)) + "\n"
-
-
-def _escaped(cell: str) -> str:
-    return cell.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")

@@ -34,7 +34,7 @@ def evaluate(
     if signals is not None:
         if loaded.motion is None:
             fail(f"problem {problem.name!r} has no signals")
-        from nlp_gait.export.signals import write_npz
+        from nlp_gait.export.tables import write_npz
 
         target = output_file(signals)
         write_npz(target, loaded.signals(point))

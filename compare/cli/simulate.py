@@ -45,7 +45,7 @@ def simulate(
     Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
     from compare.drawing.playback_figure import plot_playback
-    from nlp_gait.export.signals import write_npz
+    from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.camera import filmed, shown

@@ -29,7 +29,7 @@ def convergence_figure(comparison: Comparison) -> Figure:
     A line begins where half of the runs are feasible, a band where all are. A gradient method is known at its ends only:
     its runs are points, at what all their calls cost.
     """
-    return cost_figure(comparison, _draw, "gap to the best known [%]", both=True)
+    return cost_figure(comparison, _draw_gaps, "gap to the best known [%]", both=True)
 
 
 def cost_figure(comparison: Comparison, draw: Draw, words: str, both: bool = False) -> Figure:
@@ -47,14 +47,10 @@ def cost_figure(comparison: Comparison, draw: Draw, words: str, both: bool = Fal
     return figure
 
 
-def _draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
-    if all(len(curve.gap) <= 1 for curve in solver.curves):
-        _draw_ends(axes, solver, look, axis)
-    else:
+def _draw_gaps(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
+    if any(len(curve.gap) > 1 for curve in solver.curves):
         _draw_band(axes, solver, look, axis)
-
-
-def _draw_ends(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
+        return
     ends = [(c.total(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
     label = f"{solver.name}, {len(ends)} of {len(solver.curves)} runs"
     cost, gap = np.array(ends).T if ends else (np.empty(0), np.empty(0))

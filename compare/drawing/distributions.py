@@ -43,21 +43,13 @@ def final_gap_figure(comparison: Comparison) -> Figure:
             gaps = np.array([comparison.gap(cost) for cost in solver.costs])
             known = np.isfinite(gaps)
             shown = shown_percent(gaps[known])
-            axes.plot(
-                shown, np.full(shown.size, row), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8
-            )
+            axes.plot(shown, [row] * len(shown), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8)
             if known.any():
                 axes.plot(np.median(shown), row, "|", color=look.colour, markersize=16, markeredgewidth=2)
             missing = int((~known).sum())
             if missing:
-                axes.annotate(
-                    f"{missing} infeasible",
-                    (1.0, row),
-                    xycoords=("axes fraction", "data"),
-                    ha="right",
-                    va="center",
-                    fontsize=8,
-                )
+                beside = axes.get_yaxis_transform()
+                axes.text(1.0, row, f"{missing} infeasible", transform=beside, ha="right", va="center", fontsize=8)
         logarithmic(axes)
         axes.set_xlabel("gap to the best known at the end [%], bars: medians")
         axes.set_yticks(range(len(names)), names)

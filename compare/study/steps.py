@@ -12,9 +12,8 @@ from types import ModuleType
 from typing import Any
 
 from compare.study.progress import Progress
-from compare.study.workers import default_jobs
+from compare.study.workers import default_jobs, side_by_side
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.interrupts import children_ignore_interrupts
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
 from nlp_gait.problem import GaitProblem
@@ -109,19 +108,10 @@ def _computed(steps: Sequence[tuple[int, Step]], workers: int, progress: Progres
             progress(step.name)
             yield number, step.compute()
         return
-    from joblib import Parallel, delayed  # costs 0.1 s to import
-
-    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-    with children_ignore_interrupts():
-        results = parallel(delayed(_numbered)(number, step) for number, step in steps)
-    names = dict(steps)
-    for number, result in results:
-        progress(names[number].name)
+    names = {number: step.name for number, step in steps}
+    for number, result in side_by_side({number: step.compute for number, step in steps}, workers):
+        progress(names[number])
         yield number, result
-
-
-def _numbered(number: int, step: Step) -> tuple[int, Any]:
-    return number, step.compute()
 
 
 def _kept(path: Path, digest: str) -> dict[str, Any] | None:

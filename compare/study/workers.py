@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
+from functools import partial
+from typing import TypeVar
 
 from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
@@ -12,6 +14,8 @@ from compare.study.task import Task
 from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import refusing
+
+T = TypeVar("T")
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
@@ -57,7 +61,8 @@ def run_jobs(
             stack.enter_context(_dask(scheduler))
         while waiting:
             try:
-                for position, record in _parallel(list(waiting.items()), None if scheduler else workers, run):
+                calls = {position: partial(attempt, *job, run) for position, job in waiting.items()}
+                for position, record in side_by_side(calls, -1 if scheduler else workers):
                     del waiting[position]
                     deaths = 0
                     yield position, record
@@ -70,17 +75,18 @@ def run_jobs(
                     ) from error
 
 
-def _parallel(jobs: list[tuple[int, Job]], workers: int | None, run: Run) -> Iterator[tuple[int, RunRecord]]:
+def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator[tuple[int, T]]:
+    """Number and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are."""
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
-    parallel = Parallel(n_jobs=workers if workers is not None else -1, return_as="generator_unordered", batch_size=1)
+    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
     with children_ignore_interrupts():
-        results = parallel(delayed(_numbered)(position, job, run) for position, job in jobs)
+        results = parallel(delayed(_numbered)(number, call) for number, call in calls.items())
     yield from results
 
 
-def _numbered(position: int, job: Job, run: Run) -> tuple[int, RunRecord]:
-    return position, attempt(*job, run)
+def _numbered(number: int, call: Callable[[], T]) -> tuple[int, T]:
+    return number, call()
 
 
 def _dask(address: str) -> AbstractContextManager[object]:

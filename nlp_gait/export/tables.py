@@ -1,11 +1,13 @@
-"""Time histories as CSV and JSON, each column with its unit."""
+"""Time histories as CSV and JSON, each column with its unit, and as a NumPy archive."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
-from nlp_gait.files import csv_text, write_text
+import numpy as np
+
+from nlp_gait.files import csv_text, new_file, write_text
 from nlp_gait.problem import Result, Signals
 from nlp_gait.problem.result import SCHEMA
 
@@ -29,3 +31,9 @@ def write_json(path: Path, result: Result, signals: Signals) -> None:
         "signals": {name: {"unit": unit, "values": values.tolist()} for name, unit, values in signals.named_columns()},
     }
     write_text(path, json.dumps(data, indent=1) + "\n")
+
+
+def write_npz(path: Path, signals: Signals) -> None:
+    """All arrays and the joint names (columns of q, qd, qdd and tau) in one ``.npz`` file; raises OutputError."""
+    with new_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)

@@ -185,7 +185,7 @@ def _robot(file: RobotFile, source: str) -> Robot:
         root=file.root,
         links=links,
         joints=_made(_joint, file.joints),
-        feet=_made(_foot, file.feet),
+        feet=_made(lambda side, record: decoded(Foot, record.raw, f"feet.{side}"), file.feet),
     )
 
 
@@ -212,7 +212,3 @@ def _joint(name: str, record: _Record) -> Joint:
     completed = {"planning_limits_rad": raw.get("limits_rad"), **raw, "axis": [a / length for a in axis]}
     joint = decoded(Joint, completed, where, given={"name": name})
     return reversed_joint(joint) if record.reversed else joint
-
-
-def _foot(side: str, record: _Record) -> Foot:
-    return decoded(Foot, record.raw, f"feet.{side}")

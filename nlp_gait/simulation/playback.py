@@ -113,22 +113,11 @@ def play(
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
             break
-    columns = [np.array(column, dtype=float) for column in zip(*rows, strict=True)]
+    columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    measured = dict(zip(("q", "qd", "torque", *COLUMNS), columns, strict=True))
+    measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows hold its cosine
     n = len(rows)
-    return Trace(
-        t=times[:n],
-        set_points=commands[:n],
-        q=columns[0],
-        qd=columns[1],
-        torque=columns[2],
-        torso=columns[3],
-        tilt=np.arccos(np.clip(columns[4], -1.0, 1.0)),
-        heading=columns[5],
-        feet=columns[6],
-        loads=columns[7],
-        pressure=columns[8],
-        fell_at_s=fell_at_s,
-    )
+    return Trace(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
 
 
 def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:

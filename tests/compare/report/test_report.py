@@ -16,6 +16,7 @@ from compare.report import rebuild_report, write_report
 from compare.study.manifest import Manifest, Session
 from compare.study.study import RECORDS
 from nlp_gait.errors import InputError
+from nlp_gait.files import write_json
 from tests.compare.records import record, study
 
 SESSION = Session(
