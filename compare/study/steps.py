@@ -68,26 +68,20 @@ class Steps:
         """
         results: dict[int, Any] = {}
         for k, step in enumerate(steps):
-            if (kept := _kept(self._path(step), self._digest_of(step))) is not None:
+            if (kept := _kept(self._path(step), _digest(step.inputs, self._code))) is not None:
                 self._progress(f"{step.name}: kept from an earlier run")
                 results[k] = kept["result"]
-        waiting = [k for k in range(len(steps)) if k not in results]
-        workers = min(jobs or default_jobs(), len(waiting))
-        for k, computed in _computed([(k, steps[k]) for k in waiting], workers, self._progress):
+        waiting = {k: step for k, step in enumerate(steps) if k not in results}
+        for k, computed in _computed(waiting, min(jobs or default_jobs(), len(waiting)), self._progress):
             # As JSON gives it back, now and whenever it is read again.
-            results[k] = json.loads(json.dumps(computed, allow_nan=False))
-            self._keep(steps[k], results[k])
+            step, result = steps[k], json.loads(json.dumps(computed, allow_nan=False))
+            digests = {"sha256": _digest(step.inputs, self._code), "result_sha256": _digest(result)}
+            write_json(self._path(step), {"inputs": step.inputs, "result": result, **digests})
+            results[k] = result
         return [results[k] for k in range(len(steps))]
-
-    def _keep(self, step: Step, result: Any) -> None:
-        digests = {"sha256": self._digest_of(step), "result_sha256": _digest(result)}
-        write_json(self._path(step), {"inputs": step.inputs, "result": result, **digests})
 
     def _path(self, step: Step) -> Path:
         return self._folder / f"{step.name}.json"
-
-    def _digest_of(self, step: Step) -> str:
-        return hashlib.sha256((json.dumps(step.inputs, sort_keys=True) + self._code).encode()).hexdigest()
 
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
@@ -101,16 +95,15 @@ def fingerprint(problem: GaitProblem) -> dict[str, Any]:
     }
 
 
-def _computed(steps: Sequence[tuple[int, Step]], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
+def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
     """Number and result of each step, as it finishes."""
     if workers <= 1:
-        for number, step in steps:
+        for number, step in steps.items():
             progress(step.name)
             yield number, step.compute()
         return
-    names = {number: step.name for number, step in steps}
-    for number, result in side_by_side({number: step.compute for number, step in steps}, workers):
-        progress(names[number])
+    for number, result in side_by_side({number: step.compute for number, step in steps.items()}, workers):
+        progress(steps[number].name)
         yield number, result
 
 
@@ -127,6 +120,6 @@ def _kept(path: Path, digest: str) -> dict[str, Any] | None:
     return content if content.get("result_sha256") == _digest(content["result"]) else None
 
 
-def _digest(result: Any) -> str:
-    """Checksum of a result: a file that was changed by hand or by a broken disk is made again."""
-    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
+def _digest(data: Any, code: str = "") -> str:
+    """Checksum of inputs with the code that takes them, or of a result: a file that was changed or broke is made again."""
+    return hashlib.sha256((json.dumps(data, sort_keys=True) + code).encode()).hexdigest()
