@@ -12,7 +12,7 @@ import nlp_gait
 from benchmarks.rows import Array
 from nlp_gait.problems.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body, inertia_matrix, tree_from
+from nlp_gait.robots.tree import Body, tree_from
 
 # Gupta, Pratihar, Deb (2023), section 4.1 and Table 3 [m, rad].
 SUPPORT_XY, SWING_X, SWING_Y = (0.06, 0.05), (0.0, 0.12), -0.05
@@ -40,7 +40,7 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, list[int]]:
 
 
 def _inertia(body: Body) -> pin.Inertia:
-    return pin.Inertia(body.link.mass_kg, np.array(body.com_offset_m), inertia_matrix(body.link))
+    return pin.Inertia(body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix)
 
 
 class ByHand:

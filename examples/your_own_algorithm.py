@@ -6,7 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.table import HEADER, cells, markdown, summarise
+from compare.analysis.table import HEADER, cells, summarise
+from compare.report.document import Document, text_table
+from compare.report.writing import markdown_page
 from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
@@ -56,4 +58,5 @@ tasks = tuple(
     for run in range(runs)
 )
 (comparison,) = compare_problems(run_study(Study(tasks=tasks)))
-print(markdown(HEADER, [cells(summary, comparison) for summary in summarise(comparison)]))
+table = text_table(HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
+print(markdown_page(Document(title="Shrinking boxes", parts=[table])))
