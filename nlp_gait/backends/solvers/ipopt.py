@@ -14,7 +14,12 @@ import numpy as np
 
 from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
-from nlp_gait.backends.solvers.derivatives import WORTHWHILE_SOLVES, compiled_nlp, one_direction_at_a_time
+from nlp_gait.backends.solvers.derivatives import (
+    WORTHWHILE_SOLVES,
+    compiled_nlp,
+    derivatives_of,
+    one_direction_at_a_time,
+)
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
@@ -152,12 +157,9 @@ class Ipopt(Solver):
             nlp, ready = compiled_nlp(self._cold, model.nlp, optimise=one_by_one)
             options |= ready
             self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
-        derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
-        if settings.hessian == "exact":
-            derivatives["hess_lag"] = "nlp_hess_l"
         warm_options: dict[str, Any] = {
             **options,
-            **{option: self._cold.get_function(name) for option, name in derivatives.items()},
+            **derivatives_of(self._cold),
             "ipopt.mu_strategy": "monotone",
             "ipopt.mu_init": WARM_BARRIER,
             "ipopt.warm_start_init_point": "yes",
