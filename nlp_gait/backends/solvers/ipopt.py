@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.interrupts import deferred_interrupts, never
-from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.nlp import WIDTHS, nlp_model
 from nlp_gait.backends.solvers.derivatives import (
     WORTHWHILE_SOLVES,
     compiled_nlp,
@@ -99,12 +99,8 @@ class IpoptSettings(Solver):
         worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
         compiled = worthwhile if self.compiled is None else self.compiled
         chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
-
-        def make() -> Ipopt:
-            return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
-
         try:
-            return problem.built(f"ipopt {chosen}", make)
+            return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
                 raise
@@ -132,7 +128,8 @@ class Ipopt(Solver):
 
     name: ClassVar[str] = IpoptSettings.name
 
-    def __init__(self, model: NlpModel, settings: IpoptSettings, *, long_derivatives: bool = False) -> None:
+    def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
+        self.model = model = nlp_model(problem)
         started = time.perf_counter()
         self.linear_solver = linear_solver(settings.linear_solver)
         self._time_limit_s = settings.time_limit_s
@@ -148,9 +145,8 @@ class Ipopt(Solver):
             "ipopt.hessian_approximation": settings.hessian,
             **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
         }
-        self.model = model
         self.compiled = bool(settings.compiled)
-        one_by_one = self.compiled and long_derivatives
+        one_by_one = self.compiled and problem.long_derivatives
         with one_direction_at_a_time() if one_by_one else nullcontext():
             nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
         if self.compiled:
