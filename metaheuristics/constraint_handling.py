@@ -107,11 +107,7 @@ class ConstraintHandling(Protocol):
         """
 
 
-def _violation_first(f: Array, violation: Array) -> tuple[Array, Array]:
-    return violation, f
-
-
-FEASIBILITY = Rule(keys=_violation_first)
+FEASIBILITY = Rule(keys=lambda f, violation: (violation, f))
 """Feasible points by objective, before infeasible ones by violation: also how every run picks its reported best."""
 
 
@@ -152,10 +148,7 @@ class StaticPenalty:
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
         """Give the penalty rule, the same at any time; see `ConstraintHandling.rule`."""
-        return Rule(keys=self._keys)
-
-    def _keys(self, f: Array, violation: Array) -> tuple[Array, Array]:
-        return np.zeros_like(f), f + self.weight * violation
+        return Rule(keys=lambda f, violation: (np.zeros_like(f), f + self.weight * violation))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -191,11 +184,7 @@ class EpsilonLevel:
     def rule(self, progress: float, initial_violation: Array) -> Rule:
         """Give the rule of the epsilon in force; see `ConstraintHandling.rule`."""
         epsilon = self.epsilon(progress, initial_violation)
-
-        def keys(f: Array, violation: Array) -> tuple[Array, Array]:
-            return np.where(violation <= epsilon, 0.0, violation), f
-
-        return Rule(keys=keys)
+        return Rule(keys=lambda f, violation: (np.where(violation <= epsilon, 0.0, violation), f))
 
     def epsilon(self, progress: float, initial_violation: Array) -> float:
         """Give the violation that counts as none.

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling, Deb
 from metaheuristics.evaluation import Evaluator, Observer
-from metaheuristics.interface import Algorithm, BatchObjective, Start
-from metaheuristics.preparation import check_limits, checked_bounds, checked_seed, child, entropy, starting_points
+from metaheuristics.interface import Algorithm, BatchObjective
+from metaheuristics.preparation import check_limits, checked_seed, entropy, prepared
 from metaheuristics.result import Interrupted, Result
 
 _DEB = Deb()
@@ -55,16 +55,9 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
-    lower, upper = checked_bounds(objective)
     check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
     sequence = checked_seed(seed)
-    start = Start(
-        lower=lower,
-        upper=upper,
-        initial=starting_points(lower, upper, algorithm.population, initial, child(sequence, 0)),
-        evaluations=evaluations,
-        rng=np.random.default_rng(child(sequence, 1)),
-    )
+    start = prepared(objective, algorithm.population, evaluations, sequence, initial)
     evaluate = Evaluator(objective, observe)
     search = algorithm.start(start)
     initial_violation: Array | None = None

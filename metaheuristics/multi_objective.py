@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from importlib import import_module
-from importlib.util import find_spec
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from metaheuristics.adapters.pymoo import PymooSettings
 from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Bounded
-from metaheuristics.preparation import checked_bounds, checked_seed, child, starting_points
-from metaheuristics.settings import bad_setting, check_count
+from metaheuristics.interface import Bounded, Start
+from metaheuristics.preparation import checked_seed, completed, prepared
 
 MODULES: Mapping[str, str] = MappingProxyType({"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"})
 
@@ -32,35 +30,16 @@ class ManyObjectives(Bounded, Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class MultiObjective:
-    """An algorithm of pymoo with its own defaults, begun from uniform starting points.
-
-    Attributes:
-        algorithm: ``"NSGA2"`` or ``"CMOPSO"``.
-        population: points in a generation; 100 is pymoo's own choice.
-        settings: further arguments of pymoo's class.
-
-    Raises:
-        SearchError: unknown algorithm, a setting is not allowed, or pymoo is not installed.
+class MultiObjective(PymooSettings):
+    """An algorithm of pymoo for several objectives, ``"NSGA2"`` or ``"CMOPSO"``; a population of 100 is pymoo's own choice.
 
     Source:
-        Blank, Deb (2020), pymoo: Multi-objective optimization in Python; Deb et al. (2002), NSGA-II; Zhang et al. (2018),
-        A competitive mechanism based multi-objective particle swarm optimizer with fast convergence.
+        Deb et al. (2002), NSGA-II; Zhang et al. (2018), A competitive mechanism based multi-objective particle swarm
+        optimizer with fast convergence.
     """
 
-    algorithm: str
     population: int = 100
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.algorithm not in MODULES:
-            raise bad_setting(self, "algorithm", f"one of {', '.join(MODULES)}")
-        check_count(self, "population", at_least=5)
-        if find_spec("pymoo") is None:
-            raise SearchError(
-                f"algorithm {self.algorithm!r} needs the package pymoo, which is not installed: "
-                "pip install 'nlp-gait[algorithms]'"
-            )
+    modules: ClassVar[Mapping[str, str]] = MODULES
 
     def check_budgets(self, evaluations: Sequence[int]) -> None:
         """Refuse budgets that this algorithm cannot be looked at after.
@@ -115,37 +94,21 @@ def minimize_many(
     """
     algorithm.check_budgets(evaluations)
     budgets = list(evaluations)
-    from pymoo.core.problem import Problem
-    from pymoo.core.termination import NoTermination
-
-    lower, upper = checked_bounds(objectives)
-    sequence = checked_seed(seed)
-    free = np.flatnonzero(upper > lower)
-    problem = Problem(n_var=free.size, n_obj=objectives.count, n_ieq_constr=1, xl=lower[free], xu=upper[free])
-    initial = starting_points(lower, upper, algorithm.population, None, child(sequence, 0))[:, free]
-    factory = getattr(import_module(f"pymoo.algorithms.{MODULES[algorithm.algorithm]}"), algorithm.algorithm)
-    search = factory(pop_size=algorithm.population, sampling=initial, **algorithm.settings)
-    state = int(np.random.default_rng(child(sequence, 1)).integers(2**31))
-    search.setup(problem, termination=NoTermination(), seed=state)
+    start = prepared(objectives, algorithm.population, budgets[-1], checked_seed(seed))
+    search = algorithm.begun(start, objectives.count)
     if algorithm.algorithm == "CMOPSO":
         _seed_elites(search)
-
-    def whole(X: Array) -> Array:
-        points = np.tile(lower, (len(X), 1))
-        points[:, free] = X
-        clipped: Array = np.clip(points, lower, upper)
-        return clipped
 
     snapshots: list[Snapshot] = []
     used = 0
     while True:
         infills = search.ask()
         while budgets and used + len(infills) > budgets[0]:
-            snapshots.append(_snapshot(search, whole, used))
+            snapshots.append(_snapshot(search, start, used))
             budgets.pop(0)
         if not budgets:
             return tuple(snapshots)
-        F, violation = objectives(whole(infills.get("X")))
+        F, violation = objectives(completed(infills.get("X"), start.lower, start.upper))
         if not np.all(np.isfinite(F)):
             raise SearchError("an objective is not finite; give a large finite number where it has no value")
         # A violation that is not finite counts as the worst.
@@ -167,11 +130,11 @@ def _seed_elites(search: Any) -> None:
     search.elites.truncation = truncated
 
 
-def _snapshot(search: Any, whole: Callable[[Array], Array], used: int) -> Snapshot:
+def _snapshot(search: Any, start: Start, used: int) -> Snapshot:
     feasible = search.opt[search.opt.get("FEAS")[:, 0]]
     problem = search.problem
     return Snapshot(
         evaluations=used,
-        X=whole(feasible.get("X").astype(float).reshape(len(feasible), problem.n_var)),
+        X=completed(feasible.get("X").astype(float).reshape(len(feasible), problem.n_var), start.lower, start.upper),
         F=feasible.get("F").astype(float).reshape(len(feasible), problem.n_obj),
     )

@@ -10,7 +10,25 @@ from numpy.typing import ArrayLike
 
 from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Bounded
+from metaheuristics.interface import Algorithm, Bounded, Start
+
+
+def prepared(
+    objective: Bounded,
+    population: int,
+    evaluations: int,
+    seed: np.random.SeedSequence,
+    initial: ArrayLike | None = None,
+) -> Start:
+    """All that an algorithm is given; SearchError where the bounds, or given starting points (R, n), are not allowed."""
+    lower, upper = checked_bounds(objective)
+    return Start(
+        lower=lower,
+        upper=upper,
+        initial=starting_points(lower, upper, population, initial, child(seed, 0)),
+        evaluations=evaluations,
+        rng=np.random.default_rng(child(seed, 1)),
+    )
 
 
 def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
@@ -41,6 +59,13 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
     lower.setflags(write=False)
     upper.setflags(write=False)
     return lower, upper
+
+
+def completed(free: Array, lower: Array, upper: Array) -> Array:
+    """Points (P, n) within the bounds (n,), from values (P, k) of the variables that are free: their bounds differ."""
+    points = np.tile(lower, (len(free), 1))
+    points[:, upper > lower] = free
+    return np.clip(points, lower, upper)
 
 
 def check_limits(

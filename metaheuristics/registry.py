@@ -6,7 +6,6 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -20,6 +19,7 @@ from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm
+from metaheuristics.settings import check_installed
 
 T = TypeVar("T")
 
@@ -35,8 +35,6 @@ ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
     {"cma": CmaEs} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
 )
 """Those of other packages, which `pip install 'nlp-gait[algorithms]'` installs."""
-
-PACKAGES: Mapping[str, str] = MappingProxyType({"cma": "cma", "pymoo": "pymoo"})
 
 HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
     {"deb": Deb, "penalty": StaticPenalty, "epsilon": EpsilonLevel}
@@ -57,13 +55,9 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
         SearchError: Unknown name or setting (the nearest known ones are suggested), a value that is not allowed, or the
             package that it comes from is not installed.
     """
-    factories = {**ALGORITHMS, **ADAPTERS}
-    package = PACKAGES.get(name.partition(":")[0])
-    if name in ADAPTERS and package is not None and find_spec(package) is None:
-        raise SearchError(
-            f"algorithm {name!r} needs the package {package}, which is not installed: pip install 'nlp-gait[algorithms]'"
-        )
-    return _made("algorithm", name, factories, settings)
+    if name in ADAPTERS:
+        check_installed(name, name.partition(":")[0])
+    return _made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
 
 def handling(name: str, /, **settings: object) -> ConstraintHandling:

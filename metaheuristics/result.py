@@ -73,11 +73,6 @@ class Result:
         """Whether the best point satisfies all constraints."""
         return self.violation == 0.0
 
-    @property
-    def overhead_s(self) -> float:
-        """Time spent outside the objective [s]: the algorithm, the loop and the observer."""
-        return self.time_s - self.objective_time_s
-
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a run, with what was found until then.

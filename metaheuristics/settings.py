@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import MISSING, fields
+from importlib.util import find_spec
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +66,15 @@ def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_mos
     if not whole or value < at_least or (at_most is not None and value > at_most):
         upper = "" if at_most is None else f" and <= {at_most}"
         raise bad_setting(settings, name, f"a whole number >= {at_least}{upper}")
+
+
+def check_installed(algorithm: str, package: str) -> None:
+    """Raise SearchError unless the package that an algorithm comes from is installed."""
+    if find_spec(package) is None:
+        raise SearchError(
+            f"algorithm {algorithm!r} needs the package {package}, which is not installed: "
+            "pip install 'nlp-gait[algorithms]'"
+        )
 
 
 def bad_setting(settings: DataclassInstance, name: str, allowed: str) -> SearchError:

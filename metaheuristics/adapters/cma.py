@@ -10,6 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.preparation import completed
 from metaheuristics.settings import check_count, check_number
 
 
@@ -106,7 +107,5 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
     def _points(self, unit: Array) -> Array:
         """Points (P, n) of positions in the unit cube."""
         lower, upper = self._start.lower, self._start.upper
-        X = np.tile(lower, (len(unit), 1))
-        free = self._free
-        X[:, free] = lower[free] + unit[:, : free.size] * (upper[free] - lower[free])
-        return np.clip(X, lower, upper)
+        low, high = lower[self._free], upper[self._free]
+        return completed(low + unit[:, : low.size] * (high - low), lower, upper)

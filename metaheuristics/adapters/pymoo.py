@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import bad_setting, check_count
+from metaheuristics.preparation import completed
+from metaheuristics.settings import bad_setting, check_count, check_installed
 
 MODULES: Mapping[str, str] = {
     "DE": "soo.nonconvex.de",
@@ -32,19 +33,17 @@ MODULES: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Pymoo:
-    """An algorithm of pymoo with its own defaults, begun from the shared starting points.
-
-    pymoo prefers feasible points by itself, as Deb's rules do. It is given the objective and the violation as the
-    constraint rule in force sees them, for its whole population anew in each generation.
+class PymooSettings:
+    """An algorithm of pymoo with its own defaults, begun from the starting points.
 
     Attributes:
-        algorithm: Class name in pymoo, for example "GA"; many-objective ones get one objective.
+        algorithm: Class name in pymoo, for example "GA".
         population: Size of the population (pop_size).
         settings: Further arguments of the class.
+        modules: Where pymoo has the classes that are allowed.
 
     Raises:
-        SearchError: Unknown algorithm, or a setting is not allowed.
+        SearchError: Unknown algorithm, a setting is not allowed, or pymoo is not installed.
 
     Source:
         Blank, Deb (2020), pymoo: Multi-objective optimization in Python.
@@ -53,11 +52,40 @@ class Pymoo:
     algorithm: str
     population: int = 50
     settings: Mapping[str, Any] = field(default_factory=dict)
+    modules: ClassVar[Mapping[str, str]]
 
     def __post_init__(self) -> None:
-        if self.algorithm not in MODULES:
-            raise bad_setting(self, "algorithm", f"one of {', '.join(MODULES)}")
+        if self.algorithm not in self.modules:
+            raise bad_setting(self, "algorithm", f"one of {', '.join(self.modules)}")
         check_count(self, "population", at_least=5)
+        check_installed(self.algorithm, "pymoo")
+
+    def begun(self, start: Start, objectives: int = 1) -> Any:
+        """Begin pymoo's own search of the variables that are free; raises SearchError if it does not take the settings."""
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
+        free = start.upper > start.lower
+        lower, upper = start.lower[free], start.upper[free]
+        problem = Problem(n_var=len(lower), n_obj=objectives, n_ieq_constr=1, xl=lower, xu=upper)
+        factory = getattr(import_module(f"pymoo.algorithms.{self.modules[self.algorithm]}"), self.algorithm)
+        try:
+            search = factory(pop_size=self.population, sampling=start.initial[:, free], **self.settings)
+        except TypeError as error:
+            raise SearchError(f"pymoo:{self.algorithm} does not take these settings: {error}") from error
+        search.setup(problem, termination=NoTermination(), seed=int(start.rng.integers(2**31)))
+        return search
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Pymoo(PymooSettings):
+    """An algorithm of pymoo for one objective; many-objective ones get one.
+
+    pymoo prefers feasible points by itself, as Deb's rules do. It is given the objective and the violation as the
+    constraint rule in force sees them, for its whole population anew in each generation.
+    """
+
+    modules: ClassVar[Mapping[str, str]] = MODULES
 
     @property
     def name(self) -> str:
@@ -74,22 +102,10 @@ class PymooSearch(PopulationSearch[Pymoo]):
 
     def __init__(self, settings: Pymoo, start: Start) -> None:
         """Ask for the starting points first."""
-        from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
-
         super().__init__(settings, start)
-        self._free = np.flatnonzero(start.upper > start.lower)
         self._algorithm: Any = None
-        if self._free.size:
-            lower, upper = start.lower[self._free], start.upper[self._free]
-            problem = Problem(n_var=self._free.size, n_obj=1, n_ieq_constr=1, xl=lower, xu=upper)
-            factory = getattr(import_module(f"pymoo.algorithms.{MODULES[settings.algorithm]}"), settings.algorithm)
-            sampling = start.initial[:, self._free]
-            try:
-                self._algorithm = factory(pop_size=settings.population, sampling=sampling, **settings.settings)
-            except TypeError as error:
-                raise SearchError(f"{settings.name} does not take these settings: {error}") from error
-            self._algorithm.setup(problem, termination=NoTermination(), seed=int(start.rng.integers(2**31)))
+        if (start.upper > start.lower).any():
+            self._algorithm = settings.begun(start)
             self._infills = self._algorithm.ask()
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
@@ -103,9 +119,7 @@ class PymooSearch(PopulationSearch[Pymoo]):
         self._set_values([*members, *self._infills], rule)
         self._algorithm.tell(infills=self._infills)
         self._infills = self._algorithm.ask()
-        X = np.tile(self._start.lower, (len(self._infills), 1))
-        X[:, self._free] = self._infills.get("X")
-        self._X = np.clip(X, self._start.lower, self._start.upper)
+        self._X = completed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def stop(self) -> tuple[str, ...]:
         """Give up if there is nothing to vary."""

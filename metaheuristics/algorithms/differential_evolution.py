@@ -108,12 +108,7 @@ class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
         trials = Points(X, f, violation)
         if self._members is not None:
             members = self._members
-            kept = rule.better(members.f, members.violation, f, violation)
-            trials = Points(
-                np.where(kept[:, None], members.X, X),
-                np.where(kept, members.f, f),
-                np.where(kept, members.violation, violation),
-            )
+            trials = trials.replaced(rule.better(members.f, members.violation, f, violation), members)
         # Best first, and trials keep the places of their members.
         self._members = trials.best(len(trials.f), rule)
         self._X = self._trials(self._members.X)

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
@@ -104,21 +105,18 @@ class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
         self._limit = settings.velocity_limit * (start.upper - start.lower)
         self._inertia = settings.inertia
         self._V = np.zeros_like(start.initial)
-        self._own_X = start.initial
-        self._own_f = np.full(len(start.initial), np.inf)
-        self._own_violation = np.full(len(start.initial), np.inf)
+        unknown = np.full(len(start.initial), np.inf)
+        self._own = Points(start.initial, unknown, unknown)
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Update the bests and move; see `Search.tell`."""
-        improved = rule.better(f, violation, self._own_f, self._own_violation)
-        self._own_X = np.where(improved[:, None], X, self._own_X)
-        self._own_f = np.where(improved, f, self._own_f)
-        self._own_violation = np.where(improved, violation, self._own_violation)
-        leader = self._own_X[rule.best(self._own_f, self._own_violation)]
+        improved = rule.better(f, violation, self._own.f, self._own.violation)
+        self._own = self._own.replaced(improved, Points(X, f, violation))
+        leader = self._own.X[rule.best(self._own.f, self._own.violation)]
 
         settings, start = self._settings, self._start
         r1, r2 = start.rng.random((2, *X.shape))
-        to_own = settings.cognitive * r1 * (self._own_X - X)
+        to_own = settings.cognitive * r1 * (self._own.X - X)
         to_swarm = settings.social * r2 * (leader - X)
         moved, V = move(X, self._V, to_own, to_swarm, self._inertia, self._limit)
         self._X, self._V = reflect(moved, V, start.lower, start.upper)

@@ -37,6 +37,14 @@ class Points(NamedTuple):
         """Append the rows of others."""
         return Points(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
+    def replaced(self, rows: NDArray[np.bool_], by: Points) -> Points:
+        """Put the same rows of others, of equal number, in place of those that are True."""
+        return Points(
+            np.where(rows[:, None], by.X, self.X),
+            np.where(rows, by.f, self.f),
+            np.where(rows, by.violation, self.violation),
+        )
+
     def best(self, count: int, rule: Rule) -> Points:
         """Keep the best, best first; equals keep their order."""
         return self.take(rule.order(self.f, self.violation)[:count])

@@ -122,10 +122,7 @@ def _forward(
     upright: Collection[str],
 ) -> tuple[list[SX], list[SX]]:
     """Force and moment that each body's own motion asks for, about its reference point, in its axes."""
-    spins: list[SX] = []
-    spin_rates: list[SX] = []
-    turnings: list[SX] = []
-    accelerations: list[SX] = []
+    moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
     forces: list[SX] = []
     moments: list[SX] = []
     for body, inertia, rotation in zip(tree, inertias, rotations, strict=True):
@@ -133,19 +130,16 @@ def _forward(
         if body.joint is None:
             acceleration = SX(DM([0, 0, gravity]))  # gravity as an upward acceleration of the ground
         else:
-            offset = DM(body.offset_m)
-            acceleration = rotation.T @ (accelerations[body.parent] + turnings[body.parent] @ offset)
+            parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
+            acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))
             if body.link.name not in upright:
                 axis = body.direction * DM(body.joint.axis)
                 rate, rate_rate = axis * qd[body.joint.name], axis * qdd[body.joint.name]
-                carried = rotation.T @ spins[body.parent]
+                carried = rotation.T @ parent_spin
                 spin = carried + rate
-                spin_rate = rotation.T @ spin_rates[body.parent] + ca.cross(carried, rate) + rate_rate
+                spin_rate = rotation.T @ parent_spin_rate + ca.cross(carried, rate) + rate_rate
         turning = _turning(spin, spin_rate)
-        spins.append(spin)
-        spin_rates.append(spin_rate)
-        turnings.append(turning)
-        accelerations.append(acceleration)
+        moved.append((spin, spin_rate, turning, acceleration))
         forces.append(inertia.mass * acceleration + turning @ DM(inertia.first))
         moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _spin_moment(turning, inertia.second))
     return forces, moments

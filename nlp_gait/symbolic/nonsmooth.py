@@ -7,6 +7,7 @@ exact reformulation where the sense allows it (see ``backends/nlp.py``, which ch
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -140,21 +141,15 @@ class Lifted:
 
     def abs(self, v: MX) -> MX:
         """A variable s with s >= v and s >= -v."""
-        s = MX.sym(f"abs_{len(self.lifts)}", v.shape[0])
-        self.lifts.append(Lift(variable=s, value=ca.fabs(v), rows=ca.vertcat(s - v, s + v), from_above=True))
-        return s
+        return self._lifted("abs", ca.fabs(v), lambda s: ca.vertcat(s - v, s + v))
 
     def min(self, a: MX, b: MX) -> MX:
         """A variable d with d <= a and d <= b."""
-        d = MX.sym(f"min_{len(self.lifts)}", a.shape[0])
-        self.lifts.append(Lift(variable=d, value=ca.fmin(a, b), rows=ca.vertcat(a - d, b - d), from_above=False))
-        return d
+        return self._lifted("min", ca.fmin(a, b), lambda d: ca.vertcat(a - d, b - d), from_above=False)
 
     def largest(self, v: MX) -> MX:
         """A variable s with s >= v_i and s >= -v_i for all i."""
-        s = MX.sym(f"largest_{len(self.lifts)}")
-        self.lifts.append(Lift(variable=s, value=ca.norm_inf(v), rows=ca.vertcat(s - v, s + v), from_above=True))
-        return s
+        return self._lifted("largest", ca.norm_inf(v), lambda s: ca.vertcat(s - v, s + v))
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """A sigmoid between the two branches."""
@@ -164,9 +159,7 @@ class Lifted:
 
     def tie(self, v: MX) -> MX:
         """A variable that an equation ties to v."""
-        tied = MX.sym(f"tied_{len(self.lifts)}", v.shape[0])
-        self.lifts.append(Lift(variable=tied, value=v, rows=tied - v, tight=True))
-        return tied
+        return self._lifted("tied", v, lambda tied: tied - v, tight=True)
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """Multiple shooting: all states are variables, tied by one equation for each step."""
@@ -177,3 +170,9 @@ class Lifted:
         exact = step.mapaccum(steps)(initial, *inputs)
         self.lifts.append(Lift(variable=states, value=ca.vec(exact), rows=ca.vec(path - reached), tight=True))
         return path
+
+    def _lifted(self, name: str, value: MX, rows: Callable[[MX], MX], **kind: bool) -> MX:
+        """A new variable that stands for a value; see ``Lift``."""
+        variable = MX.sym(f"{name}_{len(self.lifts)}", value.shape[0])
+        self.lifts.append(Lift(variable=variable, value=value, rows=rows(variable), **kind))
+        return variable

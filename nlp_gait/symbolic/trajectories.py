@@ -86,6 +86,4 @@ def constant(value: float) -> Motion:
 
 def stack(*motions: Motion) -> Motion:
     """Motions one below the other as one vector motion."""
-    from casadi import vertcat
-
-    return Motion(*(vertcat(*parts) for parts in zip(*motions, strict=True)))
+    return Motion(*(ca.vertcat(*parts) for parts in zip(*motions, strict=True)))

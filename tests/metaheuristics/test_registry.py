@@ -20,7 +20,6 @@ from metaheuristics import (
     algorithm,
     handling,
     minimize,
-    registry,
 )
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
@@ -39,7 +38,7 @@ def test_names_of_adapters() -> None:
 
 
 def test_a_package_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
     with pytest.raises(SearchError, match=r"'cma' needs the package cma.*pip install 'nlp-gait\[algorithms\]'"):
         algorithm("cma")
     with pytest.raises(SearchError, match="'pymoo:GA' needs the package pymoo"):

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
+from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.interpreted import InterpretedKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
@@ -53,7 +53,7 @@ class CompiledObjective:
         )
         self.description = evaluator.description
         self._evaluator = evaluator
-        self._lower, self._upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+        self._lower, self._upper = kernel.row_bounds(problem)
         self._p = np.array(problem.p)
         self._threads = threads
         self._time_per_row_s = 0.0
@@ -152,7 +152,11 @@ def compile_objective(
     count = native_lanes() if lanes is None else lanes
     evaluator: NativeKernel | InterpretedKernel
     try:
-        evaluator = _native(problem, kernel, find_compiler(), count)
+        compiler = find_compiler()
+        evaluator = problem.built(
+            f"native kernel {count} {compiler}",
+            lambda: _verified(NativeKernel(kernel, compiler, count), problem, kernel),
+        )
     except CompilerError as error:
         if require_compiler:
             raise
@@ -160,12 +164,6 @@ def compile_objective(
         evaluator = problem.built("interpreted kernel", lambda: InterpretedKernel(kernel))
         threads = 1  # the virtual machine does not let go of Python's lock
     return CompiledObjective(problem, evaluator, threads or _available_cores())
-
-
-def _native(problem: GaitProblem, kernel: Kernel, compiler: Compiler, lanes: int) -> NativeKernel:
-    return problem.built(
-        f"native kernel {lanes} {compiler}", lambda: _verified(NativeKernel(kernel, compiler, lanes), problem, kernel)
-    )
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
@@ -177,7 +175,7 @@ def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> Nat
         CompilerError: it does not: the compiler is broken, or is not for this machine.
     """
     X = np.random.default_rng(0).uniform(problem.lower, problem.upper, (CHECK_POINTS, len(problem.names)))
-    lower, upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+    lower, upper = kernel.row_bounds(problem)
     f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(lower)))
     native(X, np.array(problem.p), lower, upper, f, violation, g)
     found = np.column_stack([f, g])

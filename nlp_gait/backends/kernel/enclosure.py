@@ -39,7 +39,7 @@ class Enclosure:
         """
         kernel = kernel_of(problem)
         self.problem = problem
-        self.lower, self.upper = (np.array(bound, dtype=float).ravel() for bound in kernel.bounds(problem.p))
+        self.lower, self.upper = kernel.row_bounds(problem)
         self.scales = kernel.model.row_scales
         source = _source(kernel.function)
         loaded, self.library = load_library(source, find_compiler(), BASE_FLAGS, SYMBOLS)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 import casadi as ca
+import numpy as np
 
 from nlp_gait.backends.exact import ExactModel, exact_model
 from nlp_gait.problem import Array, GaitProblem
@@ -30,6 +31,11 @@ class Kernel:
     bounds: ca.Function
     weights: Array
     model: ExactModel
+
+    def row_bounds(self, problem: GaitProblem) -> tuple[Array, Array]:
+        """Lower and upper bounds (m,) of the rows for the problem's parameter values."""
+        lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(problem.p))
+        return lower, upper
 
 
 def kernel_of(problem: GaitProblem) -> Kernel:

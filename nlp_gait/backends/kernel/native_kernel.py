@@ -42,7 +42,6 @@ class NativeKernel:
         self._workspace_bytes = int(loaded.nlp_gait_workspace_bytes())
         self._local = threading.local()
         self._weights = kernel.weights
-        self._rows = len(kernel.weights)
         self.lanes = lanes
         self.description = f"compiled by {compiler.summary}, {lanes} candidates at a time"
 

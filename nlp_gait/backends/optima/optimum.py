@@ -123,7 +123,7 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
     side = np.where(lam > upper - values, 1, np.where(-lam > values - lower, -1, 0))
     side[equation] = np.where(lam[equation] >= 0.0, 1, -1)
     reason: str | None = "the set of active bounds did not settle"
-    residual, step = np.inf, None
+    residual = np.inf
     for _ in range(ROUNDS):
         active = np.flatnonzero(side)
         lam[side == 0] = 0.0
@@ -159,8 +159,8 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
         side=side,
         weak=tuple(names[i] for i in np.flatnonzero(weak)),
         residual=residual,
-        freedom=0 if step is None else step.freedom,
-        dependent=0 if step is None else step.dependent,
+        freedom=step.freedom,
+        dependent=step.dependent,
         reason=reason,
     )
 

@@ -40,14 +40,18 @@ def compiled_nlp(
     Raises:
         CompilerError: there is no compiler, or it fails.
     """
-    available = solver.get_function()
-    names = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
-    derivatives = {option: name for option, name in names.items() if name in available}
-    wanted = ["nlp_f", "nlp_g", *derivatives.values()]
-    f, g, *others = compiled_functions([solver.get_function(name) for name in wanted], optimise=optimise)
+    derivatives = derivatives_of(solver)
+    values = [solver.get_function(name) for name in ("nlp_f", "nlp_g")]
+    f, g, *others = compiled_functions([*values, *derivatives.values()], optimise=optimise)
     x, p = nlp["x"], nlp["p"]
     options = {"no_nlp_grad": True, "calc_lam_p": False, **dict(zip(derivatives, others, strict=True))}
     return {"x": x, "p": p, "f": f(x, p), "g": g(x, p)}, options
+
+
+def derivatives_of(solver: ca.Function) -> dict[str, ca.Function]:
+    """Derivatives that an ``nlpsol`` has, by the option with which a new one takes them over."""
+    names = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
+    return {option: solver.get_function(name) for option, name in names.items() if solver.has_function(name)}
 
 
 @contextmanager

@@ -13,8 +13,13 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.interrupts import deferred_interrupts, never
-from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
-from nlp_gait.backends.solvers.derivatives import WORTHWHILE_SOLVES, compiled_nlp, one_direction_at_a_time
+from nlp_gait.backends.nlp import WIDTHS, nlp_model
+from nlp_gait.backends.solvers.derivatives import (
+    WORTHWHILE_SOLVES,
+    compiled_nlp,
+    derivatives_of,
+    one_direction_at_a_time,
+)
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
@@ -94,12 +99,8 @@ class IpoptSettings(Solver):
         worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
         compiled = worthwhile if self.compiled is None else self.compiled
         chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
-
-        def make() -> Ipopt:
-            return Ipopt(nlp_model(problem), chosen, long_derivatives=problem.long_derivatives)
-
         try:
-            return problem.built(f"ipopt {chosen}", make)
+            return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
                 raise
@@ -127,7 +128,8 @@ class Ipopt(Solver):
 
     name: ClassVar[str] = IpoptSettings.name
 
-    def __init__(self, model: NlpModel, settings: IpoptSettings, *, long_derivatives: bool = False) -> None:
+    def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
+        self.model = model = nlp_model(problem)
         started = time.perf_counter()
         self.linear_solver = linear_solver(settings.linear_solver)
         self._time_limit_s = settings.time_limit_s
@@ -143,21 +145,17 @@ class Ipopt(Solver):
             "ipopt.hessian_approximation": settings.hessian,
             **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
         }
-        self.model = model
         self.compiled = bool(settings.compiled)
-        one_by_one = self.compiled and long_derivatives
+        one_by_one = self.compiled and problem.long_derivatives
         with one_direction_at_a_time() if one_by_one else nullcontext():
             nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
         if self.compiled:
             nlp, ready = compiled_nlp(self._cold, model.nlp, optimise=one_by_one)
             options |= ready
             self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
-        derivatives = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g"}
-        if settings.hessian == "exact":
-            derivatives["hess_lag"] = "nlp_hess_l"
         warm_options: dict[str, Any] = {
             **options,
-            **{option: self._cold.get_function(name) for option, name in derivatives.items()},
+            **derivatives_of(self._cold),
             "ipopt.mu_strategy": "monotone",
             "ipopt.mu_init": WARM_BARRIER,
             "ipopt.warm_start_init_point": "yes",

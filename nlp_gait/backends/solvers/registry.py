@@ -10,20 +10,11 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decoded, refusing
 from nlp_gait.errors import InputError, unknown
 
 # A solver joins by a line here.
-SOLVERS: Mapping[str, type[Solver]] = {
-    solver.name: solver
-    for solver in (
-        IpoptSettings,
-        Slsqp,
-        Fatrop,
-        Sqpmethod,
-        Uno,
-    )
-}
+SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
 
 
 def solver(name: str, /, **settings: Any) -> Solver:
@@ -39,10 +30,8 @@ def solver(name: str, /, **settings: Any) -> Solver:
             raise InputError(f"{name} has no settings, got {setting!r}")
         if setting not in known:
             raise unknown(f"setting of {name}", setting, known)
-    try:
+    with refusing(f"setting of {name}", InputError):
         decoded(SOLVERS[name], settings)
-    except ValueError as error:
-        raise InputError(f"setting of {name}: {error}") from error
     return SOLVERS[name](**settings)
 
 

@@ -16,7 +16,7 @@ from nlp_gait.problem.blocks import Block, Layout
 from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.posture import posture
-from nlp_gait.problems.stairs.ideal_model import IdealModel
+from nlp_gait.problems.stairs.ideal_model import AXES, IdealModel
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
 from nlp_gait.problems.stairs.stair import (
@@ -37,7 +37,18 @@ SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
 # A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
 # A plan whose legs reach on common stairs; it need be neither optimal nor balanced.
-HIP_HEIGHT, ZMP_START, ZMP_END, END_RATE, TORSO_PITCH = 0.66, 0.18, 0.05, 2.0, 1.35
+PLAN = {
+    "hip_height": 0.66,
+    "zmp_start": 0.18,
+    "zmp_end": 0.05,
+    "end_rate": 2.0,
+    "torso_pitch": 1.35,
+    "foot_pitch": 0.0,
+    "sole_angle": np.pi / 6,
+    "toe_angle": np.pi / 6,
+    "catch_angle": 0.01,
+    **dict(zip(("t1", "t2", "t_bc", "t3"), PAPER_TIMES, strict=True)),
+}
 HIP_BEHIND = 0.08  # the hip starts so far behind the middle of the rear tread [m]
 REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stretched leg
 
@@ -120,32 +131,20 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
 
 def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
     """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
-
-    def of_links(
-        quantity: str, unit: str, columns: int, limits: tuple[tuple[float, float], ...], description: str
-    ) -> Block:
-        return Block(quantity=quantity, unit=unit, rows=MOVING, columns=columns, limits=limits, description=description)
-
-    def force(point: str, columns: int) -> Block:
-        return Block(
-            quantity=f"{point}_force",
-            unit="N",
-            rows=("x", "z"),
-            columns=columns,
-            limits=FORCE_LIMITS,
-            description=f"force of the ground on the rear {point} along",
-        )
-
     angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
     rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
     accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
+    table = (
+        ("angle", "rad", MOVING, intervals + 1, angles, "absolute angle of link"),
+        ("rate", "rad/s", MOVING, intervals + 1, rates, "rate of link"),
+        ("acceleration", "rad/s^2", MOVING, intervals, accelerations, "acceleration of link"),
+        ("toe_force", "N", AXES, toe_off, FORCE_LIMITS, "force of the ground on the rear toe along"),
+        ("sole_force", "N", AXES, sole_off, FORCE_LIMITS, "force of the ground on the rear sole along"),
+    )
     return Layout(
-        blocks=(
-            of_links("angle", "rad", intervals + 1, angles, "absolute angle of link"),
-            of_links("rate", "rad/s", intervals + 1, rates, "rate of link"),
-            of_links("acceleration", "rad/s^2", intervals, accelerations, "acceleration of link"),
-            force("toe", toe_off),
-            force("sole", sole_off),
+        blocks=tuple(
+            Block(quantity=quantity, unit=unit, rows=rows, columns=columns, limits=limits, description=description)
+            for quantity, unit, rows, columns, limits, description in table
         )
     )
 
@@ -187,23 +186,7 @@ def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
 def _angles() -> ca.Function:
     """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
     size, s = SX.sym("size", 2), SX.sym("s", 4)
-    t1, t2, t_bc, t3 = PAPER_TIMES
-    plan = StairPlan(
-        hip_height=SX(HIP_HEIGHT),
-        hip_start=size[0] / 2 - HIP_BEHIND,
-        zmp_start=SX(ZMP_START),
-        zmp_end=SX(ZMP_END),
-        end_rate=SX(END_RATE),
-        torso_pitch=SX(TORSO_PITCH),
-        t1=SX(t1),
-        t2=SX(t2),
-        t_bc=SX(t_bc),
-        foot_pitch=SX(0),
-        t3=SX(t3),
-        sole_angle=SX(np.pi / 6),
-        toe_angle=SX(np.pi / 6),
-        catch_angle=SX(0.01),
-    )
+    plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
     found = posture(
         toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -22,16 +21,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
 AXES = ("x", "z")
-
-
-class Places(NamedTuple):
-    """Points of the swing leg at every instant [m]: each (2, N + 1), origin at the stance ankle; heights above the stair."""
-
-    toe: MX
-    sole: MX
-    ankle: MX
-    hip: MX
-    heights: MX  # (3, N + 1), in the order toe, sole, ankle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,12 +85,13 @@ class IdealModel:
 
     @cached_property
     def _instant(self) -> ca.Function:
+        """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
         found = points(toe_foot_biped().rods, link_angles(q), SX(2, 1))
-        swing = [found[name] for name in "TSA"]
+        toe, sole, ankle, hip = (found[name] for name in "TSAH")
         stair = Stair(size[0], size[1])
-        heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in swing]
-        return ca.Function("places", [q, size], ca.cse([*swing, found["H"], ca.vertcat(*heights)]))
+        heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
+        return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
     def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
         """Quantised dynamics (eqs. 44, 45), rest at both ends, a still torso."""
@@ -124,11 +114,11 @@ class IdealModel:
         stair = stair_of(point)
         size = ca.vertcat(stair.tread, stair.rise)
         q = x["angle"]
-        places = Places(*self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1)))
+        swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = places.toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
-        ends = ca.horzcat(places.ankle[:, 0] + size, places.ankle[:, n] - size)
-        advance = places.hip[:, n] - places.hip[:, 0] - size
+        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
+        ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
+        advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
         def above(name: str, heights: MX, points: tuple[str, ...], instants: range) -> Constraint:
@@ -140,8 +130,8 @@ class IdealModel:
             _equal("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
             _equal("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
             _equal("hip_advance", advance, AXES, (n,), "m", 0.01),
-            above("clearance_in_support", places.heights[1:, :lift], ("sole", "ankle"), in_support),
-            above("clearance_in_swing", places.heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
+            above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),
+            above("clearance_in_swing", heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
         )
 
 

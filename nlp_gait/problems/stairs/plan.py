@@ -141,6 +141,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     jerk = step.jerk(samples, point["quantum_s"])
     exact = Exact()
     pressure = samples.stance_pressure.T
+    least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
     return Assembly(
         objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
@@ -148,7 +149,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
             stance_load(point, samples.stance_force),
             grip("friction", samples.stance_force, point["friction"]),
             stance_zmp(point, samples.stance_pressure),
-            _clearance(point, step, ops),
+            rows("clearance", step.clearances(point, ops), ("toe", "sole", "ankle"), "m", 0.01, lower=least_clearance),
             _phase_durations(point),
         ),
         indexes={
@@ -172,12 +173,6 @@ def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
         knee_limits("knee_angle", samples.q),
         rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
     )
-
-
-def _clearance(point: Point, step: PlannedStep, ops: Nonsmooth) -> Constraint:
-    """Toe, sole and ankle of the swing foot above the stair while it is in the air."""
-    least = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
-    return rows("clearance", step.clearances(point, ops), ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
 def _phase_durations(point: Point) -> Constraint:

@@ -12,7 +12,7 @@ from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan, ToeFoot, an
 from nlp_gait.problems.stairs.formulas.planar_biped import Rod
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, stack
+from nlp_gait.symbolic.trajectories import Motion, constant, plus, stack
 
 
 class Posture(NamedTuple):
@@ -75,8 +75,5 @@ def _leg(rods: Mapping[str, Rod], at_hip: Motion, at_ankle: Motion, margin: SX, 
         ops,
     )
     _, pitch, knee, _, _ = (Motion(*(part[i] for part in leg.joints)) for i in range(5))
-    shank = Motion(*(a + b for a, b in zip(pitch, knee, strict=True)))
-    upright = ca.pi / 2  # a leg that hangs down
-    return stack(
-        pitch._replace(position=pitch.position + upright), shank._replace(position=shank.position + upright)
-    ), leg.reach
+    upright = constant(ca.pi / 2)  # a leg that hangs down
+    return stack(plus(pitch, upright), plus(plus(pitch, knee), upright)), leg.reach
