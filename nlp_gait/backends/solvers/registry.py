@@ -10,8 +10,9 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decoded, refusing
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import refusing
 
 # A solver joins by a line here.
 SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
