@@ -10,7 +10,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, ProblemOptions, Seed
+from compare.cli.options import RESULTS, AnswerFolder, AsJson, CycleOptions, Seed
 from compare.cli.questions.answers import hand_out
 from nlp_gait.files import writable_folder
 
@@ -28,7 +28,7 @@ def walk(
     ] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
-    problem: ProblemOptions,
+    problem: CycleOptions,
     out: AnswerFolder = RESULTS,
     as_json: AsJson = False,
 ) -> None:
