@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.drawing.figures import COLOURS, legend_below, new_figure, style
 from compare.questions.answer import Answer, all_digits, table_of
@@ -13,10 +14,6 @@ from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.report.document import Figure, Table
 from nlp_gait.problem import Signals
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import heading, with_unit
 from compare.drawing.figures import new_figure, style
@@ -13,10 +15,6 @@ from compare.questions.answer import Answer, all_digits
 from compare.questions.prices.price import Price, Prices
 from compare.report.document import Figure, Part, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 SHOWN = 10  # bars of each kind
 LISTED = 12  # rows of the robot's table; all are in the CSV file

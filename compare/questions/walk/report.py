@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import millimetres, with_unit
 from compare.drawing.figures import new_figure, style
@@ -19,10 +20,6 @@ from nlp_gait.problem import GaitProblem, Result, finely_sampled
 from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.steps import walk
 from nlp_gait.simulation.walking import Walk
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
