@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,7 +64,7 @@ def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
             Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
             _numbers(stem, found),
         ),
-        data={"problem": problem, "motions": [m.to_json() for m in found]},
+        data={"problem": problem, "motions": [asdict(m) for m in found]},
     )
 
 
@@ -128,7 +129,7 @@ def power_figure(found: Sequence[Motion]) -> Drawing:
             if towards is not None:
                 axes.axhline(towards, color=colour, ls=":", lw=1.0, label=f"extrapolated, {towards:.3f} W")
         axes.set_xscale("symlog", linthresh=10)
-        ticks = sorted({0, 10, 20, 50, 100, 200, 500})
+        ticks = (0, 10, 20, 50, 100, 200, 500)
         axes.set_xticks(ticks, [str(tick) for tick in ticks])
         axes.set_xlim(-1, 1.3 * max(m.coefficients for m in found) + 5)
         axes.set_xlabel("coefficients beyond the paper's cubics")

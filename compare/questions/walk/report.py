@@ -28,22 +28,10 @@ LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 # Indexes of the table of numbers.
 INDEXES = (
-    "power_W",
-    "energy_J_per_m",
-    "cost_of_transport",
-    "speed_m_s",
-    "step_length_m",
-    "ssp_power_W",
-    "dsp_power_W",
-    "ssp_dbm_x_min_m",
-    "ssp_dbm_y_min_m",
-    "ssp_dbm_x_mean_m",
-    "ssp_dbm_y_mean_m",
-    "dsp_dbm_x_mean_m",
-    "dsp_dbm_y_mean_m",
-    "touch_down_torque_jump_Nm",
-    "lift_off_torque_jump_Nm",
-)
+    "power_W energy_J_per_m cost_of_transport speed_m_s step_length_m ssp_power_W dsp_power_W ssp_dbm_x_min_m "
+    "ssp_dbm_y_min_m ssp_dbm_x_mean_m ssp_dbm_y_mean_m dsp_dbm_x_mean_m dsp_dbm_y_mean_m "
+    "touch_down_torque_jump_Nm lift_off_torque_jump_Nm"
+).split()
 # What it says of the walk in the engine, and of the measurements there.
 WALKED = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
 MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
