@@ -22,7 +22,6 @@ ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
 Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
-AnswerFolder = Annotated[Path, typer.Option(help="Folder for report, tables, pictures and data.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 # Where results go unless --out names a folder.
 RESULTS = Path("results")

@@ -9,9 +9,8 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, NaoPhase, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.options import NaoPhase, Seed
+from compare.cli.questions.answers import Output
 
 if TYPE_CHECKING:
     from compare.questions.robust.playback import Played
@@ -30,8 +29,7 @@ def robust(
     samples: Annotated[int, typer.Option(min=0, help="Random corners on which each result is checked.")] = 20,
     simulate: Annotated[bool, typer.Option(help="Play both gaits in MuJoCo on the worst robots (extra sim).")] = True,
     problem: NaoPhase,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
 
@@ -46,7 +44,6 @@ def robust(
         from nlp_gait.simulation.engine import mujoco
 
         mujoco()
-    folder = writable_folder(out)
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
     found: list[Robust] = []
@@ -61,4 +58,4 @@ def robust(
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
             end_interrupted(f"{stopped}; nothing was written")
-    hand_out(robust_answer(problem.name, found, runs), folder, as_json, stopped)
+    output.take(robust_answer(problem.name, found, runs), stopped)
