@@ -83,14 +83,16 @@ def _numbers(stem: str, found: Prices) -> Table:
         *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
         *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in found.x)),
     ]
-    rows: list[list[Value]] = []
-    for kind, group in (("limit", found.limits), ("robot", found.robot)):
-        for price in group:
-            moves = [None if price.x is None else price.x[name] for name in found.x]
-            numbers = (price.value, price.slope, price.step, price.per_step, price.resolved)
-            rows.append(
-                [kind, price.name, price.unit, *numbers, *(price.one_step or (None, None)), *price.reach, *moves]
-            )
+    rows: list[list[Value]] = [
+        [
+            *(kind, price.name, price.unit, price.value, price.slope, price.step, price.per_step, price.resolved),
+            *(price.one_step or (None, None)),
+            *price.reach,
+            *(None if price.x is None else price.x[name] for name in found.x),
+        ]
+        for kind, group in (("limit", found.limits), ("robot", found.robot))
+        for price in group
+    ]
     return all_digits(stem, header, rows)
 
 
