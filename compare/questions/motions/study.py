@@ -134,18 +134,13 @@ def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) ->
     spans = SPANS[task.trajectory]
     solved = [m for m in reversed(earlier) if m.success and m.task.kind in (PLANNED, FREED)]
     for motion in solved:
-        if SPANS[motion.task.trajectory] <= spans and _contains(problem, motion.task, task.trajectory):
+        simpler = motion.task.spec.with_options(trajectory=task.trajectory)
+        if SPANS[motion.task.trajectory] <= spans and set(simpler.load().names) <= set(problem.names):
             return _embedded(motion.x, problem.names, spans)
     for motion in solved if task.kind == FREED else ():
         planned = motion.task.spec.load()
         return fitted_start(task.trajectory, planned, planned.check_x(motion.x))  # type: ignore[arg-type]
     return None
-
-
-def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> bool:
-    """Whether a problem has all curves of a simpler one."""
-    same = simpler.spec.with_options(trajectory=trajectory).load()
-    return set(same.names) <= set(problem.names)
 
 
 def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:

@@ -41,7 +41,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     """What walking costs along the axis, from at least one gait."""
     (name,), problem = gaits[0].found.at, spec.load()
     feasible = [gait for gait in gaits if gait.found.feasible]
-    results = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
+    placed = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
     cheapest_cycles = table_of(
         "Cheapest cycles",
         feasible,
@@ -77,16 +77,8 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
         title=f"{problem.name}: cheapest cycles over {name}",
         parts=parts,
         data={"gaits": [gait.to_json() for gait in gaits]},
-        results={
-            stem: {**plain_problem(result.problem), "x": result.problem.by_name(result.x)}
-            for stem, result in results.items()
-        },
+        results={file: {**plain_problem(r.problem), "x": r.problem.by_name(r.x)} for file, r in placed.items()},
     )
-
-
-def _phase(duration: str) -> str:
-    """A phase by the variable that holds its duration, for example ``single support``."""
-    return name_in_words(duration, "s").removesuffix(" time")
 
 
 def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
@@ -151,7 +143,8 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
         lengths.set_ylabel("step\n[mm]")
         lengths.set_ylim(bottom=0.0)
         for time, colour in zip(problem.durations, (LEFT, RIGHT), strict=True):
-            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=_phase(time))
+            phase = name_in_words(time, "s").removesuffix(" time")  # for example "single support"
+            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=phase)
         times.set_ylabel("time [s]")
         times.set_ylim(bottom=0.0)
         times.legend(ncols=2)
