@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,10 +10,6 @@ from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
 from compare.cli.options import NaoPhase, Seed
 from compare.cli.questions.answers import Output
-
-if TYPE_CHECKING:
-    from compare.questions.robust.playback import Played
-    from compare.questions.robust.study import Robust
 
 
 @command
@@ -35,9 +30,9 @@ def robust(
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """
-    from compare.questions.robust.playback import played
+    from compare.questions.robust.playback import Played, played
     from compare.questions.robust.report import robust_answer
-    from compare.questions.robust.study import boxes
+    from compare.questions.robust.study import Robust, boxes
     from compare.questions.robust.study import robust as find
 
     if simulate:
@@ -47,7 +42,7 @@ def robust(
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
     found: list[Robust] = []
-    runs: Sequence[Played] = ()
+    runs: tuple[Played, ...] = ()
     stopped = ""
     try:
         with progress_bar("steps", None) as advance:
