@@ -36,14 +36,12 @@ class PlainConsole(Console):
 
 
 def harmless(text: str) -> str:
-    """Text with escapes in place of control characters and of what is not a character at all."""
-    shown = (sign if sign in "\n\t" or _is_shown(sign) else repr(sign)[1:-1] for sign in text)
-    return "".join(shown)
+    """Text with escapes in place of control characters and of what is not a character at all.
 
-
-def _is_shown(sign: str) -> bool:
-    """Printable, or a space of another width, as between thousands."""
-    return sign.isprintable() or unicodedata.category(sign) == "Zs"
+    Spaces of another width, as between thousands, stay although Python does not call them printable.
+    """
+    kept = {sign for sign in text if sign in "\n\t" or sign.isprintable() or unicodedata.category(sign) == "Zs"}
+    return "".join(sign if sign in kept else repr(sign)[1:-1] for sign in text)
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
@@ -52,17 +50,15 @@ stdout = PlainConsole(highlight=False, markup=False, width=None if sys.stdout.is
 
 def end_interrupted(sentence: str) -> NoReturn:
     """End with status 130 and one sentence that says what was kept."""
-    stderr.print(f"nlp-gait: {sentence}", soft_wrap=True)
-    raise typer.Exit(130)
+    fail(sentence, status=130)
 
 
-def fail(message: str) -> NoReturn:
-    """End with status 1 and one sentence."""
+def fail(message: str, status: int = 1) -> NoReturn:
+    """End with a status and one sentence."""
     said = " ".join(message.split())
-    stderr.print(
-        f"nlp-gait: {said if len(said) <= LONGEST_SENTENCE else said[:LONGEST_SENTENCE] + ' ...'}", soft_wrap=True
-    )
-    raise typer.Exit(1)
+    shown = said if len(said) <= LONGEST_SENTENCE else f"{said[:LONGEST_SENTENCE]} ..."
+    stderr.print(f"nlp-gait: {shown}", soft_wrap=True)
+    raise typer.Exit(status)
 
 
 def print_json(data: Any) -> None:

@@ -10,7 +10,6 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
 from compare.cli.options import ResultFile
-from nlp_gait.errors import unknown
 from nlp_gait.export.setpoints import PERIOD_MS
 
 
@@ -30,9 +29,7 @@ def export(
     from nlp_gait.export.formats import FORMATS, write_as
     from nlp_gait.problem.result import load_result
 
-    if format_ not in FORMATS:
-        raise unknown("format", format_, FORMATS)
     loaded = load_result(result)
-    target = output_file(out if out is not None else result.with_name(result.stem + FORMATS[format_]))
+    target = output_file(out or result.with_name(result.stem + FORMATS.get(format_, "")))
     write_as(format_, target, loaded, period_ms)
     print_written(target)

@@ -29,19 +29,12 @@ def until_interrupted(work: Callable[[], R], nothing: str = "nothing was written
 
 
 @contextmanager
-def resumable(folder: Path, files: str = "steps/*.json") -> Iterator[None]:
-    """For a command whose finished steps are files under a folder, from which the same command goes on."""
+def interruptible(folder: Path | None = None) -> Iterator[None]:
+    """For a command that has no result before its end, or whose finished steps in a folder it goes on from when called again."""
     try:
         yield
     except KeyboardInterrupt:
-        finished = len(list(folder.glob(files)))
+        if folder is None:
+            end_interrupted("interrupted; nothing was written")
+        finished = sum(1 for files in ("steps/*.json", "records/*/*.json") for _ in folder.glob(files))
         end_interrupted(f"interrupted; {finished} finished steps are kept in {folder}; the same command continues")
-
-
-@contextmanager
-def whole() -> Iterator[None]:
-    """For a command that has no result before its end."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        end_interrupted("interrupted; nothing was written")

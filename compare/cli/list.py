@@ -9,8 +9,8 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import print_json, print_table, stdout
-from compare.cli.options import AsJson, ProblemOptions
-from nlp_gait.problem import problem_names
+from compare.cli.options import AsJson
+from nlp_gait.problem import load, problem_names
 
 
 @command
@@ -34,7 +34,7 @@ def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
     from nlp_gait.robots import robot_names
 
-    problems = {name: ProblemOptions().spec_of(name).load() for name in problem_names()}
+    problems = {name: load(name) for name in problem_names()}
     if as_json:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
@@ -48,7 +48,7 @@ def _overview(as_json: bool) -> None:
 
 
 def _details(name: str, as_json: bool) -> None:
-    problem = ProblemOptions().spec_of(name).load()
+    problem = load(name)
     if as_json:
         print_json(
             {

@@ -22,15 +22,16 @@ ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
 Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
-AnswerFolder = Annotated[Path, typer.Option(help="Folder for report, tables, pictures and data.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 # Where results go unless --out names a folder.
 RESULTS = Path("results")
+# Options of problems that have a flag of their own.
+FLAGS = ("robot", "intervals", "derivatives")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProblemOptions:
-    """How a problem is built, and its values."""
+class CycleOptions:
+    """How a walking cycle is built, and its values."""
 
     robot: Annotated[
         str | None,
@@ -39,9 +40,6 @@ class ProblemOptions:
     intervals: Annotated[
         int | None,
         typer.Option(help="Equal parts of the motion (default: the problem's own, see `nlp-gait list PROBLEM`)."),
-    ] = None
-    derivatives: Annotated[
-        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
     ] = None
     option: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Any other option of the problem; repeatable.")
@@ -63,8 +61,7 @@ class ProblemOptions:
             UnknownNameError: problem, option, parameter or variable.
             InputError: a value that is not allowed.
         """
-        named = {"robot": self.robot, "intervals": self.intervals, "derivatives": self.derivatives}
-        options: dict[str, Any] = {key: value for key, value in named.items() if value is not None}
+        options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
         known = inspect.signature(problem_maker(name)).parameters
         for key, text in _pairs(self.option, "--option"):
             if key not in known:
@@ -73,6 +70,15 @@ class ProblemOptions:
         problem = ProblemSpec(name=name, options=options, values=_numbers(self.values, "--set")).load()
         fixed = problem.fix(**_numbers(self.fix, "--fix"))
         return ProblemSpec(name=name, options=options, values=dict(fixed.values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProblemOptions(CycleOptions):
+    """How any problem is built, and its values."""
+
+    derivatives: Annotated[
+        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import print_written, progress_bar
-from compare.cli.interrupts import resumable
+from compare.cli.interrupts import interruptible
 from nlp_gait.errors import unknown
 
 # Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
@@ -35,6 +35,6 @@ def reproduce(
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
     module = import_module(REPRODUCTIONS[paper])
-    with resumable(out, "**/*.json"), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
+    with interruptible(out), progress_bar(paper, getattr(module, "STEPS", None)) as advance:
         module.reproduce(out, progress=advance)
     print_written(out / "report.md")

@@ -10,7 +10,7 @@ import typer
 
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, output_file, print_json, print_rows, print_table, stdout
+from compare.cli.common import end_interrupted, fail, output_file, print_json, print_table, stdout
 from compare.cli.options import AsJson, ResultFile
 from nlp_gait.simulation.mjcf import FRICTION
 
@@ -85,11 +85,8 @@ def simulate(
         try:
             survival = sweep(plan, drive)
         except KeyboardInterrupt:
-            kept = (
-                "nothing was written; name a folder with --out"
-                if folder is None
-                else f"the playback is kept in {folder}"
-            )
+            lost = "nothing was written; name a folder with --out"
+            kept = lost if folder is None else f"the playback is kept in {folder}"
             end_interrupted(f"interrupted in the tests of robustness; {kept}")
         data["robustness"] = asdict(survival)
         if folder is not None:
@@ -105,16 +102,11 @@ def simulate(
 def _print(report: Measurements, survival: Robustness | None) -> None:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
     stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
-    print_rows(
-        "Mean power [W]",
-        {"model": report.predicted, "engine": report.measured}.items(),
-        {
-            "": lambda row: row[0],
-            "mechanical": lambda row: f"{row[1].mechanical_W:.3f}",
-            "heat": lambda row: f"{row[1].heat_W:.3f}",
-            "total": lambda row: f"{row[1].total_W:.3f}",
-        },
-    )
+    powers = [
+        (name, *(f"{part:.3f}" for part in (power.mechanical_W, power.heat_W, power.total_W)))
+        for name, power in (("model", report.predicted), ("engine", report.measured))
+    ]
+    print_table("Mean power [W]", ("", "mechanical", "heat", "total"), powers)
     lengths = {
         "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
         "- largest": report.pressure_max_m,

@@ -1,40 +1,49 @@
-"""How the commands that ask a question hand out its answer."""
+"""Where the commands that ask a question put its answer."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from compare.cli.common import end_interrupted, print_result, print_table, stdout
-from nlp_gait.errors import OutputError
+from compare.cli.options import RESULTS, AsJson
+from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
     from compare.questions.answer import Answer
 
 
-def hand_out(answer: Answer, folder: Path, as_json: bool, stopped: str = "") -> None:
-    """Write an answer and print it, as one JSON object or in tables and sentences.
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """The folder of an answer, which is checked before the work, and how the answer is printed."""
 
-    Args:
-        answer: what was found.
-        folder: where the files go.
-        as_json: print one JSON object.
-        stopped: sentence on where the work was interrupted, if it was; the command ends with it.
+    out: Annotated[Path, typer.Option(help="Folder for report, tables, pictures and data.")] = RESULTS
+    as_json: AsJson = False
 
-    Raises:
-        OutputError: a file cannot be written; the answer is printed all the same.
-    """
-    written: list[Path] = []
-    unwritten: OutputError | None = None
-    try:
-        written = answer.write(folder)
-    except OutputError as error:
-        unwritten = error
-    print_result(as_json, answer.data, written, lambda: _print(answer))
-    if unwritten is not None:
-        raise unwritten
-    if stopped:
-        end_interrupted(f"{stopped}; what was found is in {folder}")
+    def __post_init__(self) -> None:
+        """Refuse a folder that cannot be written to."""
+        writable_folder(self.out)
+
+    def take(self, answer: Answer, stopped: str = "") -> None:
+        """Write an answer and print it, as one JSON object or in tables and sentences.
+
+        Args:
+            answer: what was found.
+            stopped: sentence on where the work was interrupted, if it was; the command ends with it.
+
+        Raises:
+            OutputError: a file cannot be written; the answer is printed all the same.
+        """
+        written: list[Path] = []
+        try:
+            written = answer.write(self.out)
+        finally:
+            print_result(self.as_json, answer.data, written, lambda: _print(answer))
+        if stopped:
+            end_interrupted(f"{stopped}; what was found is in {self.out}")
 
 
 def _print(answer: Answer) -> None:

@@ -9,10 +9,9 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import progress_bar
-from compare.cli.interrupts import resumable
+from compare.cli.interrupts import interruptible
 from compare.cli.options import AsJson, NamedProblem, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -38,12 +37,12 @@ def certainty(
     from compare.questions.certainty.report import certainty_answer
     from compare.questions.certainty.study import certainty as study_certainty
 
-    folder = writable_folder(out)
+    output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
-    with resumable(folder), progress_bar("starts, search, proof", None) as advance:
+    with interruptible(out), progress_bar("starts, search, proof", None) as advance:
         study = study_certainty(
             loaded,
-            folder,
+            out,
             starts=starts,
             evaluations=evaluations,
             tolerance=tolerance,
@@ -51,4 +50,4 @@ def certainty(
             seed=seed,
             progress=advance,
         )
-    hand_out(certainty_answer(study), folder, as_json)
+    output.take(certainty_answer(study))

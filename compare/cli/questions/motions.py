@@ -8,14 +8,14 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
-from compare.cli.interrupts import resumable
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, Seed, names_in
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.interrupts import interruptible
+from compare.cli.options import Seed, names_in
+from compare.cli.questions.answers import Output
 
 
 @command
 def motions(
+    *,
     problem: Annotated[str, typer.Argument(metavar="[nao-ssp|nao-dsp]")] = "nao-ssp",
     orders: Annotated[
         str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
@@ -26,8 +26,7 @@ def motions(
     starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the floor below them.
 
@@ -40,11 +39,10 @@ def motions(
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
 
-    folder = writable_folder(out)
     study = tasks(problem, orders=names_in(orders), free_orders=names_in(free_orders), robot=robot, starts=starts)
-    with resumable(folder), progress_bar("motions", len(study)) as advance:
-        found = run(study, folder, seed=seed, progress=advance)
-    hand_out(motions_answer(found, problem), folder, as_json)
+    with interruptible(output.out), progress_bar("motions", len(study)) as advance:
+        found = run(study, output.out, seed=seed, progress=advance)
+    output.take(motions_answer(found, problem))
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))

@@ -9,9 +9,8 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, NaoPhase, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.options import NaoPhase, Seed
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -20,8 +19,7 @@ def motors(
     starts: Annotated[int, typer.Option(min=1, help="Random starts for each variant.")] = 10,
     seed: Seed = 0,
     problem: NaoPhase,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat of each motor.
 
@@ -30,11 +28,10 @@ def motors(
     from compare.questions.motors.report import motors_answer
     from compare.questions.motors.study import VARIANTS, motor_variants
 
-    folder = writable_folder(out)
     spec = problem.spec()
     with progress_bar("variants", len(VARIANTS)) as advance:
         found, stopped = until_interrupted(lambda: motor_variants(spec, starts=starts, seed=seed, progress=advance))
-    hand_out(motors_answer(found, spec.load()), folder, as_json, stopped)
+    output.take(motors_answer(found, spec.load()), stopped)
     failed = [variant for variant in found if not variant.success]
     if failed:
         fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))

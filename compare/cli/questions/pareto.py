@@ -9,11 +9,10 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import progress_bar
-from compare.cli.interrupts import resumable, whole
+from compare.cli.interrupts import interruptible
 from compare.cli.options import AsJson, NamedProblem, Seed
-from compare.cli.questions.answers import hand_out
+from compare.cli.questions.answers import Output
 from nlp_gait.errors import InputError
-from nlp_gait.files import writable_folder
 
 SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 
@@ -58,9 +57,9 @@ def pareto(
     three = len(names) == 2  # beside power
     if three and search and searches:
         raise InputError("three objectives are traded without searches; leave out --search")
-    folder = writable_folder(out)
+    output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
-    with whole() if three else resumable(folder), progress_bar("front", None) as advance:
+    with interruptible(None if three else out), progress_bar("front", None) as advance:
         if three:
             surface = pareto_surface(loaded, names, points=points, starts=starts, seed=seed, progress=advance)
             answer = surface_answer(surface)
@@ -68,7 +67,7 @@ def pareto(
             study = pareto_study(
                 loaded,
                 names[0],
-                folder,
+                out,
                 points=points,
                 starts=starts,
                 searches=searches,
@@ -77,4 +76,4 @@ def pareto(
                 progress=advance,
             )
             answer = front_answer(study, loaded)
-    hand_out(answer, folder, as_json)
+    output.take(answer)

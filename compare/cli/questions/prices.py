@@ -8,10 +8,9 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
-from compare.cli.interrupts import whole
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, NamedProblem, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.interrupts import interruptible
+from compare.cli.options import NamedProblem, Seed
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -21,8 +20,7 @@ def prices(
     seed: Seed = 0,
     checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are checked by solving again.")] = 3,
     problem: NamedProblem,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Say what each limit costs the optimum, and which error of masses, lengths or soles would change it most.
 
@@ -31,10 +29,9 @@ def prices(
     from compare.questions.prices.report import prices_answer
     from compare.questions.prices.study import prices as find
 
-    folder = writable_folder(out)
     spec = problem.spec()
-    with whole(), progress_bar("steps", None) as advance:
+    with interruptible(), progress_bar("steps", None) as advance:
         found = find(spec, starts=starts, seed=seed, checks=checks, progress=advance)
-    hand_out(prices_answer(found, spec.load()), folder, as_json)
+    output.take(prices_answer(found, spec.load()))
     if found.reason is not None:
         fail(f"no prices at this optimum: {found.reason}")

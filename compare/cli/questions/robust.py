@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, NaoPhase, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
-
-if TYPE_CHECKING:
-    from compare.questions.robust.playback import Played
-    from compare.questions.robust.study import Robust
+from compare.cli.options import NaoPhase, Seed
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -30,27 +24,25 @@ def robust(
     samples: Annotated[int, typer.Option(min=0, help="Random corners on which each result is checked.")] = 20,
     simulate: Annotated[bool, typer.Option(help="Play both gaits in MuJoCo on the worst robots (extra sim).")] = True,
     problem: NaoPhase,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """
-    from compare.questions.robust.playback import played
+    from compare.questions.robust.playback import Played, played
     from compare.questions.robust.report import robust_answer
-    from compare.questions.robust.study import boxes
+    from compare.questions.robust.study import Robust, boxes
     from compare.questions.robust.study import robust as find
 
     if simulate:
         from nlp_gait.simulation.engine import mujoco
 
         mujoco()
-    folder = writable_folder(out)
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
     found: list[Robust] = []
-    runs: Sequence[Played] = ()
+    runs: tuple[Played, ...] = ()
     stopped = ""
     try:
         with progress_bar("steps", None) as advance:
@@ -61,4 +53,4 @@ def robust(
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
             end_interrupted(f"{stopped}; nothing was written")
-    hand_out(robust_answer(problem.name, found, runs), folder, as_json, stopped)
+    output.take(robust_answer(problem.name, found, runs), stopped)

@@ -9,9 +9,8 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, Evaluations, NamedProblem, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.options import Evaluations, NamedProblem, Seed
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -23,8 +22,7 @@ def sweep(
     evaluations: Evaluations = 10_000,
     seed: Seed = 0,
     problem: NamedProblem,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
 
@@ -34,7 +32,6 @@ def sweep(
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
 
-    folder = writable_folder(out)
     spec = problem.spec()
     axes = [parse_axis(text) for text in over]
     with progress_bar("solves", count_solves(axes, algorithm)) as advance:
@@ -49,7 +46,7 @@ def sweep(
                 progress=advance,
             )
         )
-    hand_out(sweep_answer(points, spec.load(), algorithm), folder, as_json)
+    output.take(sweep_answer(points, spec.load(), algorithm))
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
-        end_interrupted(f"{stopped}; these are in {folder}{not_twice}")
+        end_interrupted(f"{stopped}; these are in {output.out}{not_twice}")

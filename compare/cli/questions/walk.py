@@ -10,9 +10,8 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import RESULTS, AnswerFolder, AsJson, ProblemOptions, Seed
-from compare.cli.questions.answers import hand_out
-from nlp_gait.files import writable_folder
+from compare.cli.options import CycleOptions, Seed
+from compare.cli.questions.answers import Output
 
 
 @command
@@ -28,9 +27,8 @@ def walk(
     ] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
-    problem: ProblemOptions,
-    out: AnswerFolder = RESULTS,
-    as_json: AsJson = False,
+    problem: CycleOptions,
+    output: Output,
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
@@ -46,7 +44,7 @@ def walk(
 
     if steps:
         mujoco()  # if it is missing, say so before the work
-    folder, axis = writable_folder(out), parse_axis(over)
+    axis = parse_axis(over)
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(
@@ -60,6 +58,6 @@ def walk(
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
-    hand_out(walk_answer(spec, gaits), folder, as_json, stopped)
+    output.take(walk_answer(spec, gaits), stopped)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)

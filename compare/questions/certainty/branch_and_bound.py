@@ -39,7 +39,8 @@ class Certificate:
 
     Attributes:
         objective: exact value of the incumbent, in the problem's sense.
-        bound: no x within the variables' bounds that the judge calls feasible has a better objective than this.
+        bound: no x within the variables' bounds that the judge calls feasible has a better objective than this; not finite
+            where the time limit came before any such bound.
         tolerance: requested distance of bound and objective, relative.
         closed: that distance was reached.
         boxes: number that were enclosed.

@@ -60,19 +60,17 @@ class Unseen:
 def cluster(problem: GaitProblem, ends: Ends) -> list[LocalOptimum]:
     """Distinct optima among the ends that converged and are feasible, best first."""
     kept = np.flatnonzero(ends.success)
-    order = kept[np.argsort(problem.objective.sign * ends.objective[kept], kind="stable")]
+    order: list[int] = kept[np.argsort(problem.objective.sign * ends.objective[kept], kind="stable")].tolist()
     scaled = ends.x / problem.scale
-    heads: list[int] = []
-    counts: list[int] = []
+
+    def same(i: int, head: int) -> bool:
+        near = abs(ends.objective[i] - ends.objective[head]) <= SAME_OBJECTIVE * abs(ends.objective[head])
+        return bool(near and np.max(np.abs(scaled[i] - scaled[head])) <= SAME_X)
+
+    counts: dict[int, int] = {}  # by the best end of each
     for i in order:
-        for k, head in enumerate(heads):
-            near = abs(ends.objective[i] - ends.objective[head]) <= SAME_OBJECTIVE * abs(ends.objective[head])
-            if near and np.max(np.abs(scaled[i] - scaled[head])) <= SAME_X:
-                counts[k] += 1
-                break
-        else:
-            heads.append(int(i))
-            counts.append(1)
+        best = next((head for head in counts if same(i, head)), i)
+        counts[best] = counts.get(best, 0) + 1
     return [
         LocalOptimum(
             objective=float(ends.objective[head]),
@@ -80,7 +78,7 @@ def cluster(problem: GaitProblem, ends: Ends) -> list[LocalOptimum]:
             share=count / len(kept),
             x=tuple(ends.x[head].tolist()),
         )
-        for head, count in zip(heads, counts, strict=True)
+        for head, count in counts.items()
     ]
 
 

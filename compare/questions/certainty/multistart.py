@@ -15,6 +15,7 @@ from compare.study.steps import Steps, fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
+from nlp_gait.files import without_nan
 from nlp_gait.problem import Array, GaitProblem
 
 BATCH = 250
@@ -75,8 +76,7 @@ def multistart(
     x, objective, success, status = zip(*rows, strict=True)
     return Ends(
         x=np.array(x, dtype=float),
-        # what is not finite is kept as null
-        objective=np.array([np.nan if value is None else value for value in objective], dtype=float),
+        objective=np.array(objective, dtype=float),  # NaN where null was kept
         success=np.array(success, dtype=bool),
         status=tuple(status),
     )
@@ -88,6 +88,5 @@ def _batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: i
     rows: list[list[Any]] = []
     for _ in range(count):
         end = solver.run(problem, problem.start_point(rng))
-        objective = end.objective if np.isfinite(end.objective) else None
-        rows.append([end.x.tolist(), objective, bool(end.success), end.status])
-    return rows
+        rows.append([end.x.tolist(), end.objective, bool(end.success), end.status])
+    return list(without_nan(rows))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
@@ -12,9 +11,6 @@ from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer
 from compare.questions.certainty.study import Certainty
 from compare.report.document import Figure, text_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
 DRAWN, LISTED = 20, 10  # best distinct optima
 

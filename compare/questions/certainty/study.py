@@ -22,6 +22,7 @@ from compare.study.task import plain_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
+from nlp_gait.files import without_nan
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
@@ -166,10 +167,9 @@ def certainty(
         return asdict(LongSearch(objective=value, evaluations=result.evaluations, gap=gap))
 
     def proven() -> dict[str, Any]:
-        certificate = certify(
-            problem, np.array(best.x), tolerance=tolerance, time_limit_s=time_limit_s, progress=progress
-        )
-        return {**asdict(certificate), "bound": certificate.bound if math.isfinite(certificate.bound) else None}
+        x = np.array(best.x)
+        found = certify(problem, x, tolerance=tolerance, time_limit_s=time_limit_s, progress=progress)
+        return dict(without_nan(asdict(found)))
 
     search = certificate = None
     if evaluations:
@@ -177,9 +177,7 @@ def certainty(
         search = decoded(LongSearch, steps("cma", inputs, searched))
     if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
-        kept = steps("certificate", inputs, proven)
-        bound = -problem.objective.sign * math.inf if kept["bound"] is None else kept["bound"]
-        certificate = decoded(Certificate, {**kept, "bound": bound})
+        certificate = decoded(Certificate, steps("certificate", inputs, proven))
     return Certainty(
         problem=problem,
         starts=starts,

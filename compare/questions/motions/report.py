@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import asdict
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.drawing.figures import COLOURS, legend_below, new_figure, style
 from compare.questions.answer import Answer, all_digits, table_of
@@ -13,10 +15,6 @@ from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.report.document import Figure, Table
 from nlp_gait.problem import Signals
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
@@ -66,7 +64,7 @@ def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
             Figure(name=f"{stem}-paths", caption=along, drawing=path_figure(found)),
             _numbers(stem, found),
         ),
-        data={"problem": problem, "motions": [m.to_json() for m in found]},
+        data={"problem": problem, "motions": [asdict(m) for m in found]},
     )
 
 
@@ -131,7 +129,7 @@ def power_figure(found: Sequence[Motion]) -> Drawing:
             if towards is not None:
                 axes.axhline(towards, color=colour, ls=":", lw=1.0, label=f"extrapolated, {towards:.3f} W")
         axes.set_xscale("symlog", linthresh=10)
-        ticks = sorted({0, 10, 20, 50, 100, 200, 500})
+        ticks = (0, 10, 20, 50, 100, 200, 500)
         axes.set_xticks(ticks, [str(tick) for tick in ticks])
         axes.set_xlim(-1, 1.3 * max(m.coefficients for m in found) + 5)
         axes.set_xlabel("coefficients beyond the paper's cubics")

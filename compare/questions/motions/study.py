@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.judge import Evaluation, evaluate
+from compare.judge import evaluate
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, fingerprint
@@ -61,7 +61,7 @@ class Motion:
     worst: str
     converged: int
     attempts: int
-    powers_W: tuple[float | None, ...] = field(default=())
+    powers_W: tuple[float | None, ...] = ()
     iterations: int
     time_s: float
     x: Mapping[str, float]
@@ -70,10 +70,6 @@ class Motion:
     def coefficients(self) -> int:
         """Variables beyond the paper's."""
         return sum("[" in name for name in self.x)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers."""
-        return asdict(self)
 
 
 def motions(study: Sequence[MotionTask], out: Path, *, seed: int = 0, progress: Progress = unwatched) -> list[Motion]:
@@ -122,7 +118,7 @@ def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int)
         power_W=verdict.indexes["power_W"],
         dense_power_W=dense["power_W"],
         objectives=_objectives(task, x),
-        worst=_worst(verdict),
+        worst="".join(f"{row.name} by {row.violation:.2g} {row.unit}" for row in verdict.dense_violations[:1]),
         converged=sum(start.success for start in solution.starts),
         attempts=len(solution.starts),
         powers_W=tuple(start.objective if start.success else None for start in solution.starts),
@@ -130,7 +126,7 @@ def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int)
         time_s=solution.time_s.solve,
         x=solution.x,
     )
-    return motion.to_json()
+    return asdict(motion)
 
 
 def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) -> Array | None:
@@ -138,18 +134,13 @@ def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) ->
     spans = SPANS[task.trajectory]
     solved = [m for m in reversed(earlier) if m.success and m.task.kind in (PLANNED, FREED)]
     for motion in solved:
-        if SPANS[motion.task.trajectory] <= spans and _contains(problem, motion.task, task.trajectory):
+        simpler = motion.task.spec.with_options(trajectory=task.trajectory)
+        if SPANS[motion.task.trajectory] <= spans and set(simpler.load().names) <= set(problem.names):
             return _embedded(motion.x, problem.names, spans)
     for motion in solved if task.kind == FREED else ():
         planned = motion.task.spec.load()
         return fitted_start(task.trajectory, planned, planned.check_x(motion.x))  # type: ignore[arg-type]
     return None
-
-
-def _contains(problem: GaitProblem, simpler: MotionTask, trajectory: str) -> bool:
-    """Whether a problem has all curves of a simpler one."""
-    same = simpler.spec.with_options(trajectory=trajectory).load()
-    return set(same.names) <= set(problem.names)
 
 
 def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array:
@@ -169,13 +160,6 @@ def _objectives(task: MotionTask, x: Array) -> dict[str, float]:
         return {}
     problems = [task.spec.with_options(objective=name).load() for name in SMOOTH]
     return {f"{p.objective.name} [{p.objective.unit}]": exact_model(p).at(x, p.p).cost for p in problems}
-
-
-def _worst(verdict: Evaluation) -> str:
-    if not verdict.dense_violations:
-        return ""
-    row = verdict.dense_violations[0]
-    return f"{row.name} by {row.violation:.2g} {row.unit}"
 
 
 def limit(powers: Sequence[float]) -> float | None:

@@ -11,7 +11,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.problems.nao.curves import SPANS
 
 PHASES = ("nao-ssp", "nao-dsp")
-FREE = {"nao-ssp": "nao-ssp-free", "nao-dsp": "nao-dsp-free"}
 ORDERS = tuple(SPANS)[:-1]
 FREE_ORDERS = ("spline-2", "spline-4", "spline-8", "spline-16")
 # Samples in each interval, so that no motion bends between them: with 4, free joints on 16 spans hide a tenth of their power.
@@ -83,5 +82,5 @@ def tasks(
     planned = [task(PLANNED, order, starts=starts) for order in orders]
     coarse = [task(COARSE_KIND, orders[-1], samples_per_interval=COARSE)]
     smooth = [task(SMOOTHED, SMOOTH_ORDER, objective=name) for name in SMOOTH if SMOOTH_ORDER in orders]
-    free = [task(FREED, order, FREE[phase], samples_per_interval=FREE_SAMPLES) for order in free_orders]
+    free = [task(FREED, order, f"{phase}-free", samples_per_interval=FREE_SAMPLES) for order in free_orders]
     return [*planned, *coarse, *smooth, *free]

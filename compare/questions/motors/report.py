@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from compare.drawing.figures import legend_below, new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
@@ -14,9 +14,6 @@ from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.motors.study import Variant
 from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
 STILL = 1e-4  # of a variable's range
 

@@ -16,7 +16,6 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.registry import problem_maker
-from nlp_gait.problem.solution import Solution
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.
 VARIANTS: Mapping[str, str] = {
@@ -102,39 +101,29 @@ def motor_variants(
             problem = spec.with_options(motors=features).load() if features else published
             first = published.check_x(found[0].x) if found else None
             solution = solve(problem, starts=starts, seed=seed, x0=first)
-            found.append(_variant(name, problem, solution, first, published, limited))
+            x = problem.check_x(solution.x)
+            unmoved = x if first is None else first
+            moves = np.abs(x - unmoved) / problem.scale
+            unchanged = exact_model(problem).at(unmoved, problem.p)
+            found.append(
+                Variant(
+                    name=name,
+                    features=features,
+                    success=solution.success,
+                    status=solution.status,
+                    power_W=solution.objective,
+                    unchanged_power_W=unchanged.cost,
+                    unchanged_violation=unchanged.violation,
+                    published_power_W=exact_model(published).at(x, published.p).cost,
+                    x=solution.x,
+                    moved=(float(moves.max()), problem.names[int(moves.argmax())]),
+                    uses=limit_uses(limited, x),
+                )
+            )
             progress(name)
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted after {len(found)} of {len(VARIANTS)} variants", tuple(found)) from None
     return tuple(found)
-
-
-def _variant(
-    name: str,
-    problem: GaitProblem,
-    solution: Solution,
-    first: Array | None,
-    published: GaitProblem,
-    limited: GaitProblem,
-) -> Variant:
-    """A variant from its solution, compared with the published optimum ``first`` (n,); None where this is the published one."""
-    x = problem.check_x(solution.x)
-    first = x if first is None else first
-    moves = np.abs(x - first) / problem.scale
-    unchanged = exact_model(problem).at(first, problem.p)
-    return Variant(
-        name=name,
-        features=VARIANTS[name],
-        success=solution.success,
-        status=solution.status,
-        power_W=solution.objective,
-        unchanged_power_W=unchanged.cost,
-        unchanged_violation=unchanged.violation,
-        published_power_W=exact_model(published).at(x, published.p).cost,
-        x=solution.x,
-        moved=(float(moves.max()), problem.names[int(moves.argmax())]),
-        uses=limit_uses(limited, x),
-    )
 
 
 def limit_uses(limited: GaitProblem, x: Array) -> dict[str, Use]:

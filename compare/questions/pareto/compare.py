@@ -103,23 +103,21 @@ def challenge(
     criterion: CompetingObjective,
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
-    most: int = MOST_CHALLENGES,
     progress: Progress = unwatched,
 ) -> Challenge:
     """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
 
-    Of more points than ``most``, those are taken that lie lowest over the straight lines between the front's points.
+    Of more than a thousand points, those are taken that lie lowest over the straight lines between the front's points.
 
     Args:
         free: the problem without a demand on the criterion.
         criterion: beside power.
         front: the true one, as far as it is known.
         points: of searches.
-        most: largest number of points to solve for.
         progress: told the point.
     """
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
-    lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:most]
+    lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:MOST_CHALLENGES]
     solved: list[FrontPoint] = []
     excess: list[float] = []
     infeasible = moved = 0

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
@@ -12,10 +12,6 @@ from compare.questions.answer import Answer, all_digits
 from compare.questions.pareto.study import ParetoStudy
 from compare.report.document import Figure, Table, text_table
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 SEARCH_COLOURS = {"NSGA2": COLOURS["ga"], "CMOPSO": COLOURS["pso"]}
 SEARCH_NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO"}

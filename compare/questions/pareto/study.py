@@ -47,16 +47,14 @@ class ParetoStudy:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; the points that searches found stay in their files."""
-        outcome = None
-        if self.challenge is not None:
-            outcome = {key: value for key, value in asdict(self.challenge).items() if key != "front"}
+        answers = {} if self.challenge is None else asdict(self.challenge)
         return {
             **plain_problem(self.problem),
             "criterion": {"name": self.criterion.name, "unit": self.criterion.unit},
             "front": [asdict(point) for point in self.front],
             "knees": asdict(self.bends),
             "searches": [asdict(row) for row in self.qualities],
-            "challenge": outcome,
+            "challenge": {key: value for key, value in answers.items() if key != "front"} or None,
         }
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
 
+import matplotlib
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure as Drawing
 
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label
@@ -20,9 +23,6 @@ from compare.study.task import plain_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,9 +144,6 @@ def surface_figure(surface: Surface) -> Drawing:
     """Lines of equal demand on the second criterion, coloured by it: power over the first one."""
     first, second = surface.criteria
     with style():
-        import matplotlib
-        from matplotlib.colors import Normalize
-
         figure = new_figure(5.6, 3.4)
         axes = figure.subplots()
         levels = sorted({p.demanded[1] for p in surface.points})
@@ -158,7 +155,7 @@ def surface_figure(surface: Surface) -> Drawing:
         axes.set_xlabel(axis_label(first.name, first.unit))
         axes.set_ylabel("least power [W]")
         axes.set_ylim(bottom=0.0)
-        shades = matplotlib.colors.ListedColormap(colours(np.linspace(0.0, 0.9, 256)))
-        bar = figure.colorbar(matplotlib.cm.ScalarMappable(norm, shades), ax=axes)
+        shades = ListedColormap(colours(np.linspace(0.0, 0.9, 256)))
+        bar = figure.colorbar(ScalarMappable(norm, shades), ax=axes)
         bar.set_label(f"at least this {axis_label(second.name, second.unit)}")
     return figure

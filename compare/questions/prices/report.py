@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import heading, with_unit
 from compare.drawing.figures import new_figure, style
@@ -13,10 +15,6 @@ from compare.questions.answer import Answer, all_digits
 from compare.questions.prices.price import Price, Prices
 from compare.report.document import Figure, Part, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 SHOWN = 10  # bars of each kind
 LISTED = 12  # rows of the robot's table; all are in the CSV file
@@ -85,14 +83,16 @@ def _numbers(stem: str, found: Prices) -> Table:
         *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
         *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in found.x)),
     ]
-    rows: list[list[Value]] = []
-    for kind, group in (("limit", found.limits), ("robot", found.robot)):
-        for price in group:
-            moves = [None if price.x is None else price.x[name] for name in found.x]
-            numbers = (price.value, price.slope, price.step, price.per_step, price.resolved)
-            rows.append(
-                [kind, price.name, price.unit, *numbers, *(price.one_step or (None, None)), *price.reach, *moves]
-            )
+    rows: list[list[Value]] = [
+        [
+            *(kind, price.name, price.unit, price.value, price.slope, price.step, price.per_step, price.resolved),
+            *(price.one_step or (None, None)),
+            *price.reach,
+            *(None if price.x is None else price.x[name] for name in found.x),
+        ]
+        for kind, group in (("limit", found.limits), ("robot", found.robot))
+        for price in group
+    ]
     return all_digits(stem, header, rows)
 
 

@@ -37,7 +37,6 @@ MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 class Solved(NamedTuple):
     """An optimum with the outcome near it, from which neighbours are solved."""
 
-    problem: GaitProblem
     near: Outcome
     optimum: Optimum
 
@@ -54,7 +53,7 @@ def solved(problem: GaitProblem, starts: int, seed: int, solver: Solver | None =
             f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
             "try more --starts, or relax the limits that `nlp-gait solve` names"
         )
-    return Solved(problem, near, optimum(problem, near))
+    return Solved(near, optimum(problem, near))
 
 
 def prices(
@@ -183,7 +182,8 @@ def _checked(base: Solved, price: Price, progress: Progress, changed: Callable[[
     turn = min(abs(reach) for reach in price.reach)
     small = min(CHECK_SHARE * price.step, max(turn / 2, LEAST_CHECK_SHARE * price.step))
     low, high, less, more = (_neighbour(base, changed(d)) for d in (-small, small, -price.step, price.step))
-    sign, objective = base.problem.objective.sign, base.optimum.objective
+    problem, objective = base.optimum.problem, base.optimum.objective
+    sign = problem.objective.sign
     steps = tuple(None if end is None else sign * end.cost - objective for end in (less, more))
     checked = replace(price, one_step=(steps[0], steps[1]))
     if low is None or high is None:
@@ -191,7 +191,7 @@ def _checked(base: Solved, price: Price, progress: Progress, changed: Callable[[
     return replace(
         checked,
         resolved=sign * (high.cost - low.cost) / (2 * small),
-        x_error=_x_error(base.problem, price, low, high, small),
+        x_error=_x_error(problem, price, low, high, small),
     )
 
 

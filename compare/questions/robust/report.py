@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import millimetres
 from compare.drawing.figures import legend_below, new_figure, style
@@ -16,9 +16,6 @@ from compare.questions.robust.family import Worst
 from compare.questions.robust.playback import Played
 from compare.questions.robust.study import Robust
 from compare.report.document import Figure, Table, Value
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
 NOMINAL, ROBUST, WORST = "0.72", "#0072B2", "#D55E00"
 LISTED = 4  # links with another mass that are named in a table

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
@@ -15,10 +17,6 @@ from compare.questions.answer import Answer, all_digits
 from compare.questions.sweep.study import SweepPoint
 from compare.report.document import Figure, Table, Value, text_table
 from nlp_gait.problem import GaitProblem
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 
 def sweep_answer(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Answer:
@@ -69,8 +67,6 @@ def sweep_figure(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: 
     units, objective = units_of(problem), problem.objective
     lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
     with style():
-        import matplotlib
-
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(lines)))
         figure = new_figure(4.2 if not others else 6.3, 3.0)
         axes = figure.subplots()

@@ -16,7 +16,6 @@ from compare.study.runner import run_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
-from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
@@ -111,23 +110,26 @@ def sweep(
     names = [axis.name for axis in axes]
     if len(set(names)) < len(names):
         raise InputError(f"each axis must be named once, got {', '.join(names)}")
-    walk = _snake(axes)
-    named = [dict(zip(names, at, strict=True)) for at in walk]
+    walk = [dict(zip(names, at, strict=True)) for at in _snake(axes)]
     problem = spec.load()
-    specs = [replace(spec, values=dict(placed(problem, at).values)) for at in named]  # all checked before the work
+    specs = [replace(spec, values=dict(placed(problem, at).values)) for at in walk]  # all checked before the work
     tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
     check_task(tasks[0])
-    if not tasks[0].is_search:
-        solutions, sentence = _solutions([s.load() for s in specs], tasks[0].solver(), starts, seed, progress)
-        points = [None if s is None else _solved_point(at, s) for at, s in zip(named, solutions, strict=True)]
-    else:
-        points, sentence = _search_points(named, tasks, progress)
-    found = dict(zip(walk, points, strict=False))
-    grid = [found.get(at) for at in itertools.product(*(axis.values for axis in axes))]
-    known = [point for point in grid if point is not None]
+    ends: Sequence[Solution | RunRecord | None]
+    sentence = ""
+    try:
+        if tasks[0].is_search:
+            ends = _searched(tasks, progress)
+        else:
+            problems, solver = [s.load() for s in specs], tasks[0].solver()
+            ends = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
+    except Interrupted as interrupt:
+        ends, sentence = cast("list[Solution | RunRecord | None]", interrupt.partial), interrupt.sentence
+    found = {tuple(at.values()): _point(at, end) for at, end in zip(walk, ends, strict=False) if end is not None}
+    grid = [found[at] for at in itertools.product(*(axis.values for axis in axes)) if at in found]
     if sentence:
-        raise Interrupted(sentence, known)
-    return known
+        raise Interrupted(sentence, grid)
+    return grid
 
 
 def count_solves(axes: Sequence[Axis], algorithm: str) -> int:
@@ -153,56 +155,41 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
     return points
 
 
-def _solutions(
-    problems: Sequence[GaitProblem], solver: Solver, starts: int, seed: int, progress: Progress
-) -> tuple[Sequence[Solution | None], str]:
-    """Solutions along the walk, and how far it came if it was interrupted."""
+def _searched(tasks: Sequence[Task], progress: Progress) -> list[RunRecord]:
+    """Records along the walk; an interrupt carries those that were made until then."""
+    records: list[RunRecord] = []
     try:
-        found = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
-        return found, ""
-    except Interrupted as interrupt:
-        return cast("list[Solution | None]", interrupt.partial), interrupt.sentence
-
-
-def _search_points(
-    named: Sequence[Mapping[str, float]], tasks: Sequence[Task], progress: Progress
-) -> tuple[list[SweepPoint | None], str]:
-    """Points along the walk, and how far it came if it was interrupted."""
-    points: list[SweepPoint | None] = []
-    try:
-        for at, task in zip(named, tasks, strict=True):
+        for task in tasks:
             with remembered_interrupts() as check:
                 record = run_task(task)
                 progress("")
                 check()
-            points.append(_search_point(at, record))
+            records.append(record)
     except KeyboardInterrupt:
-        return points, f"interrupted after {len(points)} of {len(tasks)} points"
-    return points, ""
+        raise Interrupted(f"interrupted after {len(records)} of {len(tasks)} points", records) from None
+    return records
 
 
-def _solved_point(at: Mapping[str, float], solution: Solution) -> SweepPoint:
-    return SweepPoint(
-        at=at,
-        objective=solution.objective,
-        feasible=solution.success,
-        status=solution.status,
-        x=solution.x,
-        violation=solution.violation,
-        evaluations=solution.evaluations.f,
-        time_s=solution.time_s.solve,
-    )
-
-
-def _search_point(at: Mapping[str, float], record: RunRecord) -> SweepPoint:
-    verdict = record.verdict
+def _point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
+    if isinstance(end, Solution):
+        return SweepPoint(
+            at=at,
+            objective=end.objective,
+            feasible=end.success,
+            status=end.status,
+            x=end.x,
+            violation=end.violation,
+            evaluations=end.evaluations.f,
+            time_s=end.time_s.solve,
+        )
+    verdict = end.verdict
     return SweepPoint(
         at=at,
         objective=verdict.objective,
         feasible=verdict.feasible,
-        status=record.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
-        x=record.x,
+        status=end.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
+        x=end.x,
         violation=verdict.violation,
-        evaluations=record.evaluations["f"],
-        time_s=record.time_s.solve,
+        evaluations=end.evaluations["f"],
+        time_s=end.time_s.solve,
     )

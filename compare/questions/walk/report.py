@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import millimetres, with_unit
 from compare.drawing.figures import new_figure, style
@@ -20,10 +21,6 @@ from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.steps import walk
 from nlp_gait.simulation.walking import Walk
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
-
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
@@ -31,22 +28,10 @@ LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 # Indexes of the table of numbers.
 INDEXES = (
-    "power_W",
-    "energy_J_per_m",
-    "cost_of_transport",
-    "speed_m_s",
-    "step_length_m",
-    "ssp_power_W",
-    "dsp_power_W",
-    "ssp_dbm_x_min_m",
-    "ssp_dbm_y_min_m",
-    "ssp_dbm_x_mean_m",
-    "ssp_dbm_y_mean_m",
-    "dsp_dbm_x_mean_m",
-    "dsp_dbm_y_mean_m",
-    "touch_down_torque_jump_Nm",
-    "lift_off_torque_jump_Nm",
-)
+    "power_W energy_J_per_m cost_of_transport speed_m_s step_length_m ssp_power_W dsp_power_W ssp_dbm_x_min_m "
+    "ssp_dbm_y_min_m ssp_dbm_x_mean_m ssp_dbm_y_mean_m dsp_dbm_x_mean_m dsp_dbm_y_mean_m "
+    "touch_down_torque_jump_Nm lift_off_torque_jump_Nm"
+).split()
 # What it says of the walk in the engine, and of the measurements there.
 WALKED = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
 MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
@@ -56,7 +41,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     """What walking costs along the axis, from at least one gait."""
     (name,), problem = gaits[0].found.at, spec.load()
     feasible = [gait for gait in gaits if gait.found.feasible]
-    results = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
+    placed = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
     cheapest_cycles = table_of(
         "Cheapest cycles",
         feasible,
@@ -92,16 +77,8 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
         title=f"{problem.name}: cheapest cycles over {name}",
         parts=parts,
         data={"gaits": [gait.to_json() for gait in gaits]},
-        results={
-            stem: {**plain_problem(result.problem), "x": result.problem.by_name(result.x)}
-            for stem, result in results.items()
-        },
+        results={file: {**plain_problem(r.problem), "x": r.problem.by_name(r.x)} for file, r in placed.items()},
     )
-
-
-def _phase(duration: str) -> str:
-    """A phase by the variable that holds its duration, for example ``single support``."""
-    return name_in_words(duration, "s").removesuffix(" time")
 
 
 def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
@@ -166,7 +143,8 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
         lengths.set_ylabel("step\n[mm]")
         lengths.set_ylim(bottom=0.0)
         for time, colour in zip(problem.durations, (LEFT, RIGHT), strict=True):
-            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=_phase(time))
+            phase = name_in_words(time, "s").removesuffix(" time")  # for example "single support"
+            times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=phase)
         times.set_ylabel("time [s]")
         times.set_ylim(bottom=0.0)
         times.legend(ncols=2)

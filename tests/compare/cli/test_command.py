@@ -15,7 +15,7 @@ from nlp_gait.errors import InputError
 
 RUN = CliRunner()
 SHARED = ("--robot", "--intervals", "--derivatives", "--option", "--set", "--fix")
-# By command, the argument that it needs; all of them build a problem.
+# Commands that build any problem.
 OF_A_PROBLEM = (
     "evaluate",
     "solve",
@@ -27,7 +27,6 @@ OF_A_PROBLEM = (
     "certainty",
     "motors",
     "robust",
-    "walk",
 )
 
 
@@ -78,10 +77,17 @@ def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, wo
 
 
 @pytest.mark.parametrize("name", OF_A_PROBLEM)
-def test_every_command_that_builds_a_problem_takes_the_same_six_options(name: str) -> None:
+def test_every_command_that_builds_any_problem_takes_the_same_six_options(name: str) -> None:
     options = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands[name].params}  # type: ignore[attr-defined]
     known = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands["solve"].params}  # type: ignore[attr-defined]
     assert [options[option].help for option in SHARED] == [known[option].help for option in SHARED]
+
+
+def test_walk_takes_those_that_a_cycle_has() -> None:
+    options = [parameter.opts[0] for parameter in typer.main.get_command(app).commands["walk"].params]  # type: ignore[attr-defined]
+    assert [option for option in SHARED if option not in options] == ["--derivatives"]
+    refused = RUN.invoke(app, ["walk", "--derivatives", "analytic"])
+    assert refused.exit_code == 2 and "No such option" in refused.stderr and "--derivatives" in refused.stderr
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.cli.questions.answers import hand_out
+from compare.cli.questions.answers import Output
 from compare.questions.answer import Answer, all_digits, optima_table
 from nlp_gait.errors import OutputError
 
@@ -38,7 +38,7 @@ def test_an_answer_is_a_page_a_table_with_every_digit_and_plain_data(tmp_path: P
 
 
 def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    hand_out(ANSWER, tmp_path, as_json=False)
+    Output(out=tmp_path).take(ANSWER)
     printed = capsys.readouterr().out
     for words in ("walk: the question", "One third is enough.", "A remark.", "0.33333", "wrote "):
         assert words in printed
@@ -46,6 +46,8 @@ def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pyt
 
 
 def test_an_answer_that_cannot_be_written_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = Output(out=tmp_path / "gone", as_json=True)
+    output.out.rmdir()
     with pytest.raises(OutputError, match="cannot write"):
-        hand_out(ANSWER, tmp_path / "nowhere", as_json=True)
+        output.take(ANSWER)
     assert json.loads(capsys.readouterr().out) == {"a_m": 1.0 / 3.0, "bound": None, "files": []}

@@ -254,7 +254,8 @@ def test_study_file(tmp_path: Path) -> None:
     [
         (("runs = 3", "runs = 0"), "runs must be a whole number from 1 to 100000, got 0"),
         (("runs = 3", "runs = true"), "runs must be a whole number"),
-        (("runs = 3", "run = 3"), "unknown key.*'run'"),
+        (("runs = 3", "run = 3"), "unknown key 'run'; did you mean 'runs'"),
+        (("polish = true", "polished = true"), "unknown key of solver\\[1\\] 'polished'; did you mean 'polish'"),
         (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
         (("target = 0.9", "target = nan"), "finite numbers"),
         (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
