@@ -1,40 +1,23 @@
 """The command line as scripts use it."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tests.compare.cli.calls import as_json, is_one_sentence, nlp_gait, one_sentence, process
 
 PSO_OF_THE_PAPER = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
 # Verified by two independent implementations to nine digits; the paper's variables are rounded, the values are not.
 AGREEMENT = 2e-6
 
 
-def nlp_gait(*arguments, status=0, **environment):
-    import os
-
-    done = subprocess.run(
-        [sys.executable, "-m", "nlp_gait", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env={**os.environ, **environment},
-    )
-    assert done.returncode == status, f"{arguments}: {done.returncode}\n{done.stdout}\n{done.stderr}"
-    assert "Traceback" not in done.stderr
-    return done
-
-
-def as_json(*arguments, **options):
-    return json.loads(nlp_gait(*arguments, "--json", **options).stdout)
-
-
 def test_evaluate_prints_what_scripts_rely_on(tmp_path):
     signals = tmp_path / "signals.npz"
-    result = as_json("evaluate", "nao-ssp", "--x", PSO_OF_THE_PAPER, "--signals", str(signals))
+    done = process("evaluate", "nao-ssp", "--x", PSO_OF_THE_PAPER, "--signals", str(signals), "--json")
+    assert done.returncode == 0 and done.stderr == ""
+    result = json.loads(done.stdout)
     assert result["problem"] == "nao-ssp" and result["robot"] == "nao-v5"
     assert list(result["x"])[:2] == ["hip_height_m", "hip_vz_start_m_s"]
     assert result["objective"] == {"name": "power", "value": pytest.approx(0.866844, abs=AGREEMENT), "unit": "W"}
@@ -129,10 +112,15 @@ def test_same_seed_same_result_with_one_or_two_processes():
     ],
 )
 def test_bad_input_is_one_sentence(arguments, words):
-    error = nlp_gait(*arguments, status=1).stderr
-    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    error = one_sentence(*arguments)
     for word in words:
         assert word in error
+
+
+def test_a_process_that_refuses_ends_with_status_1_and_one_sentence():
+    done = process("solve", "nao-ssp", "--fix", "swing_hight_m=0.02")
+    assert done.returncode == 1 and done.stdout == ""
+    assert is_one_sentence(done.stderr) and "swing_height_m" in done.stderr
 
 
 def test_unreachable_pose_is_evaluated_and_named():
@@ -153,7 +141,6 @@ def test_help_has_examples():
 
 
 def test_out_is_checked_before_the_work(tmp_path):
-    blocked = Path(tmp_path, "file")
+    blocked: Path = tmp_path / "file"
     blocked.write_text("")
-    error = nlp_gait("search", "nao-ssp", "--evaluations", "100000000", "--out", str(blocked), status=1).stderr
-    assert "cannot write" in error
+    assert "cannot write" in one_sentence("search", "nao-ssp", "--evaluations", "100000000", "--out", blocked)

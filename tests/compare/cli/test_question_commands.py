@@ -8,14 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from compare.cli import app
 from compare.questions.motors import study as motors
 from compare.questions.pareto import front as pareto_front
 from compare.questions.prices import study as prices
 from compare.questions.robust import study as robust
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
+from tests.compare.cli.calls import nlp_gait, one_sentence
 
 # Three free variables, so that both the front and a search of one generation take no time.
 SMALL = ["nao-ssp", "--intervals", "4", "--starts", "1", "--seed", "0"]
@@ -29,18 +28,6 @@ FIXED = {
 }
 PARETO = ["pareto", *SMALL, "--points", "5", *(f"--fix={name}={value}" for name, value in FIXED.items())]
 CERTAINTY = ["certainty", "walk12", "--starts", "4", "--evaluations", "0"]
-
-
-def nlp_gait(*arguments: str | Path, status: int = 0) -> Result:
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert done.exit_code == status, f"{arguments}: {done.exit_code} {done.exception!r}\n{done.output}"
-    return done
-
-
-def one_sentence(*arguments: str | Path, status: int = 1) -> str:
-    error = nlp_gait(*arguments, status=status).stderr
-    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
-    return error
 
 
 def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:

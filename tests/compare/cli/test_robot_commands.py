@@ -1,14 +1,12 @@
 """``simulate``, ``export`` and ``animate`` as scripts use them."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from compare.cli import app
+from tests.compare.cli.calls import nlp_gait, one_sentence, process
 
 X = {
     "hip_height_m": 0.31,
@@ -29,12 +27,6 @@ def gait(tmp_path):
     return path
 
 
-def nlp_gait(*arguments, status=0):
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert done.exit_code == status, f"{arguments}: {done.exit_code} {done.exception!r}\n{done.output}"
-    return done
-
-
 def test_simulate_reports_and_writes_its_folder(gait, tmp_path):
     pytest.importorskip("mujoco")
     out = tmp_path / "out"
@@ -49,8 +41,7 @@ def test_simulate_reports_and_writes_its_folder(gait, tmp_path):
 
 def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    error = nlp_gait("simulate", gait, status=1).stderr
-    assert error.count("\n") == 1 and "pip install 'nlp-gait[sim]'" in error
+    assert "pip install 'nlp-gait[sim]'" in one_sentence("simulate", gait)
 
 
 @pytest.mark.parametrize(
@@ -67,8 +58,7 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
 def test_bad_input_is_one_sentence(gait, arguments, words):
     if arguments[0] == "simulate":
         pytest.importorskip("mujoco")
-    error = nlp_gait(*(gait if a == "GAIT" else a for a in arguments), status=1).stderr
-    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    error = one_sentence(*(gait if a == "GAIT" else a for a in arguments))
     for word in words:
         assert word in error
 
@@ -90,8 +80,7 @@ def test_a_film_is_made_without_a_display(gait, tmp_path):
     pytest.importorskip("mujoco")
     film = tmp_path / "film.gif"
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
-    command = [sys.executable, "-m", "nlp_gait", "simulate", str(gait), "--video", str(film), "--fps", "4"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    done = process("simulate", gait, "--video", film, "--fps", "4")
     if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
         pytest.skip("no off-screen graphics here")
     assert done.returncode == 0, done.stderr

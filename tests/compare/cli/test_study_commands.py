@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.compare.cli.test_contract import as_json, nlp_gait
+from tests.compare.cli.calls import as_json, one_sentence, process
 
 STUDY = """
 runs = 1
@@ -28,7 +28,7 @@ settings = {population = 20}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
     (out / "study.toml").write_text(STUDY)
-    done = as_json("compare", "--config", str(out / "study.toml"), "--out", str(out / "out"))
+    done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")
     assert [s["algorithm"] for s in done["problems"]["nao-ssp"]] == ["ipopt", "little-pso"]
     assert all(Path(file).stat().st_size for file in done["files"])
     return out / "out"
@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_resume_needs_no_other_option_and_keeps_everything(folder: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
     assert len(before) == 2
-    nlp_gait("compare", "--resume", "--out", str(folder), "--jobs", "1")
+    assert process("compare", "--resume", "--out", folder, "--jobs", "1").returncode == 0
     assert {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")} == before
     sessions = json.loads((folder / "study.json").read_text())["sessions"]
     assert len(sessions) >= 2 and "--resume" in sessions[-1]["command"] and sessions[-1]["machine"]["processor"]
@@ -70,8 +70,7 @@ def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> N
 )
 def test_wrong_use_is_one_sentence(arguments: list[str], words: list[str], folder: Path, tmp_path: Path) -> None:
     filled = [a.replace("{folder}", str(folder)).replace("{new}", str(tmp_path)) for a in arguments]
-    error = nlp_gait(*filled, status=1).stderr
-    assert error.startswith("nlp-gait: ") and error.count("\n") == 1
+    error = one_sentence(*filled)
     for word in words:
         assert word in error
     assert not list(tmp_path.rglob("*.json"))

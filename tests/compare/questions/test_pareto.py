@@ -81,16 +81,14 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
 
 
 def test_prices_are_the_fronts_slopes() -> None:
-    problem = nlp_gait.load("nao-ssp")
+    problem = nlp_gait.load("nao-ssp", intervals=4)
     for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
         beside = competing_objective(name, problem)
         free = beside.freed(problem)
-        below, here, above = (
-            nlp_gait.solve(beside.limited(free, at + k * step), starts=1, x0=X).objective for k in (-1, 0, 1)
-        )
-        solution = nlp_gait.solve(beside.limited(free, at), starts=1, x0=X)
-        assert below < here < above
-        assert beside.price(solution) == pytest.approx((above - below) / (2 * step), rel=SLOPE_TOLERANCE)
+        below, here, above = (nlp_gait.solve(beside.limited(free, at + k * step), starts=1, x0=X) for k in (-1, 0, 1))
+        assert below.objective < here.objective < above.objective
+        slope = (above.objective - below.objective) / (2 * step)
+        assert beside.price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
 
 
 def test_objectives_are_parsed() -> None:

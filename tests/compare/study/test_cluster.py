@@ -24,8 +24,8 @@ pytest.importorskip("distributed")
 STUDY = StudySettings(
     problems=(ProblemSpec(name="nao-ssp"),),
     solvers=(SolverSpec(algorithm="pso", polish=True), SolverSpec(algorithm="ga")),
-    runs=4,
-    stop=Stop(evaluations=2000),
+    runs=3,
+    stop=Stop(evaluations=500),
 )
 
 

@@ -61,7 +61,7 @@ def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
 def test_other_nlp_solvers_print_nothing() -> None:
     program = (
         "from compare.study.runner import run_task; from compare.study.task import ProblemSpec, Task\n"
-        "run_task(Task(problem=ProblemSpec(name='nao-ssp'), algorithm='sqpmethod'))"
+        "run_task(Task(problem=ProblemSpec(name='walk12'), algorithm='sqpmethod'))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120

@@ -173,7 +173,8 @@ def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
-    tasks = tuple(Task(problem=SSP, algorithm=Broken(deadly=True), run=run) for run in range(2))
+    light = ProblemSpec(name="walk12")  # six workers build it
+    tasks = tuple(Task(problem=light, algorithm=Broken(deadly=True), run=run) for run in range(2))
     with pytest.raises(GaitError, match="worker process died 3 times in a row"):
         run_study(Study(tasks=tasks, folder=tmp_path, jobs=2))
 
