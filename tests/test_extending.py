@@ -129,6 +129,7 @@ class MostHipSpeed(Part):
         return Contribution(rows=(row,))
 
 
+@pytest.mark.slow
 def test_a_part_of_a_gait_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
     """It joins the paper's parts of single support, limits the motion there, and its limit is a parameter."""
     from nlp_gait.problems.nao import single_support
@@ -199,6 +200,7 @@ def test_a_question_is_one_folder_and_one_line() -> None:
     assert done.exit_code == 0 and done.output.strip() == "dbm_y_mean"
 
 
+@pytest.mark.slow
 def test_a_change_of_mathematics_goes_through_one_door() -> None:
     """The example of the guide: a price on time, as an added parameter."""
     price = Parameter(name="price_W_s", unit="W/s", default=1.0, description="of a second", minimum=0.0)
