@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from functools import partial
@@ -82,7 +83,13 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
     with children_ignore_interrupts():
         results = parallel(delayed(_numbered)(number, call) for number, call in calls.items())
-    yield from results
+    try:
+        for result in results:  # noqa: UP028  `yield from` would close them before what is below
+            yield result
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # joblib tells of the calls that end with whoever stops asking
+            results.close()
 
 
 def _numbered(number: int, call: Callable[[], T]) -> tuple[int, T]:

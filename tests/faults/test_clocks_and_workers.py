@@ -6,7 +6,9 @@ import itertools
 import os
 import signal
 import time
+import warnings
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,6 +18,7 @@ import nlp_gait
 from compare.study.record import read_record
 from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.workers import side_by_side
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.files import remove_leftovers
@@ -83,3 +86,14 @@ def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
     )
     assert [record.x for record in records] == [record.x for record in run_study(Study(tasks=healthy))]
     assert len([read_record(path) for path in (tmp_path / "study").rglob("*.json")]) == 6
+
+
+@pytest.mark.slow
+def test_whoever_stops_asking_hears_nothing_of_what_is_cancelled() -> None:
+    """Ctrl-C in a study is one sentence: joblib's warning of cancelled calls is not a second one."""
+    results = side_by_side({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
+    assert next(results) == (0, None)
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        results.close()  # type: ignore[attr-defined]
+    assert not heard
