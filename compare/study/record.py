@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.judge import Evaluation
-from compare.study.task import LABEL
+from compare.study.task import LABEL, Task
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, without_nan
@@ -148,6 +148,18 @@ class RunRecord:
     active_constraints: tuple[ActiveConstraint, ...]
     history: History
     time_s: Times
+
+    @classmethod
+    def of(cls, task: Task, **found: Any) -> RunRecord:
+        """Record of a task, with what its run found: the fields from ``settings`` on."""
+        return cls(
+            problem=task.problem.title,
+            algorithm=task.title,
+            run=task.run,
+            seed=task.run_seed,
+            definition=task.definition(),
+            **found,
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""

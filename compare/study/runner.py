@@ -29,12 +29,8 @@ def attempt(task: Task, start: RunRecord | None = None, run: Run = run_task) -> 
     try:
         return run(task, start)
     except Exception as error:
-        return RunRecord(
-            problem=task.problem.title,
-            algorithm=task.title,
-            run=task.run,
-            seed=task.run_seed,
-            definition=task.definition(),
+        return RunRecord.of(
+            task,
             settings={},
             status=f"failed: {type(error).__name__}: {error}",
             success=False,

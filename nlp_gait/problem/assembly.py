@@ -10,6 +10,8 @@ from typing import Any, Generic, Literal, TypeAlias, TypeVar
 import casadi as ca
 from casadi import DM, MX, SX
 
+from nlp_gait.errors import unknown
+
 Expression = TypeVar("Expression", MX, SX, DM)
 
 
@@ -145,7 +147,9 @@ class PointOf(Generic[Expression]):
         return cls(x=x, p=p, positions=positions | {name: ("x", i) for i, name in enumerate(variables)})
 
     def __getitem__(self, name: str) -> Expression:
-        """Value of a variable or a parameter."""
+        """Value of a variable or a parameter; raises UnknownNameError."""
+        if name not in self.positions:
+            raise unknown("variable or parameter", name, tuple(self.positions))
         kind, index = self.positions[name]
         return self.x[index] if kind == "x" else self.p[index]
 
@@ -154,10 +158,9 @@ class PointOf(Generic[Expression]):
         own = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
         if tuple(variables) == own:
             return self
+        parameters = {name: place for name, place in self.positions.items() if place[0] == "p"}
         taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}
-        return PointOf(
-            x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions={**self.positions, **taken}
-        )
+        return PointOf(x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions=parameters | taken)
 
     def extended(self, name: str, value: Expression) -> PointOf[Expression]:
         """The point with one more variable, the last one."""

@@ -13,7 +13,7 @@ import nlp_gait
 from compare.judge import evaluate
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, toy
@@ -162,3 +162,16 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
 def test_names_that_stand_twice_are_refused(more: dict[str, Any], twice: str) -> None:
     with pytest.raises(InputError, match=f"problem 'toy': these variables or parameters stand twice: {twice}$"):
         toy(corner).derived(**more)
+
+
+def test_an_added_variable_is_nothing_to_the_parts_of_a_richer_motion() -> None:
+    """The swing foot halfway is a function of the phase's own variables alone."""
+    plain = load("nao-ssp", trajectory="quintic", samples_per_interval=1)
+    changed = with_slack(plain)
+    x = plain.start_point(np.random.default_rng(0))
+    assert evaluated(changed, np.append(x, 0.5)).cost == evaluated(plain, x).cost + 2.0 * 0.5
+
+
+def test_a_name_that_a_point_does_not_have_is_refused_with_those_that_it_has(walk: GaitProblem) -> None:
+    with pytest.raises(UnknownNameError, match="unknown variable or parameter 'lamda'; did you mean 'lambda'"):
+        walk.at(WALK_X)["lamda"]

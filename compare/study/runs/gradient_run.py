@@ -53,12 +53,8 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     )
     history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
     verdict = Verdict.of(evaluate(problem, outcome.x))
-    return RunRecord(
-        problem=task.problem.title,
-        algorithm=task.title,
-        run=task.run,
-        seed=task.run_seed,
-        definition=task.definition(),
+    return RunRecord.of(
+        task,
         settings=settings,
         status=solution.status if task.algorithm == IPOPT else outcome.status,  # other solvers are quoted
         success=outcome.claimed,

@@ -42,12 +42,8 @@ def search_run(task: Task, observe: Callable[..., None] | None = None) -> RunRec
         sign * float(f) if v == 0.0 and math.isfinite(f) else None
         for f, v in zip(history.objective, history.violation, strict=True)
     ]
-    return RunRecord(
-        problem=task.problem.title,
-        algorithm=task.title,
-        run=task.run,
-        seed=task.run_seed,
-        definition=task.definition(),
+    return RunRecord.of(
+        task,
         settings={**plain_settings(result.algorithm), "handling": plain_settings(result.handling)},
         status="; ".join(result.reasons),
         success=result.feasible,

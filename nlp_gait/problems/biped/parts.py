@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -34,7 +35,7 @@ class Contribution:
     indexes: Mapping[str, MX] = field(default_factory=dict)
 
 
-class Part:
+class Part(ABC):
     """One concern of a gait; a part overrides what it has.
 
     Attributes:
@@ -47,9 +48,9 @@ class Part:
     reads_motion: bool = False
     traces: Mapping[str, Trace] = MappingProxyType({})
 
+    @abstractmethod
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows and indexes at a point."""
-        raise NotImplementedError
 
 
 def rows(

@@ -30,10 +30,9 @@ from nlp_gait.problems.nao.cycle_rows import (
     start_at_speed,
 )
 from nlp_gait.problems.nao.double_support import TorsoShare, double_support_loads
-from nlp_gait.problems.nao.problem import paper_parts, playback
+from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
-from nlp_gait.problems.nao.skeleton import skeleton
-from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots import Robot
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -71,7 +70,7 @@ def nao_cycle(
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         return start_at_speed(names, parameters, rng)
 
-    return GaitProblem(
+    problem = GaitProblem(
         name="nao-cycle",
         title=f"NAO, walking cycle: least {OBJECTIVES[objective].name.replace('_', ' ')}",
         variables=cycle.decisions,
@@ -81,11 +80,9 @@ def nao_cycle(
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),
         start=start if cycle.at_given_speed else None,
-        robot=load_robot(robot),
         durations=tuple(TIMES.values()),
-        skeleton=skeleton(load_robot(robot)),
-        playback=playback(robot, repeats=True),
     )
+    return with_robot(problem, robot, repeats=True)
 
 
 def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -65,7 +66,7 @@ def phase_problem(
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
         return phase.assemble(at, phase.samples(at, ops), ops)
 
-    return GaitProblem(
+    problem = GaitProblem(
         name=name,
         title=title,
         variables=phase.variables,
@@ -77,17 +78,20 @@ def phase_problem(
         start=start,
         durations=(phase.duration,),
         searchable=searchable,
-        robot=load_robot(robot),
-        skeleton=skeleton(load_robot(robot)),
-        playback=playback(robot),
     )
+    return with_robot(problem, robot)
 
 
-def playback(robot: str, *, repeats: bool = False) -> Playback:
-    """How a gait of a robot, by name or file, is played."""
-    return Playback(
-        robot=nao(robot, rotational_inertia=True),
-        gravity=GRAVITY,
-        heat_loss=HEAT_LOSS.name,
-        repeats=repeats,
+def with_robot(problem: GaitProblem, robot: str, *, repeats: bool = False) -> GaitProblem:
+    """The problem with what drawing and playing its gaits need of a robot.
+
+    Args:
+        problem: without.
+        robot: name or file, with all its joints.
+        repeats: a gait is one step, whose mirror image is the next one.
+    """
+    full = load_robot(robot)
+    playback = Playback(
+        robot=nao(robot, rotational_inertia=True), gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats
     )
+    return replace(problem, robot=full, skeleton=skeleton(full), playback=playback)
