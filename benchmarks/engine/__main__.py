@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable
 
-from benchmarks.engine import agreement, sensitivity
+from benchmarks.engine import agreement, feedback, sensitivity
 
 TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "waterfall": agreement.waterfall,
@@ -20,6 +20,8 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "published": agreement.published,
     "gains": sensitivity.gains,
     "survival": sensitivity.survival,
+    "disturbed": feedback.disturbed,
+    "feedback": feedback.settings,
 }
 
 

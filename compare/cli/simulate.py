@@ -11,8 +11,7 @@ import typer
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, output_file, print_json, print_table, stdout
-from compare.cli.options import AsJson, DriveOptions, ResultFile
-from nlp_gait.simulation.mjcf import FRICTION
+from compare.cli.options import AsJson, ConditionOptions, DriveOptions, ResultFile
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.measurements import Measurements
@@ -34,14 +33,14 @@ def simulate(
     ] = 25.0,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
-    friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    world: ConditionOptions,
     servos: DriveOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a NAO gait in MuJoCo, open loop, and compare it with the model's predictions.
+    """Play a NAO gait in MuJoCo, in open loop or with balance feedback, and compare it with the model's predictions.
 
     Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
@@ -50,7 +49,6 @@ def simulate(
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.camera import filmed, shown
-    from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.measurements import measure
     from nlp_gait.simulation.mjcf import free_model
@@ -66,7 +64,7 @@ def simulate(
     target = None if video is None else output_file(check_video_path(video))
     folder = None if out is None else writable_folder(out)
     plan = plan_of(load_result(result), steps)
-    drive, conditions = servos.chosen(), Conditions(friction=friction)
+    drive, conditions = servos.chosen(), world.chosen()
     if target is not None:
         trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)
         write_video(target, frames, frames_per_s)
@@ -78,7 +76,9 @@ def simulate(
     data = {"schema": 1, **asdict(report), **({} if walk is None else {"walk": walk.course()})}
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        write_text(
+            folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, conditions.friction)
+        )
         write_npz(folder / "playback.npz", trace.signals(plan.joints))
         plot_playback(plan, trace, drive, folder / "playback")
     if robustness:

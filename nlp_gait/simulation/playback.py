@@ -97,7 +97,10 @@ def play(
     least_height = FALLEN_HEIGHT * float(plan.at("hip", np.zeros(1))[0, 2])
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None
+    balance = drive.balance(plan, model)
     for t, command in zip(times.tolist(), commands, strict=True):
+        if balance is not None:
+            command += balance.shift(data)  # in place: these are the set-points that the trace keeps
         data.ctrl[at.actuators] = command
         data.xfrc_applied[at.torso, :2] = _push(conditions, plan.duration_s, t)
         if observe is not None:
@@ -126,6 +129,8 @@ def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tup
     model = engine.MjModel.from_xml_string(text)
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
+    model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
+    model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
     model.opt.gravity[:] = conditions.gravity(plan.gravity)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
