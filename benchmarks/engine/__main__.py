@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable
 
-from benchmarks.engine import agreement, feedback, sensitivity
+from benchmarks.engine import agreement, feedback, rotors, sensitivity
 
 TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "waterfall": agreement.waterfall,
@@ -22,6 +22,7 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "survival": sensitivity.survival,
     "disturbed": feedback.disturbed,
     "feedback": feedback.settings,
+    "rotors": rotors.rotors,
 }
 
 

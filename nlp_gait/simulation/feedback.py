@@ -26,9 +26,9 @@ class Feedback:
     """A spring and a damper between the torso and its planned place over the feet, and between both attitudes.
 
     Force and moment reach the ground through the legs that are planned to stand, each with its planned share of the load, and
-    are added to the set-points as torque / stiffness. The spring across the ground is a controller of the divergent component of
-    motion x + v / w of a pendulum of height h, w^2 = g / h: m w^2 k = 500 N/m and m w k = 80 N s/m for NAO's 5.3 kg, h = 0.26 m
-    and k = 2.4.
+    are added to the set-points as torque / stiffness. Across the ground it is a controller of the divergent component of
+    motion x + v / w of a pendulum of height h with w^2 = g / h: with gain k a spring of m w^2 k and a damper of m w k, which
+    are 480 N/m and 78 N s/m for NAO's 5.3 kg, h = 0.26 m and k = 2.4.
 
     Attributes:
         spring_N_per_m: towards the planned place.
@@ -45,9 +45,10 @@ class Feedback:
         seed: of the noise; the same seed, the same walk.
 
     Source:
-        Pratt, Chew, Torres, Dilworth, Pratt (2001): virtual model control. Gain k: Caron, Kheddar, Tempier (2019), who
-        control HRP-4 with 1 + 5 / w, w = 3.6 / s. Noise: the 0.1 degrees of NAO's joint sensors (data sheet) over 0.3 m of leg
-        and over its controller's cycle of 10 ms, smoothed over three; the rest is an assumption, with a table of what it costs.
+        Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
+        controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral. Noise: joint sensors that round to 0.1 degrees
+        (data sheet), three in a row, over 0.3 m of leg and over 30 ms; the gyrometer's 10 mrad/s and the growth are
+        assumptions. `python -m benchmarks.engine feedback` shows what hangs on all of them.
     """
 
     spring_N_per_m: float = 500.0

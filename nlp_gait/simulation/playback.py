@@ -1,4 +1,4 @@
-"""A planned gait played back open loop: what the servos are told is known before it begins."""
+"""A planned gait played back: what the servos are told is known before it begins, unless the drive has a feedback."""
 
 from __future__ import annotations
 

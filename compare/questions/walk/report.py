@@ -110,7 +110,7 @@ def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
         "model's": lambda row: with_unit(row[1].model_J_per_m, "J", ".2f"),
         "per walked metre": lambda row: with_unit(row[1].engine_J_per_m, "J", ".2f"),
     }
-    return [table_of(f"{walks[0][1].steps} steps in the physics engine, open loop", walks, columns)]
+    return [table_of(f"{walks[0][1].steps} steps in the physics engine", walks, columns)]
 
 
 def _fate(walked: Walk) -> str:
