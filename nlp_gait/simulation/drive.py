@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.feedback import Balance, Feedback
-
-if TYPE_CHECKING:
-    from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.plan import Plan
 
 # Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
 # stall or in continuous service, times the gear ratio.

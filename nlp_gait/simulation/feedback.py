@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
 from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.plan import SIDES, Plan
 
-if TYPE_CHECKING:
-    from nlp_gait.simulation.plan import Plan
-
-SIDES = ("left", "right")
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
 NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
 
