@@ -46,6 +46,7 @@ VARIANTS: Mapping[str, Feedback | None] = {
     "half the springs and dampers": DEFAULT.with_strength(0.5),
     "twice the springs and dampers": DEFAULT.with_strength(2.0),
     "no growth": replace(DEFAULT, growth_per_s=0.0),
+    "growth without limit": replace(DEFAULT, growth_limit=1e3),
 }
 FEW_STEPS = 4
 HARD = ("as planned", "floor rises 3 degrees backward", "servo stiffness -30 %", f"push of {IMPULSE:g} N s left")

@@ -33,6 +33,8 @@ class Feedback:
         tilt_spring_Nm_per_rad: towards the planned attitude.
         tilt_damper_Nms_per_rad: against turning.
         growth_per_s: share of force and moment by which they grow each second for as long as they last.
+        growth_limit: of what has grown, along each axis: of the force as a share of the weight, of the moment as that share of
+            the weight at the height of the torso; 0.05 holds the robot on a slope of 3 degrees, and a push adds no more.
         period_s: between two measurements, each of which acts until the next.
         delay_s: from a measurement to the servos: one more cycle of the controller.
         position_noise_m: standard deviation of the measured place of the torso over the feet.
@@ -53,6 +55,7 @@ class Feedback:
     tilt_spring_Nm_per_rad: float = 30.0
     tilt_damper_Nms_per_rad: float = 2.0
     growth_per_s: float = 2.0
+    growth_limit: float = 0.05
     period_s: float = 0.01
     delay_s: float = 0.01
     position_noise_m: float = 2.5e-4
@@ -128,6 +131,8 @@ class Balance:
         self._steps = 0
         self._shift = np.zeros(len(joints))
         self._lasting = np.zeros(6)  # force [N] and moment [Nm] that have grown
+        weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
+        self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
 
     def shift(self, data: Any) -> Array:
         """What is added to the set-points (J,) in this step of the engine [rad]; to be called once in each."""
@@ -168,7 +173,8 @@ class Balance:
         moment = settings.tilt_spring_Nm_per_rad * (rotation_vector(planned @ seen.attitude.T) - seen.tilt_error)
         moment -= settings.tilt_damper_Nms_per_rad * seen.rate
         wrench = np.concatenate([force, moment])
-        self._lasting += settings.growth_per_s * settings.period_s * wrench
+        grown = self._lasting + settings.growth_per_s * settings.period_s * wrench
+        self._lasting = np.clip(grown, -self._most, self._most)
         wrench += self._lasting
         force, moment = planned.T @ wrench[:3], planned.T @ wrench[3:]  # in the torso's planned axes
         torques = np.zeros(len(self._rates))
