@@ -89,6 +89,10 @@ def compare(
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
     check_study(study)
+    if engine and not any(task.problem.load().playback for task in study.tasks):
+        raise InputError(
+            f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
+        )
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:

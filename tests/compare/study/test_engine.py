@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study import engine
+from compare.study import engine, task
 from compare.study.engine import kept_plays, play_records
 from compare.study.record import RunRecord
 from compare.study.study import RECORDS
@@ -141,3 +141,14 @@ def test_compare_says_that_the_engine_is_missing_before_the_work(
     refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path / "study")])
     assert refused.exit_code == 1 and "pip install 'nlp-gait[sim]'" in refused.stderr
     assert not (tmp_path / "study").exists()
+
+
+def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    loaded = task._load
+    monkeypatch.setattr(task, "_load", lambda name, options: replace(loaded(name, options), playback=None))
+    refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
+    assert refused.exit_code == 1 and "no gait of nao-dsp can be played; leave out --engine" in refused.stderr
+    assert not (tmp_path / "study.json").exists()
