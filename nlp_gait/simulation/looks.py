@@ -17,9 +17,11 @@ LINES_PER_M = 10  # of the floor's grid
 
 def paint(bodies: Mapping[str, Xml.Element], robot: Robot) -> None:
     """Give every shape its colour: the legs' by their side, all else grey."""
-    legs = {side: {joint.child for joint in robot.path_to_root(foot.link)} for side, foot in robot.feet.items()}
+    above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in bodies}
+    feet = {side: foot.link for side, foot in robot.feet.items()}
     for link, body in bodies.items():
-        sides = [side for side, links in legs.items() if link in links]
+        # A leg is what lies between the root and a foot, and beyond the foot.
+        sides = [side for side, foot in feet.items() if link in above[foot] or foot in above[link]]
         for geom in body.findall("geom"):
             geom.set("rgba", SIDE_COLOURS[sides[0]] if len(sides) == 1 else TRUNK)
             if geom.get("type") != "mesh":

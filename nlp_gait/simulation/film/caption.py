@@ -87,7 +87,7 @@ class Captions:
 
     def _label(self, canvas: Any, view: View) -> None:
         """What a view shows, along its lower edge."""
-        texts = [("front", FAINT)]
+        texts = [(view.name, FAINT)]
         if view.name == "above":
             texts = [("\u25cf centre of pressure", INK), ("\u25cf planned ZMP", PLANNED)]
         elif view.name == "side":

@@ -12,7 +12,7 @@ from PIL import Image
 from nlp_gait.errors import InputError
 from nlp_gait.simulation.film.caption import PAPER, Captions, Strip, pasted
 from nlp_gait.simulation.film.recording import Recording
-from nlp_gait.simulation.film.stage import Stage, View
+from nlp_gait.simulation.film.stage import Stage, View, stairs
 from nlp_gait.simulation.film.video import Frame
 
 SMALLEST, LARGEST = (320, 240), (3840, 2160)
@@ -50,13 +50,13 @@ def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str =
     share = (width - GAP * (len(recordings) - 1)) // len(recordings)
     line = height // LINES
     strip_height = round(STRIP_LINES * line)
-    views = _views(share, height - strip_height)
     most_power = max(float(np.max(recording.power)) for recording in recordings)
     end_s = max(float(recording.t[-1]) for recording in recordings)
     with ExitStack() as open_stages:
         parts = []
         for i, recording in enumerate(recordings):
             left = i * (share + GAP)
+            views = _views(share, height - strip_height, "back" if stairs(recording.model).any() else "front")
             stage = open_stages.enter_context(closing(Stage(recording, views, share, height - strip_height)))
             moved = tuple(
                 View(name=v.name, left=left + v.left, top=v.top, width=v.width, height=v.height) for v in views
@@ -72,18 +72,21 @@ def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str =
             yield np.asarray(picture)
 
 
-def _views(width: int, height: int) -> tuple[View, ...]:
-    """Side, front and above: beside each other in a wide area, the side on top of the others in a narrow one."""
+def _views(width: int, height: int, end: str) -> tuple[View, ...]:
+    """Side, front or back, and above: beside each other in a wide area, the side on top of the others in a narrow one.
+
+    Stairs hide a robot from the front.
+    """
     if width >= 1.3 * height:
         side, front = round(0.62 * width), round(0.62 * height)
         return (
             View(name="side", left=0, top=0, width=side, height=height),
-            View(name="front", left=side, top=0, width=width - side, height=front),
+            View(name=end, left=side, top=0, width=width - side, height=front),
             View(name="above", left=side, top=front, width=width - side, height=height - front),
         )
     side, front = round(0.56 * height), width // 2
     return (
         View(name="side", left=0, top=0, width=width, height=side),
-        View(name="front", left=0, top=side, width=front, height=height - side),
+        View(name=end, left=0, top=side, width=front, height=height - side),
         View(name="above", left=front, top=side, width=width - front, height=height - side),
     )

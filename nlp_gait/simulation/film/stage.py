@@ -16,7 +16,12 @@ from nlp_gait.simulation.film.recording import Recording
 from nlp_gait.simulation.film.video import Frame
 
 # By name: azimuth and elevation of the camera [degrees], and the height that it sees in heights of the robot.
-CAMERAS = {"side": (90.0, -9.0, 1.4), "front": (180.0, -9.0, 1.4), "above": (90.0, -90.0, 0.6)}
+CAMERAS = {
+    "side": (90.0, -9.0, 1.4),
+    "front": (180.0, -9.0, 1.4),
+    "back": (0.0, -9.0, 1.4),
+    "above": (90.0, -90.0, 0.6),
+}
 NARROWEST = 0.75  # width over height of a view below which the camera steps back
 ARROW_HEIGHT = 0.45  # of the robot, for a force on the floor as large as its weight
 FORCE, MEASURED, PLANNED = (0.0, 0.62, 0.45, 0.9), (0.05, 0.05, 0.05, 1.0), (0.8, 0.47, 0.65, 1.0)
@@ -32,7 +37,7 @@ class View:
     """Part of a picture [pixels]; the origin is its upper left corner.
 
     Attributes:
-        name: side, front or above.
+        name: side, front, back or above.
         left: edge.
         top: edge.
         width: positive.
@@ -44,6 +49,11 @@ class View:
     top: int
     width: int
     height: int
+
+
+def stairs(model: Any) -> Any:
+    """Which geometries of the engine's model are boxes that stand on the floor."""
+    return (model.geom_bodyid == 0) & (model.geom_type == mujoco().mjtGeom.mjGEOM_BOX)
 
 
 class Stage:
@@ -137,7 +147,7 @@ class Stage:
         centre, load = self._recording.pressure[k], float(self._recording.load[k])
         if not np.isfinite(centre).all() or load <= 0.0:
             return
-        foot = np.array([*centre, 0.001])
+        foot = np.array([*centre, self._ground(*centre) + 0.001])
         tip = foot + (0.0, 0.0, ARROW_HEIGHT * self._height * load / self._weight)
         geometry = self._new(self._engine.mjtGeom.mjGEOM_ARROW, FORCE)
         if geometry is not None:
@@ -154,9 +164,17 @@ class Stage:
 
     def _add_dot(self, centre: Any, share: float, colour: Sequence[float], over: float) -> None:
         if np.isfinite(centre).all():
-            place = np.array([*centre, DOTS_ABOVE * self._height + over])
+            place = np.array([*centre, self._ground(*centre) + DOTS_ABOVE * self._height + over])
             size = np.array([share * DOT * self._height, FLAT, 0.0])
             self._new(self._engine.mjtGeom.mjGEOM_CYLINDER, colour, size, place)
+
+    def _ground(self, x: float, y: float) -> float:
+        """Height of the floor, or of the highest box that stands on it, under a point [m]."""
+        model = self._recording.model
+        boxes = stairs(model)
+        middles, halves = model.geom_pos[boxes], model.geom_size[boxes]
+        under = (np.abs(middles[:, :2] - (x, y)) <= halves[:, :2]).all(axis=1)
+        return float(max((middles[:, 2] + halves[:, 2])[under], default=0.0))
 
     def _new(self, kind: Any, colour: Sequence[float], size: Any = None, place: Any = None) -> Any:
         """A further geometry in the scene; None if it is full."""
