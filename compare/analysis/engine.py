@@ -27,6 +27,8 @@ class Agreement:
         spearman: rank correlation; None for fewer than three gaits, or if one of the two does not tell them apart.
         mean_error: mean of |engine / model - 1|; None if all fell.
         largest_error: of these.
+        spread: the model's largest energy over its least, minus 1; None if all fell.
+        error_spread: largest less least signed error: gaits that the model sets less apart than this have no sure order.
     """
 
     gaits: int
@@ -34,6 +36,8 @@ class Agreement:
     spearman: float | None
     mean_error: float | None
     largest_error: float | None
+    spread: float | None
+    error_spread: float | None
 
     def sentence(self) -> str:
         """For people."""
@@ -46,16 +50,22 @@ class Agreement:
         said = f"{self.gaits} gait{'s were' if self.gaits != 1 else ' was'} played, {fate}."
         if self.mean_error is not None and self.largest_error is not None:
             said += f" Error of the model: {100 * self.mean_error:.2f} % in the mean, {100 * self.largest_error:.2f} % at most."
-        if self.spearman is not None:
-            return f"{said} Spearman correlation of the ranks: {self.spearman:.3f} over {upright} gaits."
-        reason = f"with fewer than {FEWEST} gaits" if upright < FEWEST else "where all gaits are equal"
-        return f"{said} A rank correlation says nothing {reason}."
+        if self.spearman is None or self.spread is None or self.error_spread is None:
+            reason = f"with fewer than {FEWEST} gaits" if upright < FEWEST else "where all gaits are equal"
+            return f"{said} A rank correlation says nothing {reason}."
+        said += f" Spearman correlation of the ranks: {self.spearman:.3f} over {upright} gaits"
+        apart = (
+            f"that the model sets {100 * self.spread:.2f} % apart, with errors {100 * self.error_spread:.2f} % apart"
+        )
+        doubt = "; their order is not sure" if self.spread < self.error_spread else ""
+        return f"{said} {apart}{doubt}."
 
 
 def agreement(model: Sequence[float], engine: Sequence[float | None]) -> Agreement:
     """From energies or powers of the same gaits by both, None after a fall."""
     pairs = [(m, e) for m, e in zip(model, engine, strict=True) if e is not None]
-    errors = [abs(e / m - 1.0) for m, e in pairs]
+    signed = [e / m - 1.0 for m, e in pairs]
+    errors = [abs(error) for error in signed]
     ranked = [([printed(m) for m, _ in pairs]), ([printed(e) for _, e in pairs])]
     told_apart = len(pairs) >= FEWEST and all(len(set(values)) > 1 for values in ranked)
     return Agreement(
@@ -64,6 +74,8 @@ def agreement(model: Sequence[float], engine: Sequence[float | None]) -> Agreeme
         spearman=_spearman(*ranked) if told_apart else None,
         mean_error=sum(errors) / len(errors) if errors else None,
         largest_error=max(errors, default=None),
+        spread=max(m for m, _ in pairs) / min(m for m, _ in pairs) - 1.0 if pairs else None,
+        error_spread=max(signed) - min(signed) if pairs else None,
     )
 
 

@@ -37,6 +37,13 @@ def test_errors_and_correlation_leave_out_what_fell() -> None:
     # Without ties: 1 - 6 sum d^2 / (n (n^2 - 1)), with the ranks 1 2 4 3 and 1 2 3 4.
     assert found.spearman == pytest.approx(1.0 - 6.0 * 2.0 / (4.0 * 15.0))
     assert "1 fell and has no rank" in found.sentence() and "0.800 over 4 gaits" in found.sentence()
+    assert found.spread == pytest.approx(3.0) and found.error_spread == pytest.approx(0.35)
+    assert "300.00 % apart, with errors 35.00 % apart" in found.sentence() and "not sure" not in found.sentence()
+
+
+def test_gaits_nearer_to_each_other_than_the_model_is_right_have_no_sure_order() -> None:
+    found = agreement([1.0, 1.001, 1.002], [1.01, 1.005, 1.0])
+    assert found.spearman == pytest.approx(-1.0) and found.sentence().endswith("their order is not sure.")
 
 
 @pytest.mark.parametrize(
