@@ -90,6 +90,17 @@ def test_captions_say_time_speed_and_power_and_a_fall(recording):
     assert red.sum() > 20 and not ((late[200:, :, 0] > 150) & (late[200:, :, 1] < 80)).any()
 
 
+@pytest.mark.slow
+def test_a_recording_stands_still_on_a_fall(gait):
+    plan = plan_of(gait("ssp falling"))
+    record = recorded("a fall", plan, partial(play, plan), 0.25)
+    fell_at_s = record.trace.fell_at_s
+    assert fell_at_s is not None
+    assert (record.t == fell_at_s).sum() == 4  # a second
+    assert record.t[-5] == pytest.approx(fell_at_s, abs=0.25) and record.t[-5] < fell_at_s
+    assert len(record.states) == len(record.t) and (record.states[-1] == record.states[-5]).all()
+
+
 def test_legs_have_a_colour_for_each_side(gait):
     from xml.etree import ElementTree as Xml
 

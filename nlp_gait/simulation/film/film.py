@@ -18,6 +18,7 @@ from nlp_gait.simulation.film.video import Frame
 SMALLEST, LARGEST = (320, 240), (3840, 2160)
 LINES = 30  # of text in a picture's height
 STRIP_LINES = 3.6
+LEAST_POWER = 0.1  # [W] at the top of its curve
 GAP = 4  # between two gaits [pixels]
 
 
@@ -50,7 +51,7 @@ def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str =
     share = (width - GAP * (len(recordings) - 1)) // len(recordings)
     line = height // LINES
     strip_height = round(STRIP_LINES * line)
-    most_power = max(float(np.max(recording.power)) for recording in recordings)
+    most_power = max(LEAST_POWER, *(float(np.max(recording.power)) for recording in recordings))
     end_s = max(float(recording.t[-1]) for recording in recordings)
     with ExitStack() as open_stages:
         parts = []

@@ -18,6 +18,7 @@ from nlp_gait.simulation.playback import Observer, Trace
 POWER_WINDOW, PRESSURE_WINDOW, SPEED_WINDOW, PATH_WINDOW = 0.1, 0.02, 0.4, 2.0
 
 ROUNDING = 1e-9  # [s]
+HELD = 1.0  # [s] of the simulation for which a film stands still on a fall
 
 
 class Player(Protocol):
@@ -35,11 +36,12 @@ class Recording:
         title: one line.
         model: the engine's.
         trace: of the playback.
-        t: (F,) [s].
+        t: (F,) [s]; after a fall its time, again and again.
         states: (F, ...) the engine's positions.
         power: (F,) of the servos, mechanical and heat [W].
         speed: (F,) of the torso, forward [m/s].
         path: (F, 3) of the torso without its sway [m].
+        stand: (F, 2) halfway between the feet, likewise [m].
         pressure: (F, 2) centre of pressure [m]; NaN in flight.
         planned: (F, 2) planned zero-moment point [m].
         load: (F,) force of the floor [N].
@@ -53,6 +55,7 @@ class Recording:
     power: Array
     speed: Array
     path: Array
+    stand: Array
     pressure: Array
     planned: Array
     load: Array
@@ -81,6 +84,10 @@ def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recor
         count += 1
 
     trace = player(observe=keep)
+    if trace.fell_at_s is not None:
+        held = max(1, round(HELD / interval_s))
+        indexes += [len(trace.t) - 1] * held
+        states += [states[-1]] * held
     at = np.minimum(indexes, len(trace.t) - 1)
     power = np.abs(trace.torque * trace.qd).sum(axis=1) + plan.heat_loss * (trace.torque**2).sum(axis=1)
     torso = trace.torso
@@ -94,6 +101,7 @@ def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recor
         power=_smooth(power, POWER_WINDOW)[at],
         speed=(torso[ahead, 0] - torso[behind, 0]) / np.maximum((ahead - behind) * TIME_STEP, TIME_STEP),
         path=_smooth(torso, PATH_WINDOW)[at],
+        stand=_smooth(trace.feet.mean(axis=1)[:, :2], PATH_WINDOW)[at],
         pressure=averaged_pressure(trace, PRESSURE_WINDOW)[at],
         planned=plan.at("zmp", trace.t[at]),
         load=_smooth(trace.loads.sum(axis=1), PRESSURE_WINDOW)[at],

@@ -135,8 +135,9 @@ class Stage:
         camera = self._engine.MjvCamera()
         camera.azimuth, camera.elevation, seen = CAMERAS[view.name]
         path = self._recording.path
-        x, y, climbed = path[k, 0], path[k, 1], max(0.0, path[k, 2] - path[0, 2])
-        camera.lookat[:] = (x, y, climbed + (0.0 if view.name == "above" else 0.45 * self._height))
+        above, climbed = view.name == "above", max(0.0, path[k, 2] - path[0, 2])
+        x, y = self._recording.stand[k] if above else path[k, :2]
+        camera.lookat[:] = (x, y, climbed + (0.0 if above else 0.45 * self._height))
         opening = math.tan(math.radians(float(self._recording.model.vis.global_.fovy)) / 2)
         step_back = max(1.0, NARROWEST * view.height / view.width)
         camera.distance = step_back * seen * self._height / (2 * opening)
