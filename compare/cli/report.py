@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
 
 
+ENGINE_TABLE = (
+    "Model and engine: mean power over a phase, or energy of ten steps for each planned metre of a cycle; rank: first the "
+    "model's, then the engine's; fate: a cycle walks that part of the planned way."
+)
+
+
 @command
 def report(
     *,
@@ -101,3 +107,5 @@ def print_plays(plays: Sequence[Played]) -> None:
     for problem, own in by_problem(plays).items():
         print_table(f"{problem} played: {drive_in_words(own[0].drive)}", HEADER, engine_rows(own))
         stdout.print(agreement_of(own).sentence())
+    if plays:
+        stdout.print(ENGINE_TABLE)
