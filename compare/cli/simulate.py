@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 def simulate(
     result: ResultFile,
     *,
-    steps: Annotated[
-        int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
-    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Play this many steps of a gait that repeats.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
     frames_per_s: Annotated[
@@ -41,7 +39,7 @@ def simulate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a NAO gait in MuJoCo, open loop, and compare it with the model's predictions.
+    """Play a gait in MuJoCo, open loop, and compare it with the model's predictions.
 
     Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
@@ -53,7 +51,7 @@ def simulate(
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.mjcf import free_model
+    from nlp_gait.simulation.mjcf import plan_model
     from nlp_gait.simulation.plan import plan_of
     from nlp_gait.simulation.playback import play
     from nlp_gait.simulation.robustness import robustness as sweep
@@ -78,7 +76,7 @@ def simulate(
     data = {"schema": 1, **asdict(report), **({} if walk is None else {"walk": walk.course()})}
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        write_text(folder / "model.xml", plan_model(plan, drive, sole, friction))
         write_npz(folder / "playback.npz", trace.signals(plan.joints))
         plot_playback(plan, trace, drive, folder / "playback")
     if robustness:
