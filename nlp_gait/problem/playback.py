@@ -18,6 +18,9 @@ PLAYED = {
     ),  # of the root, a quaternion; upright where it is missing
     "left_foot": in_space("m"),  # the sole under the ankle
     "right_foot": in_space("m"),
+    # 1 where any part of the foot is on the ground, else 0; where it is missing, a foot is on it when its sole is.
+    "left_bears": Columns(unit="1"),
+    "right_bears": Columns(unit="1"),
 }
 
 

@@ -12,9 +12,13 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
-SIDES_SWAPPED = {"left_foot": "right_foot", "right_foot": "left_foot"}
+SIDES_SWAPPED = {
+    f"{side}_{what}": f"{other}_{what}"
+    for side, other in (("left", "right"), ("right", "left"))
+    for what in ("foot", "bears")
+}
 # What stays where it is when a walk goes on, and what a reflection at the plane y = 0 does to a quaternion (w, x, y, z).
-UNMOVED = (*JOINT_ARRAYS, "attitude")
+UNMOVED = (*JOINT_ARRAYS, "attitude", "left_bears", "right_bears")
 MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 

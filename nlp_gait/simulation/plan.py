@@ -63,6 +63,13 @@ class Plan:
         foot = self.at(f"{side}_foot", times)
         return np.asarray(foot[:, 2] - self.level(foot[:, 0]) < ON_GROUND, dtype=float)
 
+    def bears(self, side: str, times: Array) -> Array:
+        """1 where any part of a foot is planned to be on the ground, else 0."""
+        name = f"{side}_bears"
+        if name not in self.signals.arrays:
+            return self.stands(side, times)
+        return np.round(self.at(name, times)[:, 0])
+
     def level(self, x: Array) -> Array:
         """(N,) height of the ground at places along x [m]."""
         heights = np.array([0.0, *(tread.height_m for tread in self.ground)])

@@ -18,8 +18,8 @@ from nlp_gait.problems.stairs.stair import GRAVITY
 from nlp_gait.robots import Foot, Joint, Link, Robot
 from nlp_gait.robots.robot import Vector
 
-# The paper has no motors. NAO's give 0.8 (knee) and 1.2 times (hip roll) weight times leg length at stall; here each once that.
-WEIGHT_AT_A_LEG = 1.0
+# The paper has no motors. The largest torque of each is the robot's weight at a lever as long as what the joint moves: leg,
+# shank, foot, toe. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
 FOOT_HALF_WIDTH = 0.05  # [m]; in the plane nothing depends on it
 RANGE = (-np.pi, np.pi)  # of every joint [rad]: what the paper limits, its plans keep within
 RATE_LIMIT = 100.0  # [rad/s]; nothing reads it
@@ -45,7 +45,8 @@ def rigid_bodies() -> Robot:
     """Tree from the torso, whose frame stands at the hip; in its zero pose it stands upright with straight legs."""
     biped = toe_foot_biped()
     rods = biped.rods
-    limit = WEIGHT_AT_A_LEG * biped.mass_kg * GRAVITY * (rods["HK"].length + rods["KA"].length)
+    levers = {"Hip": rods["HK"].length + rods["KA"].length, "Knee": rods["KA"].length}
+    levers |= {"Ankle": biped.foot_m, "Toe": biped.toe_m}
     links = {TORSO: _link(TORSO, rods["UH"], (0.0, 0.0, 1.0))}
     joints, feet, toes = {}, {}, {}
     for letter, (side, _) in SIDES.items():
@@ -63,7 +64,7 @@ def rigid_bodies() -> Robot:
                 limits_rad=RANGE,
                 planning_limits_rad=RANGE,
                 velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=limit,
+                torque_limit_Nm=biped.mass_kg * GRAVITY * levers[joint],
             )
             parent, origin = name, (rod.length * along[0], rod.length * along[1], rod.length * along[2])
         feet[side], toes[side] = (_plate(f"{side} {part}", rods[of].length) for part, of in (LEG["Ankle"], LEG["Toe"]))

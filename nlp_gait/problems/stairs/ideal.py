@@ -138,6 +138,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
             qdd,
             borne("toe_force"),
             borne("sole_force"),
+            toe_off * step,
         )
 
     return GaitProblem(

@@ -132,7 +132,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
         t, q, qd, qdd, stance = (part[new] for part in (t, q, qd, qdd, stance))
         toe = whole_force(q, qd, qdd) - stance
-        return standing(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe))
+        return standing(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
 
     return GaitProblem(
         name="stairs-plan",

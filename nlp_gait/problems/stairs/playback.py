@@ -30,6 +30,7 @@ class Performance(NamedTuple):
         qdd: (T, 9) [rad/s^2].
         tau: (T, 8) of the robot's joints [Nm].
         pressure: (T,) centre of pressure of everything that stands, ahead of the stance ankle [m].
+        double_support_s: how long the rear foot bears, on its toe at last.
     """
 
     t: Array
@@ -38,6 +39,7 @@ class Performance(NamedTuple):
     qdd: Array
     tau: Array
     pressure: Array
+    double_support_s: float
 
 
 def playback(performance: Callable[[NumericPoint], Performance], *, repeats: bool = False) -> Playback:
@@ -59,7 +61,9 @@ def playback(performance: Callable[[NumericPoint], Performance], *, repeats: boo
     return Playback(robot=rigid_bodies(), gravity=GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True)
 
 
-def standing(t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array) -> Performance:
+def standing(
+    t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array, double_support_s: float
+) -> Performance:
     """A step over the flat stance foot.
 
     Args:
@@ -69,6 +73,7 @@ def standing(t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array)
         qdd: (T, 7) [rad/s^2].
         toe: (T, 2) force of the ground on the rear toe [N].
         sole: (T, 2) on the rear sole joint [N].
+        double_support_s: how long the rear foot bears.
     """
     torque, stance, pressure, toe_x, sole_x = (
         np.array(part).T for part in _loads().map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
@@ -84,6 +89,7 @@ def standing(t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array)
         qdd,
         joint_torques(torque, _standing_toe(stance[:, 1], pressure[:, 0])),
         carried / whole,
+        double_support_s,
     )
 
 
@@ -93,7 +99,7 @@ def whole_force(q: Array, qd: Array, qdd: Array) -> Array:
     return np.array(_loads().map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
 
 
-def driven(t: Array, state: Array, torque: Array, pressure: Array) -> Performance:
+def driven(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> Performance:
     """A step whose links were driven by torques against the world.
 
     A link's torque against the world cannot be built. Joints that give seven links theirs, and the toe that stands, leave over a
@@ -104,17 +110,19 @@ def driven(t: Array, state: Array, torque: Array, pressure: Array) -> Performanc
         state: (T, 18) angles and rates of the links [rad], [rad/s].
         torque: (T, 9) on the links [Nm].
         pressure: (T,) ahead of the stance ankle [m].
+        double_support_s: how long the rear foot bears.
     """
     q, qd = np.split(state, 2, axis=1)
     between = torque[:, : len(MOVING)] @ np.linalg.inv(JOINT_RATES)
     tau = joint_torques(between, torque[:, LINKS.index("S'T'")])
-    return Performance(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure)
+    return Performance(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
 
 
 def _signals(step: Performance, rise: float) -> Signals:
     hip, ankle, stance_ankle = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
     lean = torso_lean(step.q)
     still = np.zeros_like(lean)
+    rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at last
 
     def placed(point: Array) -> Array:
         """(T, 3) above the floor on which the rear foot stands."""
@@ -131,6 +139,8 @@ def _signals(step: Performance, rise: float) -> Signals:
         "attitude": np.column_stack([np.cos(lean / 2), still, np.sin(lean / 2), still]),
         "left_foot": placed(stance_ankle),
         "right_foot": placed(ankle),
+        "left_bears": np.ones((len(step.t), 1)),
+        "right_bears": rear[:, None].astype(float),
     }
     return Signals(joints=JOINTS, arrays=arrays, columns=PLAYED)
 

@@ -148,7 +148,7 @@ def stairs_track(
     def performance(at: NumericPoint) -> Performance:
         arrays = motion(at).arrays
         state = np.hstack([arrays["q"], arrays["qd"]])
-        return driven(arrays["t"], state, arrays["tau"], arrays["zmp"])
+        return driven(arrays["t"], state, arrays["tau"], arrays["zmp"], float(at["t2_s"]))
 
     return GaitProblem(
         name="stairs-track",

@@ -26,9 +26,8 @@ from nlp_gait.symbolic.dynamics import newton_euler
 
 SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
 SOLE_SHARE = 0.1  # of the foot's mass that is the sole's; as much is the ankle's
-# The paper's robot has servos without data. Joint for joint NAO's motors give 0.8 to 1.2 times weight times leg length at stall
-# (knee and hip roll, docs/simulation.md); here every one gives once that.
-WEIGHT_AT_A_LEG = 1.0
+# The paper says nothing of its servos. The largest torque of each is the robot's weight at a lever as long as what the joint
+# moves: leg, shank, front of the foot. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
 RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
 RATE_LIMIT = 100.0  # [rad/s], likewise; nothing reads it
 FINE_INTERVALS = 1000  # of a step
@@ -78,6 +77,8 @@ def rigid_bodies(robot: PointMassBiped) -> Robot:
     hip, knee, foot = robot.hip_mass_kg, robot.knee_mass_kg, robot.foot_mass_kg
     up = robot.foot_com_height_m
     across = robot.hip_distance_m / 2
+    weight = GRAVITY * (2 * (knee + foot + hip) + robot.waist_mass_kg)
+    levers = (robot.leg_m,) * 3 + (robot.shank_m,) + (robot.foot_front_m,) * 2
     # By link: masses with their places in its axes; the three links that meet at a hip share its mass, two a knee's.
     contents: dict[str, list[tuple[float, Vector]]] = {
         "waist": [(robot.waist_mass_kg, (0, 0, 0)), (hip / 3, (0, across, 0)), (hip / 3, (0, -across, 0))]
@@ -112,7 +113,7 @@ def rigid_bodies(robot: PointMassBiped) -> Robot:
                 limits_rad=RANGE,
                 planning_limits_rad=RANGE,
                 velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=WEIGHT_AT_A_LEG * _mass(robot) * GRAVITY * robot.leg_m,
+                torque_limit_Nm=weight * levers[i],
             )
         feet[side] = Foot(
             link=f"{side} foot",
@@ -131,10 +132,6 @@ def rigid_bodies(robot: PointMassBiped) -> Robot:
         joints={name: joints[name] for name in JOINTS},
         feet=feet,
     )
-
-
-def _mass(robot: PointMassBiped) -> float:
-    return 2 * (robot.knee_mass_kg + robot.foot_mass_kg + robot.hip_mass_kg) + robot.waist_mass_kg
 
 
 def _link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:

@@ -1,0 +1,163 @@
+"""The robots of the other two papers in the engine: the 12-joint walk, and the climb on stairs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+import nlp_gait
+from benchmarks.engine.agreement import STEPS
+from benchmarks.engine.markdown import cells, header
+from benchmarks.engine.sensitivity import engine_step
+from compare.papers.stairs.paper import TABLE_3 as STAIRS_TABLE_3
+from compare.papers.stairs.paper import TABLE_4 as STAIRS_TABLE_4
+from compare.papers.walk12.paper import TABLE_3, TABLE_4, row_of
+from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.simulation.conditions import Conditions
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import Measurements, measure
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.walking import measure_walk
+
+CASE = 2  # of Table IV, the problems' default
+# What the ideal step keeps in reserve: ZMP 4 cm inside the foot, 100 N on it, friction that exists.
+RESERVES = {"zmp_margin_m": 0.04, "least_stance_force_N": 100.0, "stance_friction": 0.6}
+VARIANTS = {
+    "default": Drive(),
+    **{f"largest torque at {error:g} rad": Drive(full_error_rad=error) for error in (0.16, 0.04)},
+    **{f"damping / stiffness {seconds:g} s": Drive(time_constant_s=seconds) for seconds in (0.01, 0.05)},
+    "velocity fed forward": Drive(feed_forward="velocity"),
+    "nothing fed forward": Drive(feed_forward="none"),
+}
+
+
+def walk12() -> Iterator[str]:
+    """The 12-joint walk, ten steps: the paper's gaits (Tables III and IV), our optima, a circle."""
+    yield header(
+        "gait", "ZMP in the sole, share", "fate", "steps", "way", "tilt, first step", "CoP mm", "model J/m", "engine"
+    )
+    for label, result in walks().items():
+        plan = plan_of(result, STEPS)
+        trace = play(plan)
+        found = measure_walk(plan, trace, Drive(), STEPS)
+        m = found.measurements
+        first = trace.t <= plan.duration_s / STEPS
+        yield cells(
+            label,
+            f"{_stable_share(result):.2f}",
+            fate(m),
+            f"{found.steps_done}",
+            "-" if found.walked_m is None else f"{found.walked_m / found.planned_m:.2f}",
+            f"{math.degrees(float(trace.tilt[first].max())):.1f}",
+            f"{1e3 * (m.pressure_rms_m or np.nan):.0f}",
+            f"{found.model_J_per_m:.1f}",
+            "-" if found.engine_J_per_planned_m is None else f"{found.engine_J_per_planned_m:.1f}",
+        )
+
+
+def stairs() -> Iterator[str]:
+    """One step up: plans, tracked steps and the ideal; energies in J, |torque x rate|."""
+    yield header("gait", "fate", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
+    for label, result in climbs().items():
+        plan = plan_of(result)
+        m = measure(plan, play(plan), Drive())
+        energies = (power.mechanical_W * plan.duration_s for power in (m.predicted, m.measured))
+        landing = 1e3 * m.landings["right"].error_m
+        yield cells(
+            label,
+            fate(m),
+            *(f"{energy:.1f}" for energy in energies),
+            f"{m.largest_tilt_deg:.1f}",
+            f"{1e3 * m.slip_m:.1f}",
+            *("-" if v is None else f"{1e3 * v:.1f}" for v in (m.pressure_rms_m, m.pressure_middle_rms_m)),
+            f"{landing:.1f}",
+        )
+
+
+def other_gains() -> Iterator[str]:
+    """How both fare with other gains, feed-forward, friction and steps of the engine."""
+    climb = plan_of(optimal_climb(nlp_gait.load("stairs-plan")))
+    problem = nlp_gait.load("walk12")
+    walks = {row.step_time_s: problem.with_values(step_time_s=row.step_time_s) for row in TABLE_4[:2]}
+    plans = [plan_of(_at(walks[row.step_time_s], row.x), STEPS) for row in TABLE_4[:2]]
+    yield header("variant", "stairs-plan J", "fate", "CoP, middle mm", *(f"walk12, {T:g} s: steps" for T in walks))
+
+    def row(label: str, drive: Drive, conditions: Conditions | None = None) -> str:
+        m = measure(climb, play(climb, conditions, drive), drive)
+        steps = [measure_walk(plan, play(plan, conditions, drive), drive, STEPS).steps_done for plan in plans]
+        return cells(
+            label,
+            f"{m.measured.mechanical_W * climb.duration_s:.1f}",
+            fate(m),
+            f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
+            *(f"{done}" for done in steps),
+        )
+
+    for label, drive in VARIANTS.items():
+        yield row(label, drive)
+    yield row("friction 0.4", Drive(), Conditions(friction=0.4))
+    with engine_step(0.00025):
+        yield row("engine step 0.25 ms", Drive())
+
+
+def fate(m: Measurements) -> str:
+    """In two words."""
+    return "stays up" if m.fell_at_s is None else f"falls at {m.fell_at_s:.1f} s"
+
+
+def walks() -> dict[str, Result]:
+    """Gaits of the 12-joint walk."""
+    problem = nlp_gait.load("walk12")
+    found = {f"paper, lambda {row.weight:g}": _at(problem, row.x) for row in TABLE_3}
+    for row in TABLE_4:
+        found[f"paper, {row.step_time_s:g} s"] = _at(problem.with_values(step_time_s=row.step_time_s), row.x)
+    for values in ({"lambda": 0.15}, {"lambda": 0.15, "step_time_s": 2.0}, {"lambda": 1.0}):
+        variant = problem.with_values(**values)
+        name = ", ".join(
+            f"{value:g} s" if key == "step_time_s" else f"{key} {value:g}" for key, value in values.items()
+        )
+        found[f"optimum, {name}"] = _at(variant, nlp_gait.solve(variant, starts=5, seed=0).x)
+    turning = problem.with_values(turn_rad=math.radians(8.0))
+    return found | {"paper, lambda 0.9, on a circle of 8 degrees a step": _at(turning, row_of(0.9).x)}
+
+
+def climbs() -> dict[str, Result]:
+    """Gaits on the stairs."""
+    plan, track, ideal = (nlp_gait.load(f"stairs-{name}") for name in ("plan", "track", "ideal"))
+    found = {}
+    for case, printed in STAIRS_TABLE_4.items():
+        sized = plan.with_values(stair_length_m=printed.stair_length_m, rise_run_ratio=printed.rise_run_ratio)
+        found[f"plan, optimum, case {case}"] = optimal_climb(sized)
+    case_2 = STAIRS_TABLE_4[CASE]
+    times = {name: value for name, value in STAIRS_TABLE_3.items() if name in plan.names}
+    times["torso_pitch_rad"] = case_2.torso_pitch_rad
+    for label, fixed in (("", times), (", hip height free", {k: v for k, v in times.items() if k != "hip_height_m"})):
+        solved = nlp_gait.solve(plan, starts=2, seed=0, fix=fixed)
+        found[f"plan, paper's Table III{label}"] = _at(plan, solved.x)
+    found["tracked, paper's gains"] = _at(
+        track.with_values(gravity_compensation=0.0), (case_2.kp, case_2.kd, case_2.torso_pitch_rad)
+    )
+    found["tracked, optimum"] = _at(track, nlp_gait.solve(track, starts=1, seed=0).x)
+    for label, variant in (("ideal", ideal), ("ideal with reserves", ideal.with_values(**RESERVES))):
+        found[label] = _at(variant, nlp_gait.solve(variant, starts=1, seed=0).x)
+    return found
+
+
+def optimal_climb(problem: GaitProblem) -> Result:
+    """Best of three starts of IPOPT."""
+    return _at(problem, nlp_gait.solve(problem, starts=3, seed=0).x)
+
+
+def _at(problem: GaitProblem, x: object) -> Result:
+    return Result(problem=problem, x=problem.check_x(x))  # type: ignore[arg-type]
+
+
+def _stable_share(result: Result) -> float:
+    """Share of the step's time in which the planned ZMP is within the standing sole."""
+    plan = plan_of(result, 1)
+    foot, x, y = plan.robot.feet["left"], *plan.signals.arrays["zmp"].T
+    within = (x >= -foot.back_m) & (x <= foot.front_m) & (y >= -foot.right_m) & (y <= foot.left_m)
+    return float(within.mean())
