@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -13,14 +14,15 @@ from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import engine_step
 from compare.papers.stairs.paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.paper import TABLE_4 as STAIRS_TABLE_4
-from compare.papers.walk12.paper import TABLE_3, TABLE_4, row_of
+from compare.papers.walk12.paper import TABLE_3, TABLE_4, PaperRow, row_of
 from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.problems.walk12 import playback as walk12_playback
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import measure_walk
+from nlp_gait.simulation.walking import Walk, measure_walk
 
 CASE = 2  # of Table IV, the problems' default
 # What the ideal step keeps in reserve: ZMP 4 cm inside the foot, 100 N on it, friction that exists.
@@ -32,6 +34,9 @@ VARIANTS = {
     "velocity fed forward": Drive(feed_forward="velocity"),
     "nothing fed forward": Drive(feed_forward="none"),
 }
+
+# Radius of a point mass [m], and the sole's share of the foot's mass.
+SPHERES = {"SPHERE_RADIUS": (0.01, 0.03), "SOLE_SHARE": (0.03, 0.3)}
 
 
 def walk12() -> Iterator[str]:
@@ -80,20 +85,29 @@ def stairs() -> Iterator[str]:
 def other_gains() -> Iterator[str]:
     """How both fare with other gains, feed-forward, friction and steps of the engine."""
     climb = plan_of(optimal_climb(nlp_gait.load("stairs-plan")))
-    problem = nlp_gait.load("walk12")
-    walks = {row.step_time_s: problem.with_values(step_time_s=row.step_time_s) for row in TABLE_4[:2]}
-    plans = [plan_of(_at(walks[row.step_time_s], row.x), STEPS) for row in TABLE_4[:2]]
-    yield header("variant", "stairs-plan J", "fate", "CoP, middle mm", *(f"walk12, {T:g} s: steps" for T in walks))
+    fast, slow = row_of(0.15), TABLE_4[0]
+    yield header(
+        "variant",
+        "stairs-plan J",
+        "fate",
+        "CoP, middle mm",
+        *(f"walk12, {printed.step_time_s:g} s: steps" for printed in (fast, slow)),
+        "way",
+        "J per planned m",
+    )
 
     def row(label: str, drive: Drive, conditions: Conditions | None = None) -> str:
         m = measure(climb, play(climb, conditions, drive), drive)
-        steps = [measure_walk(plan, play(plan, conditions, drive), drive, STEPS).steps_done for plan in plans]
+        first, second = (_walked(printed, drive, conditions) for printed in (fast, slow))
         return cells(
             label,
             f"{m.measured.mechanical_W * climb.duration_s:.1f}",
             fate(m),
             f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
-            *(f"{done}" for done in steps),
+            f"{first.steps_done}",
+            f"{second.steps_done}",
+            "-" if second.walked_m is None else f"{second.walked_m / second.planned_m:.2f}",
+            "-" if second.engine_J_per_planned_m is None else f"{second.engine_J_per_planned_m:.1f}",
         )
 
     for label, drive in VARIANTS.items():
@@ -101,11 +115,34 @@ def other_gains() -> Iterator[str]:
     yield row("friction 0.4", Drive(), Conditions(friction=0.4))
     with engine_step(0.00025):
         yield row("engine step 0.25 ms", Drive())
+    for name, values in SPHERES.items():
+        for value in values:
+            with spheres(name, value):
+                yield row(f"walk12: {name.lower().replace('_', ' ')} {value:g}", Drive())
+
+
+@contextmanager
+def spheres(name: str, value: float) -> Iterator[None]:
+    """Another way to make bodies of the 12-joint biped's point masses."""
+    before = getattr(walk12_playback, name)
+    setattr(walk12_playback, name, value)
+    walk12_playback.rigid_bodies.cache_clear()
+    try:
+        yield
+    finally:
+        setattr(walk12_playback, name, before)
+        walk12_playback.rigid_bodies.cache_clear()
 
 
 def fate(m: Measurements) -> str:
     """In two words."""
     return "stays up" if m.fell_at_s is None else f"falls at {m.fell_at_s:.1f} s"
+
+
+def _walked(printed: PaperRow, drive: Drive, conditions: Conditions | None) -> Walk:
+    problem = nlp_gait.load("walk12").with_values(step_time_s=printed.step_time_s)
+    plan = plan_of(_at(problem, printed.x), STEPS)
+    return measure_walk(plan, play(plan, conditions, drive), drive, STEPS)
 
 
 def walks() -> dict[str, Result]:
