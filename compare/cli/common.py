@@ -28,7 +28,7 @@ LONGEST_SENTENCE = 2000
 STACKED_WIDTH = 60  # up to here a table is stacked: a block of lines for each row
 LONGEST_CELL = 24  # characters up to which a cell is kept on one line
 LOG_PERIOD_S = 30.0  # between two lines of progress in a log
-GAP = 2  # columns of a terminal between two columns of a table
+GAP = 3  # columns of a terminal between two columns of a table
 
 
 class PlainConsole(Console):
@@ -87,7 +87,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         return
     needs = [_needed(name, [row[i] for row in rows]) for i, name in enumerate(header)]
     groups: list[list[int]] = [[0]]
-    room = stdout.width - needs[0] - GAP
+    room = stdout.width - needs[0] - GAP - 1
     left = room
     for i in range(1, len(header)):
         if needs[i] + GAP > left and len(groups[-1]) > 1:
@@ -97,7 +97,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         left -= needs[i] + GAP
     for k, group in enumerate(groups):
         heading = title if k == 0 else f"{title}, continued"
-        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP, 0, 0))
+        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
         for i in group:
             need = min(needs[i], room)
             justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"

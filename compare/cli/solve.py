@@ -88,8 +88,12 @@ def solve(
 def _print(solution: Solution) -> None:
     value = with_unit(solution.objective, solution.objective_unit)
     converged = sum(start.success for start in solution.starts)
-    stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
-    print_table("Optimum", ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
+    if solution.feasible:
+        stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
+    else:
+        stdout.print(f"{solution.problem}: no feasible point was found ({solution.status})")
+    kind = "Optimum" if solution.success else "Best feasible point" if solution.feasible else "Least infeasible point"
+    print_table(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
         print_rows(
             "What holds it back",
