@@ -66,7 +66,7 @@ def walk12() -> Iterator[str]:
 def stairs() -> Iterator[str]:
     """One step up: plans, tracked steps and the ideal; energies in J, |torque x rate|."""
     yield header("gait", "fate", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
-    for label, result in climbs().items():
+    for label, result in climbs():
         plan = plan_of(result)
         m = measure(plan, play(plan), Drive())
         energies = (power.mechanical_W * plan.duration_s for power in (m.predicted, m.measured))
@@ -161,26 +161,22 @@ def walks() -> dict[str, Result]:
     return found | {"paper, lambda 0.9, on a circle of 8 degrees a step": _at(turning, row_of(0.9).x)}
 
 
-def climbs() -> dict[str, Result]:
-    """Gaits on the stairs."""
+def climbs() -> Iterator[tuple[str, Result]]:
+    """Gaits on the stairs, each with its name."""
     plan, track, ideal = (nlp_gait.load(f"stairs-{name}") for name in ("plan", "track", "ideal"))
-    found = {}
     for case, printed in STAIRS_TABLE_4.items():
         sized = plan.with_values(stair_length_m=printed.stair_length_m, rise_run_ratio=printed.rise_run_ratio)
-        found[f"plan, optimum, case {case}"] = optimal_climb(sized)
+        yield f"plan, optimum, case {case}", optimal_climb(sized)
     case_2 = STAIRS_TABLE_4[CASE]
     times = {name: value for name, value in STAIRS_TABLE_3.items() if name in plan.names}
     times["torso_pitch_rad"] = case_2.torso_pitch_rad
     for label, fixed in (("", times), (", hip height free", {k: v for k, v in times.items() if k != "hip_height_m"})):
-        solved = nlp_gait.solve(plan, starts=2, seed=0, fix=fixed)
-        found[f"plan, paper's Table III{label}"] = _at(plan, solved.x)
-    found["tracked, paper's gains"] = _at(
-        track.with_values(gravity_compensation=0.0), (case_2.kp, case_2.kd, case_2.torso_pitch_rad)
-    )
-    found["tracked, optimum"] = _at(track, nlp_gait.solve(track, starts=1, seed=0).x)
+        yield f"plan, paper's Table III{label}", _at(plan, nlp_gait.solve(plan, starts=2, seed=0, fix=fixed).x)
+    printed_loop = track.with_values(gravity_compensation=0.0)
+    yield "tracked, paper's gains", _at(printed_loop, (case_2.kp, case_2.kd, case_2.torso_pitch_rad))
+    yield "tracked, optimum", _at(track, nlp_gait.solve(track, starts=1, seed=0).x)
     for label, variant in (("ideal", ideal), ("ideal with reserves", ideal.with_values(**RESERVES))):
-        found[label] = _at(variant, nlp_gait.solve(variant, starts=1, seed=0).x)
-    return found
+        yield label, _at(variant, nlp_gait.solve(variant, starts=1, seed=0).x)
 
 
 def optimal_climb(problem: GaitProblem) -> Result:
