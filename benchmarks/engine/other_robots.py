@@ -69,12 +69,12 @@ def stairs() -> Iterator[str]:
     for label, result in climbs():
         plan = plan_of(result)
         m = measure(plan, play(plan), Drive())
-        energies = (power.mechanical_W * plan.duration_s for power in (m.predicted, m.measured))
         landing = 1e3 * m.landings["right"].error_m
         yield cells(
             label,
             fate(m),
-            *(f"{energy:.1f}" for energy in energies),
+            f"{m.predicted.mechanical_W * plan.duration_s:.1f}",
+            "-" if m.fallen else f"{m.measured.mechanical_W * plan.duration_s:.1f}",
             f"{m.largest_tilt_deg:.1f}",
             f"{1e3 * m.slip_m:.1f}",
             *("-" if v is None else f"{1e3 * v:.1f}" for v in (m.pressure_rms_m, m.pressure_middle_rms_m)),
@@ -101,7 +101,7 @@ def other_gains() -> Iterator[str]:
         first, second = (_walked(printed, drive, conditions) for printed in (fast, slow))
         return cells(
             label,
-            f"{m.measured.mechanical_W * climb.duration_s:.1f}",
+            "-" if m.fallen else f"{m.measured.mechanical_W * climb.duration_s:.1f}",
             fate(m),
             f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
             f"{first.steps_done}",
