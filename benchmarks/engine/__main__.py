@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable
 
-from benchmarks.engine import agreement, sensitivity
+from benchmarks.engine import agreement, other_robots, sensitivity
 
 TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "waterfall": agreement.waterfall,
@@ -20,6 +20,9 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "published": agreement.published,
     "gains": sensitivity.gains,
     "survival": sensitivity.survival,
+    "walk12": other_robots.walk12,
+    "stairs": other_robots.stairs,
+    "other-gains": other_robots.other_gains,
 }
 
 

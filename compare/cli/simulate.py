@@ -40,9 +40,7 @@ if TYPE_CHECKING:
 def simulate(
     result: ResultFile,
     *,
-    steps: Annotated[
-        int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
-    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Play this many steps of a gait that repeats.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
@@ -54,7 +52,7 @@ def simulate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a NAO gait in MuJoCo, open loop, and compare it with the model's predictions.
+    """Play a gait in MuJoCo, open loop, and compare it with the model's predictions.
 
     Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
     `nlp-gait simulate best.json --video walk.mp4`,
@@ -69,7 +67,7 @@ def simulate(
     from nlp_gait.simulation.film.film import picture_size
     from nlp_gait.simulation.film.video import check_video_path
     from nlp_gait.simulation.film.viewer import shown
-    from nlp_gait.simulation.mjcf import free_model
+    from nlp_gait.simulation.mjcf import plan_model
     from nlp_gait.simulation.plan import plan_of
     from nlp_gait.simulation.playback import play
     from nlp_gait.simulation.robustness import robustness as sweep
@@ -98,7 +96,7 @@ def simulate(
         data["beside"] = _plain(*measured[1])
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
+        write_text(folder / "model.xml", plan_model(plan, drive, sole, friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
         plot_playback(plan, traces[0], drive, folder / "playback")
     if robustness:
