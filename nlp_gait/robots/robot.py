@@ -160,9 +160,12 @@ class Foot:
     sole_polygon_m: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        """A sole has an extent on all four sides."""
-        extents = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
-        check_numbers(f"foot {self.link!r}", self, positive=extents)
+        """A sole has an extent; the ankle may lie on the ground, and above the sole's rear edge."""
+        owner = f"foot {self.link!r}"
+        check_numbers(owner, self, positive=("front_m", "left_m", "right_m"))
+        for name in ("ankle_height_m", "back_m"):
+            if getattr(self, name) < 0.0:
+                raise RobotDataError(f"{owner}: {name} must be >= 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,6 +180,7 @@ class Robot:
         links: by name.
         joints: by name.
         feet: ``"left"`` and ``"right"``.
+        toes: what lies on the ground beyond a toe joint, by side; its link's frame stands at that joint.
         armatures_kgm2: by joint, inertia of rotors at the joint, where the dynamics take it into account; none by default.
     """
 
@@ -187,6 +191,7 @@ class Robot:
     links: Mapping[str, Link]
     joints: Mapping[str, Joint]
     feet: Mapping[str, Foot]
+    toes: Mapping[str, Foot] = field(default_factory=dict)
     armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -209,6 +214,14 @@ class Robot:
         for side in ("left", "right"):
             if side not in self.feet or self.feet[side].link not in self.links:
                 raise RobotDataError(f"robot {self.name!r}: foot {side!r} is missing or names no link")
+        for side, toe in self.toes.items():
+            if side not in self.feet or toe.link not in self.links:
+                raise RobotDataError(f"robot {self.name!r}: toe {side!r} belongs to no foot or names no link")
+
+    @cached_property
+    def soles(self) -> Mapping[str, Foot]:
+        """Everything that stands on the ground, feet and toes, by link."""
+        return {foot.link: foot for part in (self.feet, self.toes) for foot in part.values()}
 
     @cached_property
     def mass_kg(self) -> float:
