@@ -138,6 +138,28 @@ class DriveOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FilmOptions:
+    """A film of a simulated gait, and how it is made."""
+
+    video: Annotated[
+        Path | None, typer.Option(help="Film it to this .gif or .mp4 file, from the side, the front and above.")
+    ] = None
+    beside: Annotated[
+        Path | None, typer.Option(metavar="OTHER.json", help="Play this gait as well, beside the other in the film.")
+    ] = None
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Of the film [pixels].")] = "1280x720"
+    speed: Annotated[float, typer.Option(min=0.05, max=20.0, help="Speed of the film; 0.25 is slow motion.")] = 1.0
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")] = 25.0
+
+    @property
+    def note(self) -> str:
+        """What the film says of its speed."""
+        if self.speed == 1.0:
+            return ""
+        return f"{'slow motion' if self.speed < 1.0 else 'fast'}: {self.speed:g} x real time"
+
+
+@dataclass(frozen=True, kw_only=True)
 class SearchOptions:
     """Runs of search algorithms: how many, how constraints are handled, and when a run ends."""
 

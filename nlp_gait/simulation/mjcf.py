@@ -10,6 +10,7 @@ from nlp_gait.problem.playback import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.looks import FLOOR, add_light, add_world, paint
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.root import add_root_joints
 from nlp_gait.simulation.shapes import Prism, Shape
@@ -20,7 +21,6 @@ TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
-FLOOR = "floor"
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 Shapes = Mapping[str, Sequence[Shape]]
@@ -64,14 +64,14 @@ def free_model(
         condim="3",
         solref=_numbers(CONTACT_TIME_CONSTANT, 1.0),
         friction=_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION),
-        rgba="0.86 0.87 0.9 1",
     )
-    _add_assets(Xml.SubElement(root, "asset"), shapes)
+    _add_hulls(add_world(root), shapes)
     world = Xml.SubElement(root, "worldbody")
-    Xml.SubElement(world, "light", pos="0.6 -1 2", dir="-0.3 0.5 -1", diffuse="0.7 0.7 0.7")
     Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
     _add_stairs(world, ground)
     bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
+    paint(bodies, robot)
+    add_light(bodies[robot.root])
     for side, foot in robot.feet.items():
         Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
     actuators = Xml.SubElement(root, "actuator")
@@ -108,13 +108,8 @@ def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
         box.attrib |= {"contype": "1", "rgba": "0.8 0.78 0.74 1"}
 
 
-def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
-    """Texture of the floor and convex hulls of the soles."""
-    sky = Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384")
-    sky.attrib |= {"rgb1": "1 1 1", "rgb2": "0.85 0.9 0.95"}
-    tiles = Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256")
-    tiles.attrib |= {"rgb1": "0.95 0.96 0.97", "rgb2": "0.85 0.87 0.9"}
-    Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texrepeat="60 60")
+def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
+    """Convex hulls of the soles."""
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
             if isinstance(shape, Prism):
@@ -149,7 +144,7 @@ def add_bodies(
 
 def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
     if isinstance(shape, Prism):
-        Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name, rgba="0.35 0.38 0.42 1")
+        Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name)
         return
     if shape.start == shape.end:
         place = {"type": "sphere", "pos": _numbers(*shape.start)}

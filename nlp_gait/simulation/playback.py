@@ -13,7 +13,8 @@ from nlp_gait.problem import Array, Columns, Signals, in_space
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.mjcf import FLOOR, TIME_STEP, plan_model
+from nlp_gait.simulation.looks import FLOOR
+from nlp_gait.simulation.mjcf import TIME_STEP, plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.root import place_root
 

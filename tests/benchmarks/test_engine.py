@@ -11,6 +11,8 @@ from compare.judge import evaluate  # noqa: E402
 from compare.papers.walk12.paper import row_of  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.problem import Result  # noqa: E402
+from nlp_gait.problems.walk12.playback import rigid_bodies  # noqa: E402
+from nlp_gait.problems.walk12.robot import point_mass_biped  # noqa: E402
 
 
 def test_random_gaits_are_feasible_and_seeded():
@@ -40,7 +42,7 @@ def test_the_engine_ranks_random_gaits_of_double_support_as_the_model_does(monke
 
 def test_point_masses_are_built_otherwise_only_within_the_block():
     def inertia() -> float:
-        robot = nlp_gait.load("walk12").playback.robot
+        robot = rigid_bodies(point_mass_biped())
         return float(robot.links["left foot"].inertia_com_kgm2[0])
 
     usual = inertia()
