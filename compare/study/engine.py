@@ -18,7 +18,7 @@ from nlp_gait.problem.result import StoredProblem
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.measurements import measure
-from nlp_gait.simulation.mjcf import free_model
+from nlp_gait.simulation.mjcf import plan_model
 from nlp_gait.simulation.plan import Plan, plan_of
 from nlp_gait.simulation.playback import play
 from nlp_gait.simulation.walking import measure_walk
@@ -158,7 +158,7 @@ def _gait(record: RunRecord) -> dict[str, Any]:
 
 def _digest(plan: Plan, drive: Drive) -> str:
     """Of all that is simulated but the drive's set-points, which follow from it and the drive."""
-    text = free_model(plan.robot, plan.shapes("rectangle"), drive, plan.gravity)
+    text = plan_model(plan, drive)
     digest = hashlib.sha256(text.encode())
     for name in ("t", "q", "tau"):
         digest.update(plan.signals.arrays[name].tobytes())
