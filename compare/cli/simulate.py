@@ -22,8 +22,7 @@ from compare.cli.common import (
     progress_bar,
     stdout,
 )
-from compare.cli.options import AsJson, DriveOptions, FilmOptions, ResultFile
-from nlp_gait.simulation.mjcf import FRICTION
+from compare.cli.options import AsJson, ConditionOptions, DriveOptions, FilmOptions, ResultFile
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
@@ -44,7 +43,7 @@ def simulate(
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
-    friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    world: ConditionOptions,
     servos: DriveOptions,
     film: FilmOptions,
     robustness: Annotated[
@@ -52,7 +51,7 @@ def simulate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a gait in MuJoCo, open loop, and compare it with the model's predictions.
+    """Play a gait in MuJoCo, in open loop or with balance feedback, and compare it with the model's predictions.
 
     Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
     `nlp-gait simulate best.json --video walk.mp4`,
@@ -62,7 +61,6 @@ def simulate(
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.problem.result import load_result
-    from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.film.film import picture_size
     from nlp_gait.simulation.film.video import check_video_path
@@ -80,7 +78,7 @@ def simulate(
     size = picture_size(film.size)
     target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else writable_folder(out)
-    drive, conditions = servos.chosen(), Conditions(friction=friction)
+    drive, conditions = servos.chosen(), world.chosen()
     gaits = [(path, load_result(path)) for path in (result, film.beside) if path is not None]
     plans = [plan_of(gait, steps) for _, gait in gaits]
     plan, players = plans[0], [partial(play, plan, conditions, drive, sole) for plan in plans]
@@ -96,7 +94,7 @@ def simulate(
         data["beside"] = _plain(*measured[1])
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", plan_model(plan, drive, sole, friction))
+        write_text(folder / "model.xml", plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
         plot_playback(plan, traces[0], drive, folder / "playback")
     if robustness:

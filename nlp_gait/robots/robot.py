@@ -56,18 +56,25 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
-    """Motor and gear of a joint (data-sheet values at the motor shaft)."""
+    """Motor and gear of a joint (data-sheet values at the motor shaft); the rotor's inertia if it is known."""
 
     make: str
     gear_ratio: float
     no_load_rpm: float
     stall_torque_mNm: float
     continuous_torque_mNm: float
+    rotor_inertia_gcm2: float | None = None
 
     def __post_init__(self) -> None:
         """All ratings are positive."""
-        ratings = ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm")
-        check_numbers(f"motor {self.make!r}", self, positive=ratings)
+        ratings = ["gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"]
+        known = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
+        check_numbers(f"motor {self.make!r}", self, positive=known)
+
+    @property
+    def reflected_inertia_kgm2(self) -> float | None:
+        """Of the rotor at the joint: it turns as many times faster as the gear's ratio, which counts twice [kg m^2]."""
+        return None if self.rotor_inertia_gcm2 is None else self.gear_ratio**2 * self.rotor_inertia_gcm2 * 1e-7
 
     @property
     def stall_torque_Nm(self) -> float:
@@ -174,6 +181,7 @@ class Robot:
         joints: by name.
         feet: ``"left"`` and ``"right"``.
         toes: what lies on the ground beyond a toe joint, by side; its link's frame stands at that joint.
+        armatures_kgm2: by joint, inertia of rotors at the joint, where the dynamics take it into account; none by default.
     """
 
     name: str
@@ -184,6 +192,7 @@ class Robot:
     joints: Mapping[str, Joint]
     feet: Mapping[str, Foot]
     toes: Mapping[str, Foot] = field(default_factory=dict)
+    armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Links and joints form one tree."""

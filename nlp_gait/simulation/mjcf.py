@@ -130,7 +130,9 @@ def add_bodies(
         if body.joint is not None:
             axis = (body.direction * a for a in body.joint.axis)
             limits = _numbers(*body.joint.limits_rad)
-            Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
+            joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
+            if body.armature_kgm2:
+                joint.set("armature", _numbers(body.armature_kgm2))
         elif root != "fixed":
             add_root_joints(element, planar=root == "planar")
         link = body.link

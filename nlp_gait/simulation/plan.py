@@ -117,10 +117,15 @@ class Plan:
             return np.asarray(self._splines[name](within))
         samples = self.signals.arrays
         if name == "qd":
-            return np.asarray(self._splines["q"](within, 1) * (times <= self.duration_s)[:, None])
+            return self.rate("q", times)
         # Torques jump where a foot lands or lifts: no spline runs through them.
         columns = [np.interp(within, samples["t"], column) for column in samples[name].T]
         return np.stack(columns, axis=1)
+
+    def rate(self, name: str, times: Array) -> Array:
+        """Planned rates of what has a spline at any times (T,): zero beyond the end."""
+        within = np.clip(times, 0.0, self.duration_s)
+        return np.asarray(self._splines[name](within, 1) * (times <= self.duration_s)[:, None])
 
     def rate_at_start(self, name: str) -> Array:
         """Planned velocity at time zero."""

@@ -1,4 +1,4 @@
-"""A planned gait played back open loop: what the servos are told is known before it begins."""
+"""A planned gait played back: what the servos are told is known before it begins, unless the drive has a feedback."""
 
 from __future__ import annotations
 
@@ -102,7 +102,10 @@ def play(
     least_heights = (heights - (1.0 - FALLEN_HEIGHT) * heights[0]).tolist()
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None
+    balance = drive.balance(plan, model)
     for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
+        if balance is not None:
+            command += balance.shift(data)  # in place: these are the set-points that the trace keeps
         data.ctrl[at.actuators] = command
         data.xfrc_applied[at.torso, :2] = _push(conditions, plan.duration_s, t)
         if observe is not None:
@@ -131,6 +134,8 @@ def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tup
     model = engine.MjModel.from_xml_string(text)
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
+    model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
+    model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
     model.opt.gravity[:] = conditions.gravity(plan.gravity)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)

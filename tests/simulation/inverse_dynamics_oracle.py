@@ -11,7 +11,7 @@ from casadi import SX
 
 from nlp_gait.problem import Array, Result, Signals
 from nlp_gait.problems.biped.phase import BOTH_FEET
-from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.double_support import torso_shares
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
@@ -29,8 +29,9 @@ def engine_torques(result: Result, signals: Signals) -> Array:
         result: gait of ``nao-ssp`` or ``nao-dsp``, with rotational inertia: an engine takes no point masses.
         signals: its time histories.
     """
-    options = result.problem.options
-    robot = nao(str(options["robot"]), rotational_inertia=True)
+    options, playback = result.problem.options, result.problem.playback
+    assert playback is not None  # a gait of NAO has one; for the type checker
+    robot = playback.robot
     torques = np.zeros_like(signals.arrays["tau"])
     if result.problem.name == "nao-ssp":
         _fill(torques, tree_from(robot, robot.feet["left"].link), signals)

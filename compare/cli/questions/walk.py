@@ -33,7 +33,8 @@ def walk(
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
-    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. A cycle is played open loop.
+    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. Played is in open loop unless
+    a feedback is named.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`

@@ -123,7 +123,7 @@ def _walks(name: str, gaits: Sequence[Gait]) -> list[Part]:
     return [
         table_of(f"Energy of {steps} steps in the physics engine, for each planned metre", walks, energies),
         agreed.sentence(),
-        table_of(f"Course of the {steps} steps, open loop", walks, courses),
+        table_of(f"Course of the {steps} steps", walks, courses),
     ]
 
 

@@ -30,9 +30,9 @@ from nlp_gait.problems.nao.cycle_rows import (
     start_at_speed,
 )
 from nlp_gait.problems.nao.double_support import TorsoShare, double_support_loads
-from nlp_gait.problems.nao.problem import paper_parts, with_robot
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
-from nlp_gait.robots import Robot
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -41,7 +41,7 @@ OBJECTIVES = {
 }
 
 
-@maker({"samples_per_interval": 1})
+@maker({"samples_per_interval": 1}, {"motors": ""})
 def nao_cycle(
     *,
     robot: str = "nao-v5",
@@ -50,6 +50,7 @@ def nao_cycle(
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "lever",
     samples_per_interval: int = 1,
+    motors: str = "",
 ) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one; for the other options see ``problems.nao``.
 
@@ -62,9 +63,11 @@ def nao_cycle(
         torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
             farther one.
         samples_per_interval: above 1 for a denser grid.
+        motors: what of the real motors is taken into account; the mean square of a continuous torque is that of each phase.
     """
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
-    cycle = walking_cycle(nao(robot, rotational_inertia), torso_share, grid, at_given_speed=objective == "power")
+    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    cycle = walking_cycle(real, torso_share, grid, at_given_speed=objective == "power")
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -82,18 +85,19 @@ def nao_cycle(
         start=start if cycle.at_given_speed else None,
         durations=tuple(TIMES.values()),
     )
-    return with_robot(problem, robot, repeats=True)
+    return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
 
-def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
+def walking_cycle(motors: Motors, torso_share: TorsoShare, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
     """Both phases of the cycle.
 
     Args:
-        model: robot as ``nao`` makes it.
+        motors: of a robot as ``nao`` makes it.
         torso_share: in double support, see ``double_support.torso_shares``.
         grid: of each phase.
         at_given_speed: the step length follows from the speed.
     """
+    model = motors.model
     variables, means = cycle_variables(model), mean_margins(model)
     halves = {
         "ssp": (single_support_planner(model), single_support_loads(model), single_margins(model)),
@@ -109,7 +113,8 @@ def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given
             plan=plan,
             loads=loads,
             grid=grid,
-            parts=paper_parts(model, margins, means[name]),
+            parts=(*paper_parts(model, margins, means[name]), *motors.parts),
+            goal=goal_of("power", motors),
         )
         for name, (plan, loads, margins) in halves.items()
     }

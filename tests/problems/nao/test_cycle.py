@@ -9,6 +9,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle import walking_cycle
+from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
@@ -71,9 +72,10 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     """Single and double support, both with their samples at the switch."""
-    model, share = nao("nao-v5", rotational_inertia=True), problem.options["torso_share"]
+    real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
+    share = problem.options["torso_share"]
     assert problem.grid is not None
-    cycle = walking_cycle(model, share, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    cycle = walking_cycle(real, share, problem.grid, at_given_speed=problem.options["objective"] == "power")
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 
