@@ -44,7 +44,6 @@ class Recording:
         stand: (F, 2) halfway between the feet, likewise [m].
         pressure: (F, 2) centre of pressure [m]; NaN in flight.
         planned: (F, 2) planned zero-moment point [m].
-        level: (F,) height of the ground there [m].
         load: (F,) force of the floor [N].
     """
 
@@ -59,7 +58,6 @@ class Recording:
     stand: Array
     pressure: Array
     planned: Array
-    level: Array
     load: Array
 
 
@@ -106,7 +104,6 @@ def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recor
         stand=_smooth(trace.feet.mean(axis=1)[:, :2], PATH_WINDOW)[at],
         pressure=averaged_pressure(trace, PRESSURE_WINDOW)[at],
         planned=plan.at("zmp", trace.t[at]),
-        level=plan.level(plan.at("zmp", trace.t[at])[:, 0]),
         load=_smooth(trace.loads.sum(axis=1), PRESSURE_WINDOW)[at],
     )
 

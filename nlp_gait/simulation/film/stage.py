@@ -157,12 +157,11 @@ class Stage:
 
     def _add_dots(self, k: int) -> None:
         """Centre of pressure with its path, and the planned zero-moment point."""
-        level = float(self._recording.level[k])
-        self._add_dot(self._recording.planned[k], 1.5, PLANNED, level - 0.001)
+        self._add_dot(self._recording.planned[k], 1.5, PLANNED, -0.001)
         begin = max(0, k - TRAIL)
         for i, centre in enumerate(self._recording.pressure[begin : k + 1], begin):
             share = 1.0 if i == k else 0.35
-            self._add_dot(centre, share, MEASURED, level + (0.001 if i == k else 0.0))
+            self._add_dot(centre, share, MEASURED, 0.001 if i == k else 0.0)
 
     def _add_dot(self, centre: Any, share: float, colour: Sequence[float], over: float) -> None:
         if np.isfinite(centre).all():
