@@ -21,7 +21,7 @@ TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
-LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.6  # [m]
+LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 Shapes = Mapping[str, Sequence[Shape]]
 
