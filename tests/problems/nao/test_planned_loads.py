@@ -1,0 +1,214 @@
+"""Double support whose load is planned: torques and wrenches against Pinocchio, soles against corner forces, curves against SciPy."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+from casadi import SX
+from scipy.interpolate import BPoly
+from scipy.optimize import linprog
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array, GaitProblem, Signals, load
+from nlp_gait.problems.biped.foot_loads import bernstein
+from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.cycle import walking_cycle
+from nlp_gait.problems.nao.double_support import load_sharing
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.symbolic.balance import sole_limits
+from tests.backends.toys import row_violations
+from tests.evaluation import evaluated
+from tests.pinocchio_oracle import floating_model
+
+# Two double-precision algorithms on torques of some Nm and forces of some ten N.
+TORQUE_TOLERANCE_NM = FORCE_TOLERANCE_N = 1e-10
+# The same sums in another order.
+ROUNDING = 1e-12
+SAMPLES = 11
+FEASIBLE = {
+    "nao-dsp": (0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0),
+    "nao-dsp-free": (0.30, 0.006, 0.0006, 0.03, 0.03, -0.05, -0.05, 1.0),
+}
+OPTIONS: dict[str, dict[str, str | int]] = {
+    "nao-dsp": {"samples_per_interval": 1},
+    "nao-dsp-free": {"trajectory": "spline-2", "samples_per_interval": 1},
+    "nao-cycle": {"objective": "power", "samples_per_interval": 1},
+}
+
+
+@cache
+def problem_of(name: str) -> GaitProblem:
+    return load(name, torso_share="free", **OPTIONS[name])
+
+
+def candidate(name: str, seed: int = 0) -> Array:
+    """A motion that closes, with a load somewhere near one that passes evenly."""
+    problem, rng = problem_of(name), np.random.default_rng(seed)
+    x = problem.start_point(rng)
+    if name in FEASIBLE:
+        own = FEASIBLE[name]
+        x[: len(own)] = own
+    for i, variable in enumerate(problem.names):
+        if variable.startswith("right_"):
+            x[i] += 0.05 * rng.normal() * problem.scale[i]
+        elif variable.startswith("torso_"):
+            x[i] = 0.2 * rng.normal()
+    return x
+
+
+def double_support(name: str, x: Array) -> Signals:
+    problem = problem_of(name)
+    if name != "nao-cycle":
+        return problem.signals(x)
+    model = nao("nao-v5", rotational_inertia=True)
+    assert problem.grid is not None
+    cycle = walking_cycle(model, load_sharing(model, "free", 4), problem.grid, at_given_speed=True)
+    return cycle.signals(problem.at(x))["dsp"]
+
+
+def left_over(robot: Robot, signals: Signals, sample: int) -> Array:
+    """What equations of motion with both wrenches as forces from outside leave: base rows first, then joints [N, Nm]."""
+    model = floating_model(robot)
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    data = model.createData()
+    q, v, a, tau = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv), np.zeros(model.nv)
+    for joint, *values in zip(
+        signals.joints, *(signals.arrays[k][sample] for k in ("q", "qd", "qdd", "tau")), strict=True
+    ):
+        entry = model.joints[model.getJointId(joint)]
+        q[entry.idx_q], v[entry.idx_v], a[entry.idx_v], tau[entry.idx_v] = values
+    left = model.getJointId("LAnkleRoll")
+    pin.forwardKinematics(model, data, q)
+    height = np.array([0.0, 0.0, robot.feet["left"].ankle_height_m])
+    base = pin.SE3(np.eye(3), signals.arrays["left_foot"][sample] + height) * data.oMi[left].inverse()
+    q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+    pin.computeJointJacobians(model, data, q)
+    jacobian = pin.getJointJacobian(model, data, left, pin.LOCAL_WORLD_ALIGNED)
+    v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
+    pin.forwardKinematics(model, data, q, v, a)
+    drift = pin.getAcceleration(model, data, left, pin.LOCAL_WORLD_ALIGNED).vector
+    a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+    forces = pin.StdVec_Force()
+    for _ in range(model.njoints):
+        forces.append(pin.Force.Zero())
+    for side, foot in (("L", "left"), ("R", "right")):
+        index = model.getJointId(f"{side}AnkleRoll")
+        # The placement of the foot's axes in the world, at the point under its ankle.
+        below = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample])
+        wrench = pin.Force(signals.arrays[f"{foot}_force"][sample], signals.arrays[f"{foot}_moment"][sample])
+        forces[index] = data.oMi[index].actInv(below.act(wrench))
+    driven = [model.joints[model.getJointId(joint)].idx_v for joint in signals.joints]  # the head is locked
+    return np.asarray((pin.rnea(model, data, q, v, a, forces) - tau)[[*range(6), *driven]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(OPTIONS))
+@pytest.mark.parametrize("seed", range(2))
+def test_torques_are_pinocchios_with_the_wrenches_as_outer_forces(name: str, seed: int) -> None:
+    """The base rows say that both wrenches carry the robot, the joint rows that the torques are right."""
+    robot, signals = load_robot("nao-v5"), double_support(name, candidate(name, seed))
+    assert np.ptp(signals.arrays["right_force"][:, 2]) > 10.0
+    for sample in range(SAMPLES):
+        rest = left_over(robot, signals, sample)
+        np.testing.assert_allclose(rest, 0.0, rtol=0, atol=TORQUE_TOLERANCE_NM)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", ["printed", "lever"])
+def test_the_papers_divisions_show_their_wrenches_too(rule: str) -> None:
+    problem = load("nao-dsp", torso_share=rule)
+    signals = problem.signals(np.array(FEASIBLE["nao-dsp"]))
+    for sample in range(SAMPLES):
+        np.testing.assert_allclose(left_over(load_robot("nao-v5"), signals, sample), 0.0, atol=TORQUE_TOLERANCE_NM)
+
+
+@pytest.mark.slow
+def test_the_division_leaves_motion_and_zmp_alone() -> None:
+    """Only torques differ: with the wrench that a rule has, the plan has that rule's torques."""
+    x, free = candidate("nao-dsp"), problem_of("nao-dsp")
+    ruled = load("nao-dsp", torso_share="lever").signals(x[:8])
+    mine = free.signals(x)
+    for name in ("q", "qd", "qdd", "hip", "com", "zmp"):
+        np.testing.assert_allclose(mine.arrays[name], ruled.arrays[name], rtol=0, atol=ROUNDING * 10, err_msg=name)
+    both = [sum(s.arrays[f"{foot}_force"] for foot in ("left", "right")) for s in (mine, ruled)]
+    np.testing.assert_allclose(both[0], both[1], rtol=0, atol=FORCE_TOLERANCE_N)
+    phases = np.linspace(0.0, 1.0, 11)
+    forces = np.hstack([ruled.arrays["right_force"], ruled.arrays["right_moment"]])
+    table = BPoly(np.eye(11)[:, None, :], [0.0, 1.0])(phases)
+    matched = load("nao-dsp", torso_share="free", samples_per_interval=1, load_degree=10)
+    same = matched.signals(np.concatenate([x[:8], np.linalg.solve(table, forces).T.ravel()]))
+    np.testing.assert_allclose(same.arrays["tau"], ruled.arrays["tau"], rtol=0, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_derivatives_of_the_paper_take_the_planned_wrench_too() -> None:
+    problem = load("nao-dsp", torso_share="free", derivatives="finite-difference", samples_per_interval=1)
+    signals = problem.signals(candidate("nao-dsp"))
+    analytic = problem_of("nao-dsp").signals(candidate("nao-dsp"))
+    np.testing.assert_array_equal(signals.arrays["right_force"], analytic.arrays["right_force"])
+    power = np.abs(signals.arrays["tau"] * signals.arrays["qd"]) + 0.025 * signals.arrays["tau"] ** 2
+    t = signals.arrays["t"]
+    cost = evaluated(problem, candidate("nao-dsp")).cost
+    assert cost == pytest.approx(np.trapezoid(power.sum(axis=1), t) / t[-1], rel=ROUNDING)
+
+
+def test_bernstein_polynomials_are_scipys() -> None:
+    s = SX.sym("s")
+    function = ca.Function("bernstein", [s], [bernstein(5, s)])
+    phases = np.linspace(0.0, 1.0, 21)
+    theirs = BPoly(np.eye(6)[:, None, :], [0.0, 1.0])(phases)
+    np.testing.assert_allclose(np.array(function.map(21)(phases[None, :])).T, theirs, rtol=0, atol=1e-14)
+
+
+def test_a_sole_bears_what_forces_at_its_corners_can_give() -> None:
+    """Random wrenches: the rows hold if and only if four corner forces, each within its pyramid, add up to it."""
+    along, across, mu = (-0.04, 0.09), (-0.03, 0.05), 0.5
+    wrench = SX.sym("wrench", 6)
+    limits = ca.Function("limits", [wrench], [ca.vertcat(*sole_limits(wrench, along, across, SX(mu)))])
+    corners = [(x, y) for x in along for y in across]
+    arms = np.hstack([_turned(np.array([x, y, 0.0])) for x, y in corners])
+    sums = np.vstack([np.tile(np.eye(3), 4), arms])
+    slope = mu / np.sqrt(2.0)
+    pyramid = np.array([[1, 0, -slope], [-1, 0, -slope], [0, 1, -slope], [0, -1, -slope]])
+    rng, seen = np.random.default_rng(0), {True: 0, False: 0}
+    for _ in range(300):
+        load_N = rng.uniform(5.0, 50.0)
+        w = np.array([0.2, 0.2, 1.0, 0.05, 0.06, 0.03]) * rng.uniform(-1, 1, 6) * load_N
+        w[2], w[4] = load_N, w[4] - 0.025 * load_N
+        least = float(ca.mmin(limits(w)))
+        if abs(least) < 1e-6:
+            continue
+        found = linprog(
+            np.zeros(12), A_ub=np.kron(np.eye(4), pyramid), b_ub=np.zeros(16), A_eq=sums, b_eq=w, bounds=(None, None)
+        )
+        assert found.success == (least > 0), (w, least)
+        seen[least > 0] += 1
+    assert min(seen.values()) > 20
+
+
+def _turned(arm: Array) -> Array:
+    """(3, 3) matrix of the moment that a force at a point has."""
+    x, y, z = arm
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+@pytest.mark.slow
+def test_a_load_that_jumps_or_pulls_breaks_rows() -> None:
+    problem, x = problem_of("nao-dsp"), candidate("nao-dsp")
+    names = list(problem.names)
+    x[names.index("right_force_z_N[0]")] = 40.0
+    x[[i for i, name in enumerate(names) if name.startswith("right_force_x")]] = 25.0
+    broken = {row.name.partition("[")[0] for row in row_violations(problem, x)}
+    assert {"switch_load", "right_friction"} <= broken
+    x[[i for i, name in enumerate(names) if name.startswith("right_force_z")]] = -5.0
+    assert "right_pressure" in {row.name.partition("[")[0] for row in row_violations(problem, x)}
+
+
+def test_a_degree_without_use_is_refused() -> None:
+    for degree in (0, 13):
+        with pytest.raises(InputError, match="load_degree must be within"):
+            load("nao-dsp", torso_share="free", load_degree=degree)
