@@ -36,6 +36,12 @@ def simulate(
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
     servos: DriveOptions,
+    share_loads: Annotated[
+        bool, typer.Option("--share-loads", help="Share load anew in double support for least power (extra qp).")
+    ] = False,
+    load_rate: Annotated[
+        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load, weights a second.")
+    ] = 12.5,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
@@ -52,6 +58,8 @@ def simulate(
     from nlp_gait.simulation.camera import filmed, shown
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.engine import mujoco
+    from nlp_gait.simulation.load_sharing import Sharing
+    from nlp_gait.simulation.load_sharing import share_loads as anew
     from nlp_gait.simulation.measurements import measure
     from nlp_gait.simulation.mjcf import free_model
     from nlp_gait.simulation.plan import plan_of
@@ -66,6 +74,8 @@ def simulate(
     target = None if video is None else output_file(check_video_path(video))
     folder = None if out is None else writable_folder(out)
     plan = plan_of(load_result(result), steps)
+    if share_loads:
+        plan = anew(plan, Sharing(load_rate_1_s=load_rate))
     drive, conditions = servos.chosen(), Conditions(friction=friction)
     if target is not None:
         trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)

@@ -12,7 +12,11 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
-SIDES_SWAPPED = {"left_foot": "right_foot", "right_foot": "left_foot"}
+SIDES_SWAPPED = {
+    f"{side}_{what}": f"{other}_{what}"
+    for side, other in (("left", "right"), ("right", "left"))
+    for what in ("foot", "force", "moment")
+}
 
 
 def walk(cycle: Signals, robot: Robot, steps: int) -> Signals:
@@ -52,7 +56,9 @@ def mirror_image(signals: Signals, robot: Robot) -> Signals:
         elif name == "t":
             arrays[name] = array
         else:
-            arrays[SIDES_SWAPPED.get(name, name)] = array * np.array([1.0, -1.0, 1.0])[: array.shape[1]]
+            # A reflection turns a moment, as any turning, the other way than a force.
+            reflected = np.array([1.0, -1.0, 1.0]) * (-1.0 if signals.columns[name].unit == "Nm" else 1.0)
+            arrays[SIDES_SWAPPED.get(name, name)] = array * reflected[: array.shape[1]]
     return replace(signals, arrays=arrays)
 
 
@@ -60,8 +66,10 @@ def _moved(signals: Signals, distance: float, delay: float) -> dict[str, Array]:
     """Arrays with all positions moved forward [m] and all times delayed [s]."""
     arrays = {}
     for name, array in signals.arrays.items():
-        if name in JOINT_ARRAYS:
-            arrays[name] = array
+        if name == "t":
+            arrays[name] = array + delay
+        elif name not in JOINT_ARRAYS and signals.columns[name].unit == "m":
+            arrays[name] = array + distance * np.eye(1, array.shape[1])[0]
         else:
-            arrays[name] = array + (delay if name == "t" else distance * np.eye(1, array.shape[1])[0])
+            arrays[name] = array
     return arrays

@@ -31,6 +31,10 @@ from nlp_gait.symbolic.trajectories import Motion
 
 COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"}
 LARGEST_DEGREE = 12
+# Part of the phase, at either end, in which a foot takes over load or hands it on: a low polynomial alone cannot begin at zero
+# and be elsewhere soon after.
+RAMP_SHARE = 0.1
+RAMPS = 2
 # Coefficients start near a load that passes evenly from foot to foot, off it by at most this share of their bounds.
 START_SHARE = 0.02
 # Static friction that is commonly asked of a walkway (UL 410); rubber on a dry floor has more.
@@ -43,7 +47,7 @@ Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlannedWrench:
-    """Wrench of the ground on the right sole, about the point under its ankle, as polynomials in Bernstein form.
+    """Wrench of the ground on the right sole, about the point under its ankle: polynomials in Bernstein form, and ramps.
 
     Attributes:
         robot: with links welded that never move.
@@ -64,8 +68,13 @@ class PlannedWrench:
             raise InputError(f"load_degree must be within [1, {LARGEST_DEGREE}], got {self.degree}")
 
     @property
+    def count(self) -> int:
+        """Coefficients of each component."""
+        return self.degree + 1 + RAMPS
+
+    @property
     def variables(self) -> tuple[Variable, ...]:
-        """Coefficients, component by component; bounds are wide, for coefficients may lie beyond what the polynomial reaches."""
+        """Coefficients, component by component; bounds are wide, for coefficients may lie beyond what the curve reaches."""
         foot, weight = self.robot.feet["right"], self.weight
         along, across = max(foot.front_m, foot.back_m), max(foot.left_m, foot.right_m)
         most = dict(zip(COMPONENTS, (0.5, 0.5, 2.0, across, along, across), strict=True))
@@ -78,7 +87,7 @@ class PlannedWrench:
                 description=f"coefficient {k} of the ground's {component.replace('_', ' along ')} on the right sole",
             )
             for (component, unit), share in zip(COMPONENTS.items(), most.values(), strict=True)
-            for k in range(self.degree + 1)
+            for k in range(self.count)
         )
 
     def planned(self, plan: Planner) -> Planner:
@@ -86,8 +95,8 @@ class PlannedWrench:
         names = [variable.name for variable in self.variables]
 
         def both(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
-            values = ca.reshape(ca.vertcat(*(at[name] for name in names)), self.degree + 1, len(COMPONENTS))
-            return plan(at, phase, ops)._replace(wrench=values.T @ bernstein(self.degree, phase))
+            values = ca.reshape(ca.vertcat(*(at[name] for name in names)), self.count, len(COMPONENTS))
+            return plan(at, phase, ops)._replace(wrench=values.T @ load_basis(self.degree, phase))
 
         return both
 
@@ -95,8 +104,8 @@ class PlannedWrench:
         """Start points of variables: a load that passes evenly to the right foot, and the others as without it."""
         own = [variable.name for variable in self.variables]
         places = [names.index(name) for name in own]
-        middle = np.zeros((len(COMPONENTS), self.degree + 1))
-        middle[list(COMPONENTS).index("force_z")] = np.linspace(0.0, self.weight, self.degree + 1)
+        middle = np.zeros((len(COMPONENTS), self.count))
+        middle[list(COMPONENTS).index("force_z"), :-RAMPS] = np.linspace(0.0, self.weight, self.degree + 1)
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
             lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
@@ -108,10 +117,11 @@ class PlannedWrench:
         return start
 
 
-def bernstein(degree: int, phase: SX) -> SX:
-    """(degree + 1,) Bernstein polynomials of the phase."""
+def load_basis(degree: int, phase: SX) -> SX:
+    """(degree + 3,) Bernstein polynomials of the phase, and cubic ramps down from its start and up to its end."""
+    ramps = (ca.fmax(0, 1 - far / RAMP_SHARE) ** 3 for far in (phase, 1 - phase))
     return ca.vertcat(
-        *(math.comb(degree, k) * phase**k * (1 - phase) ** (degree - k) for k in range(degree + 1)),
+        *(math.comb(degree, k) * phase**k * (1 - phase) ** (degree - k) for k in range(degree + 1)), *ramps
     )
 
 

@@ -144,7 +144,7 @@ class Phase:
             qd, qdd = self._differences(q, at)
             n = self.grid.parts + 1
             torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
-            wrenches = self._ground.map(n)(q, qd, qdd, hip, world) if pressed else ()
+            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if pressed else []
             power, moved = qd * moving, [q, qd, qdd]
         return Samples(
             joints=self.joints,

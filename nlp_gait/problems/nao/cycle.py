@@ -15,6 +15,7 @@ import numpy as np
 from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.curves import grid_for
 from nlp_gait.problems.nao.cycle_motion import (
     TIMES,
     cycle_variables,
@@ -29,7 +30,6 @@ from nlp_gait.problems.nao.cycle_rows import (
     single_margins,
     start_at_speed,
 )
-from nlp_gait.problems.nao.curves import grid_for
 from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
 from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
@@ -86,6 +86,7 @@ def nao_cycle(
         motion=lambda at: joined(cycle.signals(at)),
         start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
+        long_derivatives=bool(sharing.variables),
     )
     return with_robot(problem, robot, repeats=True)
 

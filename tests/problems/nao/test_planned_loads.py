@@ -1,4 +1,4 @@
-"""Double support whose load is planned: torques and wrenches against Pinocchio, soles against corner forces, curves against SciPy."""
+"""Double support whose load is planned: against Pinocchio, corner forces, and SciPy's polynomials."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 import pytest
 from casadi import SX
 from scipy.interpolate import BPoly
@@ -14,15 +13,15 @@ from scipy.optimize import linprog
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
-from nlp_gait.problems.biped.foot_loads import bernstein
+from nlp_gait.problems.biped.foot_loads import RAMP_SHARE, load_basis
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.problems.nao.double_support import load_sharing
-from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.balance import sole_limits
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
-from tests.pinocchio_oracle import floating_model
+from tests.pinocchio_oracle import left_over
 
 # Two double-precision algorithms on torques of some Nm and forces of some ten N.
 TORQUE_TOLERANCE_NM = FORCE_TOLERANCE_N = 1e-10
@@ -70,41 +69,6 @@ def double_support(name: str, x: Array) -> Signals:
     return cycle.signals(problem.at(x))["dsp"]
 
 
-def left_over(robot: Robot, signals: Signals, sample: int) -> Array:
-    """What equations of motion with both wrenches as forces from outside leave: base rows first, then joints [N, Nm]."""
-    model = floating_model(robot)
-    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    data = model.createData()
-    q, v, a, tau = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv), np.zeros(model.nv)
-    for joint, *values in zip(
-        signals.joints, *(signals.arrays[k][sample] for k in ("q", "qd", "qdd", "tau")), strict=True
-    ):
-        entry = model.joints[model.getJointId(joint)]
-        q[entry.idx_q], v[entry.idx_v], a[entry.idx_v], tau[entry.idx_v] = values
-    left = model.getJointId("LAnkleRoll")
-    pin.forwardKinematics(model, data, q)
-    height = np.array([0.0, 0.0, robot.feet["left"].ankle_height_m])
-    base = pin.SE3(np.eye(3), signals.arrays["left_foot"][sample] + height) * data.oMi[left].inverse()
-    q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
-    pin.computeJointJacobians(model, data, q)
-    jacobian = pin.getJointJacobian(model, data, left, pin.LOCAL_WORLD_ALIGNED)
-    v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
-    pin.forwardKinematics(model, data, q, v, a)
-    drift = pin.getAcceleration(model, data, left, pin.LOCAL_WORLD_ALIGNED).vector
-    a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
-    forces = pin.StdVec_Force()
-    for _ in range(model.njoints):
-        forces.append(pin.Force.Zero())
-    for side, foot in (("L", "left"), ("R", "right")):
-        index = model.getJointId(f"{side}AnkleRoll")
-        # The placement of the foot's axes in the world, at the point under its ankle.
-        below = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample])
-        wrench = pin.Force(signals.arrays[f"{foot}_force"][sample], signals.arrays[f"{foot}_moment"][sample])
-        forces[index] = data.oMi[index].actInv(below.act(wrench))
-    driven = [model.joints[model.getJointId(joint)].idx_v for joint in signals.joints]  # the head is locked
-    return np.asarray((pin.rnea(model, data, q, v, a, forces) - tau)[[*range(6), *driven]])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(OPTIONS))
 @pytest.mark.parametrize("seed", range(2))
@@ -113,7 +77,7 @@ def test_torques_are_pinocchios_with_the_wrenches_as_outer_forces(name: str, see
     robot, signals = load_robot("nao-v5"), double_support(name, candidate(name, seed))
     assert np.ptp(signals.arrays["right_force"][:, 2]) > 10.0
     for sample in range(SAMPLES):
-        rest = left_over(robot, signals, sample)
+        rest = left_over(robot, signals, sample, GRAVITY)
         np.testing.assert_allclose(rest, 0.0, rtol=0, atol=TORQUE_TOLERANCE_NM)
 
 
@@ -123,7 +87,9 @@ def test_the_papers_divisions_show_their_wrenches_too(rule: str) -> None:
     problem = load("nao-dsp", torso_share=rule)
     signals = problem.signals(np.array(FEASIBLE["nao-dsp"]))
     for sample in range(SAMPLES):
-        np.testing.assert_allclose(left_over(load_robot("nao-v5"), signals, sample), 0.0, atol=TORQUE_TOLERANCE_NM)
+        np.testing.assert_allclose(
+            left_over(load_robot("nao-v5"), signals, sample, GRAVITY), 0.0, atol=TORQUE_TOLERANCE_NM
+        )
 
 
 @pytest.mark.slow
@@ -140,7 +106,8 @@ def test_the_division_leaves_motion_and_zmp_alone() -> None:
     forces = np.hstack([ruled.arrays["right_force"], ruled.arrays["right_moment"]])
     table = BPoly(np.eye(11)[:, None, :], [0.0, 1.0])(phases)
     matched = load("nao-dsp", torso_share="free", samples_per_interval=1, load_degree=10)
-    same = matched.signals(np.concatenate([x[:8], np.linalg.solve(table, forces).T.ravel()]))
+    coefficients = np.vstack([np.linalg.solve(table, forces), np.zeros((2, 6))])  # without ramps
+    same = matched.signals(np.concatenate([x[:8], coefficients.T.ravel()]))
     np.testing.assert_allclose(same.arrays["tau"], ruled.arrays["tau"], rtol=0, atol=1e-9)
 
 
@@ -156,12 +123,15 @@ def test_derivatives_of_the_paper_take_the_planned_wrench_too() -> None:
     assert cost == pytest.approx(np.trapezoid(power.sum(axis=1), t) / t[-1], rel=ROUNDING)
 
 
-def test_bernstein_polynomials_are_scipys() -> None:
+def test_polynomials_are_scipys_and_ramps_end_smoothly() -> None:
     s = SX.sym("s")
-    function = ca.Function("bernstein", [s], [bernstein(5, s)])
+    function = ca.Function("basis", [s], [load_basis(5, s)])
     phases = np.linspace(0.0, 1.0, 21)
+    mine = np.array(function.map(21)(phases[None, :])).T
     theirs = BPoly(np.eye(6)[:, None, :], [0.0, 1.0])(phases)
-    np.testing.assert_allclose(np.array(function.map(21)(phases[None, :])).T, theirs, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(mine[:, :6], theirs, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(mine[:, 6], np.maximum(0.0, 1.0 - phases / RAMP_SHARE) ** 3, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(mine[::-1, 7], mine[:, 6], rtol=0, atol=1e-12)
 
 
 def test_a_sole_bears_what_forces_at_its_corners_can_give() -> None:
