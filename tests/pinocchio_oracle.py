@@ -115,8 +115,11 @@ def stand(
     )
 
 
-def left_over(robot: Robot, signals: Signals, sample: int, gravity: float) -> Array:
-    """What equations of motion with both wrenches as forces from outside leave: base rows first, then joints [N, Nm]."""
+def left_over(robot: Robot, signals: Signals, sample: int, gravity: float, stance: str = "L") -> Array:
+    """What equations of motion with both wrenches as forces from outside leave: base rows first, then joints [N, Nm].
+
+    The foot on the side ``stance`` stands flat and still.
+    """
     model = floating_model(robot)
     model.gravity.linear = np.array([0.0, 0.0, -gravity])
     data = model.createData()
@@ -126,16 +129,16 @@ def left_over(robot: Robot, signals: Signals, sample: int, gravity: float) -> Ar
     ):
         entry = model.joints[model.getJointId(joint)]
         q[entry.idx_q], v[entry.idx_v], a[entry.idx_v], tau[entry.idx_v] = values
-    left = model.getJointId("LAnkleRoll")
+    stands, foot = model.getJointId(f"{stance}AnkleRoll"), {"L": "left", "R": "right"}[stance]
     pin.forwardKinematics(model, data, q)
-    height = np.array([0.0, 0.0, robot.feet["left"].ankle_height_m])
-    base = pin.SE3(np.eye(3), signals.arrays["left_foot"][sample] + height) * data.oMi[left].inverse()
+    height = np.array([0.0, 0.0, robot.feet[foot].ankle_height_m])
+    base = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample] + height) * data.oMi[stands].inverse()
     q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
     pin.computeJointJacobians(model, data, q)
-    jacobian = pin.getJointJacobian(model, data, left, pin.LOCAL_WORLD_ALIGNED)
+    jacobian = pin.getJointJacobian(model, data, stands, pin.LOCAL_WORLD_ALIGNED)
     v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
     pin.forwardKinematics(model, data, q, v, a)
-    drift = pin.getAcceleration(model, data, left, pin.LOCAL_WORLD_ALIGNED).vector
+    drift = pin.getAcceleration(model, data, stands, pin.LOCAL_WORLD_ALIGNED).vector
     a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
     forces = pin.StdVec_Force()
     for _ in range(model.njoints):

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import builtins
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from typer.testing import CliRunner
 
+from compare.cli import app
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.problem import Array, Result, load
 from nlp_gait.robots import load_robot
@@ -184,3 +188,22 @@ def test_what_cannot_be_shared_is_said(plan: Plan, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtraError, match="nlp-gait\\[qp\\]"):
         share_loads(plan)
+
+
+@pytest.mark.slow
+def test_the_command_plays_it(tmp_path: Path) -> None:
+    """Power that the model predicts falls, more so where load may jump."""
+    pytest.importorskip("mujoco")
+    problem = load("nao-dsp", torso_share="lever")
+    x = np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0])
+    file = tmp_path / "best.json"
+    options = {"torso_share": "lever"}
+    file.write_text(json.dumps({"problem": "nao-dsp", "options": options, "x": problem.by_name(x)}))
+    found = []
+    for more in ([], ["--share-loads", "--load-rate", "0.5"], ["--share-loads"]):
+        done = CliRunner().invoke(app, ["simulate", str(file), "--json", *more])
+        assert done.exit_code == 0, done.output
+        found.append(json.loads(done.stdout))
+    predicted = [sum(report["predicted"][part] for part in ("mechanical_W", "heat_W")) for report in found]
+    assert predicted[0] > predicted[1] > predicted[2]
+    assert not any(report["fallen"] for report in found)

@@ -33,7 +33,7 @@ COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment
 LARGEST_DEGREE = 12
 # Part of the phase, at either end, in which a foot takes over load or hands it on: a low polynomial alone cannot begin at zero
 # and be elsewhere soon after.
-RAMP_SHARE = 0.1
+RAMP_SHARE = 0.05
 RAMPS = 2
 # Coefficients start near a load that passes evenly from foot to foot, off it by at most this share of their bounds.
 START_SHARE = 0.02
@@ -100,6 +100,11 @@ class PlannedWrench:
 
         return both
 
+    def load_slope(self, at: InstantPoint, phase: SX) -> SX:
+        """Derivative of the load on the right sole with respect to the phase [N]."""
+        own = [v.name for v in self.variables if v.name.startswith("right_force_z")]
+        return ca.dot(ca.vertcat(*(at[name] for name in own)), ca.jacobian(load_basis(self.degree, phase), phase))
+
     def start_of(self, names: Sequence[str], others: Start | None) -> Start:
         """Start points of variables: a load that passes evenly to the right foot, and the others as without it."""
         own = [variable.name for variable in self.variables]
@@ -155,8 +160,7 @@ class FootLimits(Part):
     That the ground does not pull follows from friction and pressure together.
 
     Args:
-        robot: whose soles they are.
-        weight: of the robot [N].
+        planned: wrench on the right sole.
     """
 
     reads_wrenches = True
@@ -166,15 +170,16 @@ class FootLimits(Part):
         (
             "switch_load_limit",
             "1",
-            0.05,
-            "largest load, in weights, of the foot that has just landed and of the one about to lift",
+            1.0,
+            "largest load, in weights, of the foot that has just landed and of the one about to lift; all of it by default",
             0.0,
             math.inf,
         ),
     )
 
-    def __init__(self, robot: Robot, weight: float) -> None:
-        self._robot, self._weight = robot, weight
+    def __init__(self, planned: PlannedWrench) -> None:
+        self._robot, self._weight = planned.robot, planned.weight
+        self.traces = {"load_slope": planned.load_slope}
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows with a lower bound for the soles, two-sided ones for the change of load, and how near all come to their limits."""
@@ -185,9 +190,13 @@ class FootLimits(Part):
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
                 found.append(rows(f"{foot}_{name}", unit, ca.vec(values), MX(0.0), labels=labels(names, range(n))))
             loads[foot] = samples.wrenches[side][2, :] / self._weight
-        rates = {foot: (load[1:] - load[:-1]) / samples.step_s for foot, load in loads.items()}
+        # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
+        right = samples.traces["load_slope"] / (samples.step_s * samples.steps * self._weight)
+        total = loads["left"] + loads["right"]
+        changes = (total[1:] - total[:-1]) / samples.step_s
+        rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}
         limit = at["load_rate_limit_1_s"]
-        names = labels(tuple(rates), range(n - 1))
+        names = labels(tuple(rates), range(n))
         ends = ca.vertcat(loads["right"][0], loads["left"][-1])
         return Contribution(
             rows=(

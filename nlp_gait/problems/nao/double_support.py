@@ -231,7 +231,7 @@ def load_sharing(robot: Robot, rule: TorsoShare, degree: int, upright: Collectio
     weight = robot.mass_kg * GRAVITY
     wrench = PlannedWrench(robot=robot, weight=weight, degree=degree)
     loads = planned_loads(robot, GRAVITY, upright_links(robot) if upright is None else upright)
-    return Sharing(wrench.variables, wrench.planned, loads, (FootLimits(robot, weight),), wrench.start_of)
+    return Sharing(wrench.variables, wrench.planned, loads, (FootLimits(wrench),), wrench.start_of)
 
 
 def double_support_loads(robot: Robot, rule: Division, upright: Collection[str] | None = None) -> Loader:

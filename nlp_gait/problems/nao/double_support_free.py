@@ -116,7 +116,6 @@ def nao_dsp_free(
         phase,
         robot,
         start=sharing.start_of(phase.names, splines.start_of(phase.names)),
-        long_derivatives=bool(sharing.variables),
         searchable=False,
     )
 

@@ -168,7 +168,7 @@ def _turned(arm: Array) -> Array:
 
 @pytest.mark.slow
 def test_a_load_that_jumps_or_pulls_breaks_rows() -> None:
-    problem, x = problem_of("nao-dsp"), candidate("nao-dsp")
+    problem, x = problem_of("nao-dsp").with_values(switch_load_limit=0.1), candidate("nao-dsp")
     names = list(problem.names)
     x[names.index("right_force_z_N[0]")] = 40.0
     x[[i for i, name in enumerate(names) if name.startswith("right_force_x")]] = 25.0
