@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
 from compare.cli.options import RESULTS, AsJson, Jobs, ProblemOptions, SearchOptions, names_in
 from compare.study.settings import SolverSpec, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
@@ -111,6 +111,11 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
+# What the first table on a narrow terminal holds, in the order in which it is to be read.
+READ_FIRST = ("solver", "judged feasible", "median gap", "median", "evaluations", "time a run")
+HOW_TO_READ = "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
+
+
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
@@ -118,7 +123,13 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 
     for comparison in compare_problems(records):
         rows = [cells(summary, comparison) for summary in summarise(comparison)]
-        print_table(title or f"{comparison.problem}: judged by the exact functions", HEADER, rows)
+        order = [HEADER.index(name) for name in (*READ_FIRST, *(n for n in HEADER if n not in READ_FIRST))]
+        print_table(
+            title or f"{comparison.problem}: judged by the exact functions",
+            [HEADER[i] for i in order],
+            [[row[i] for i in order] for row in rows],
+        )
+    stdout.print(HOW_TO_READ)
 
 
 def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:

@@ -135,6 +135,8 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
             f"Feet land at most {abs(early):.0f} ms {'early' if early >= 0.0 else 'late'}, "
             f"at {report.landing_speed_m_s:.3f} m/s or less"
         )
+    for joint, share in report.beyond_limit.items():
+        stdout.print(f"{joint} is planned to give up to {share:.2f} times its torque limit")
     for joint, share in report.saturated.items():
         stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
     for joint in report.joint_limits:

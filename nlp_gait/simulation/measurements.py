@@ -101,6 +101,7 @@ class Measurements:
         predicted: power by the rigid model.
         measured: power of the servos.
         saturated: share of time at the torque limit, by joint, where not zero.
+        beyond_limit: largest planned torque over the torque limit, by joint, where above 1: no drive can follow that.
         joint_limits: joints that went beyond their mechanical range.
     """
 
@@ -122,6 +123,7 @@ class Measurements:
     predicted: Power
     measured: Power
     saturated: Mapping[str, float]
+    beyond_limit: Mapping[str, float]
     joint_limits: tuple[str, ...]
 
     @property
@@ -135,6 +137,7 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
     during = trace.t <= plan.duration_s
     error = plan.at("q", trace.t[during]) - trace.q[during]
     torque, rate = trace.torque[during], trace.qd[during]
+    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
     raw = np.linalg.norm(trace.pressure - plan.at("zmp", trace.t), axis=1)[during]
     pressure, planned = averaged_pressure(trace, drive.period_s), plan.at("zmp", trace.t)
     deviation = np.linalg.norm(pressure - planned, axis=1)[during]
@@ -160,7 +163,8 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
         landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
         predicted=predicted(plan),
         measured=Power.of(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
-        saturated=_saturated(plan, torque, drive),
+        saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
+        beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
         joint_limits=_beyond_range(plan, trace.q[during]),
     )
 
@@ -236,10 +240,8 @@ def _landing(plan: Plan, trace: Trace, side: str) -> Landing:
     )
 
 
-def _saturated(plan: Plan, torque: Array, drive: Drive) -> dict[str, float]:
-    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
-    shares = (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0)
-    return {name: float(share) for name, share in zip(plan.joints, shares, strict=True) if share > 0.0}
+def _by_joint(plan: Plan, shares: Array, above: float) -> dict[str, float]:
+    return {name: share for name, share in zip(plan.joints, shares.tolist(), strict=True) if share > above}
 
 
 def _beyond_range(plan: Plan, q: Array) -> tuple[str, ...]:
