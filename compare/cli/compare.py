@@ -14,6 +14,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
 from compare.cli.options import RESULTS, AsJson, Jobs, ProblemOptions, SearchOptions, names_in
+from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "as_json")
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "engine", "as_json")
 
 
 @command
@@ -52,10 +53,14 @@ def compare(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Then play every solver's best gait in MuJoCo (extra sim).")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
 
+    With `--engine` the report says how each solver's best gait fares in a physics engine, and whether that confirms the model.
     Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
@@ -64,7 +69,11 @@ def compare(
     from compare.report import write_report
     from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.study import Study, check_study, default_jobs, run_study
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.engine import mujoco
 
+    if engine:
+        mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
     if config is not None:
@@ -80,6 +89,10 @@ def compare(
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
     check_study(study)
+    if engine and not any(task.problem.load().playback for task in study.tasks):
+        raise InputError(
+            f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
+        )
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
@@ -93,9 +106,15 @@ def compare(
             end_interrupted(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
+    plays = play_best(out, records, Drive()) if engine else []
     written = write_report(out, records, read_manifest(out))
-    data = {"problems": summaries_of(records)} if as_json else {}
-    print_result(as_json, data, written, lambda: print_summaries(records))
+    data = {"problems": summaries_of(records), **plain_plays(plays)} if as_json else {}
+
+    def tables() -> None:
+        print_summaries(records)
+        print_plays(plays)
+
+    print_result(as_json, data, written, tables)
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:

@@ -6,13 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
+from compare.analysis.engine import best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import verdict
 from compare.drawing.distributions import expected_costs, profile_figure
 from compare.report.document import Document, Figure, Section
+from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
 from compare.report.problem_section import problem_section
 from compare.report.writing import write_document
+from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
 from compare.study.study import read_records
@@ -31,20 +34,29 @@ def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING) -> li
 def write_report(
     folder: Path, records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING
 ) -> list[Path]:
-    """Write ``report.html``, ``report.md`` and the figures as PNG and SVG; returns the paths of all files."""
-    return write_document(folder, document_of(records, manifest, weighting))
+    """Write ``report.html``, ``report.md`` and the figures as PNG and SVG; returns the paths of all files.
+
+    What the folder keeps of gaits that were played in the engine is part of it.
+    """
+    plays = kept_plays(folder, best_gaits(records))
+    return write_document(folder, document_of(records, manifest, weighting, plays))
 
 
-def document_of(records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING) -> Document:
-    """Document of a study's records."""
+def document_of(
+    records: Sequence[RunRecord],
+    manifest: Manifest,
+    weighting: Weighting = DEFAULT_WEIGHTING,
+    plays: Sequence[Played] = (),
+) -> Document:
+    """Document of a study's records, and of their best gaits that were played in the engine."""
     comparisons = compare_problems(records, weighting)
-    sections = [problem_section(comparison) for comparison in comparisons]
+    sections = [problem_section(c, [play for play in plays if play.problem == c.problem]) for c in comparisons]
     if len(comparisons) > 1 and expected_costs(comparisons):
         sections.append(_over_problems(comparisons))
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
         verdict=verdict(comparisons),
-        parts=(*sections, method_section(comparisons, manifest, weighting)),
+        parts=(*sections, *(() if plays else (HOW,)), method_section(comparisons, manifest, weighting)),
     )
 
 

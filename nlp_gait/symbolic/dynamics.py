@@ -56,7 +56,8 @@ def newton_euler(
     Source:
         Gives the torques of Gupta, Pratihar, Deb (2023), eqs. (15)-(18); the recursion is that of Luh, Walker and Paul
         (1980), with each link seen from the joint through which it is reached, inertias regrouped and products of spins
-        shared as Khalil and Kleinfinger (1987) do.
+        shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
+        gyroscopic torques: Featherstone (2008), section 9.6.
     """
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
@@ -74,6 +75,8 @@ def newton_euler(
         body = tree[i]
         assert body.joint is not None  # only the first body has none; for the type checker
         torques[body.joint.name] = body.direction * ca.dot(DM(body.joint.axis), moments[i])
+        if body.armature_kgm2:
+            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
         force = rotations[i] @ forces[i]
         moment = rotations[i] @ moments[i]
         forces[body.parent] += force

@@ -13,9 +13,9 @@ import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, Signals, finely_sampled
+from nlp_gait.problem.steps import step_of, walk
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.robots import load_robot
-from nlp_gait.simulation.steps import step_of, walk
 from tests.pinocchio_oracle import left_over
 
 pytest.importorskip("mujoco")
@@ -146,6 +146,6 @@ def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int)
 def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(
         InputError,
-        match="problem 'nao-ssp' is no cycle that can be repeated; several steps can be played of 'nao-cycle'",
+        match="problem 'nao-ssp' is no cycle that can be repeated; leave out the number of steps",
     ):
         plan_of(gait("ssp optimum"), 2)

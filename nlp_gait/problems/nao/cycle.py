@@ -31,9 +31,9 @@ from nlp_gait.problems.nao.cycle_rows import (
     start_at_speed,
 )
 from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
-from nlp_gait.problems.nao.problem import paper_parts, with_robot
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
-from nlp_gait.robots import Robot
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -42,7 +42,7 @@ OBJECTIVES = {
 }
 
 
-@maker({"samples_per_interval": 1}, {"load_degree": LOAD_DEGREE})
+@maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
 def nao_cycle(
     *,
     robot: str = "nao-v5",
@@ -51,6 +51,7 @@ def nao_cycle(
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "lever",
     samples_per_interval: int = 0,
+    motors: str = "",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one; for the other options see ``problems.nao``.
@@ -64,12 +65,13 @@ def nao_cycle(
         torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
             farther one; free plans the load of the foot that has landed.
         samples_per_interval: above 1 for a denser grid; 0 for what suits the loads: 4 where they are planned, else 1.
+        motors: what of the real motors is taken into account; the mean square of a continuous torque is that of each phase.
         load_degree: of the planned wrench over double support.
     """
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    model, at_given_speed = nao(robot, rotational_inertia), objective == "power"
-    sharing = load_sharing(model, torso_share, load_degree)
-    cycle = walking_cycle(model, sharing, grid, at_given_speed=at_given_speed)
+    real, at_given_speed = Motors.parsed(motors, nao(robot, rotational_inertia)), objective == "power"
+    sharing = load_sharing(real.model, torso_share, load_degree)
+    cycle = walking_cycle(real, sharing, grid, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -88,18 +90,19 @@ def nao_cycle(
         durations=tuple(TIMES.values()),
         long_derivatives=bool(sharing.variables),
     )
-    return with_robot(problem, robot, repeats=True)
+    return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
 
-def walking_cycle(model: Robot, sharing: Sharing, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
+def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
     """Both phases of the cycle.
 
     Args:
-        model: robot as ``nao`` makes it.
+        motors: of a robot as ``nao`` makes it.
         sharing: of load in double support, see ``double_support.load_sharing``.
         grid: of each phase.
         at_given_speed: the step length follows from the speed.
     """
+    model = motors.model
     *motion, step = cycle_variables(model)
     variables, means = (*motion, *sharing.variables, step), mean_margins(model)
     double = sharing.planned(double_support_planner(model))
@@ -117,7 +120,8 @@ def walking_cycle(model: Robot, sharing: Sharing, grid: Grid, *, at_given_speed:
             plan=plan,
             loads=loads,
             grid=grid,
-            parts=(*paper_parts(model, margins, means[name]), *more),
+            parts=(*paper_parts(model, margins, means[name]), *motors.parts, *more),
+            goal=goal_of("power", motors),
         )
         for name, (plan, loads, margins, more) in halves.items()
     }

@@ -74,11 +74,12 @@ def nao_dsp(
 ) -> GaitProblem:
     """Double support of NAO; for the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    model = nao(robot, rotational_inertia)
+    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    model = real.model
     soles = soles_of(model, step_length_m)
     box = support_box(model, soles)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING))
-    real, sharing = Motors.parsed(motors, model), load_sharing(model, torso_share, load_degree)
+    sharing = load_sharing(model, torso_share, load_degree)
     richer = (arm_limits(model, splines, ARM_SWING, double_support_duration),)
     phase = Phase(
         robot=model,

@@ -65,10 +65,10 @@ def nao_ssp(
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    model = nao(robot, rotational_inertia)
+    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    model = real.model
     stance, foot = stance_of(model, step_length_m), model.feet["left"]
     splines = Splines(trajectory=trajectory, units=UNITS)
-    real = Motors.parsed(motors, model)
 
     def path(at: InstantPoint, s: SX) -> SX:
         return _swing(at, stance, splines.motions(at, single_support_duration(at), s), 0.0, s).position

@@ -10,6 +10,7 @@ from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle import walking_cycle
 from nlp_gait.problems.nao.double_support import LOAD_DEGREE, load_sharing
+from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
@@ -72,10 +73,10 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     """Single and double support, both with their samples at the switch."""
-    model = nao("nao-v5", rotational_inertia=True)
+    real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
+    sharing = load_sharing(real.model, problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
     assert problem.grid is not None
-    sharing = load_sharing(model, problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
-    cycle = walking_cycle(model, sharing, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    cycle = walking_cycle(real, sharing, problem.grid, at_given_speed=problem.options["objective"] == "power")
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 
