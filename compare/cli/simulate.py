@@ -45,6 +45,12 @@ def simulate(
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     servos: DriveOptions,
+    share_loads: Annotated[
+        bool, typer.Option("--share-loads", help="Share load anew in double support for least power (extra qp).")
+    ] = False,
+    load_rate: Annotated[
+        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load, weights a second.")
+    ] = 12.5,
     film: FilmOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
@@ -65,6 +71,8 @@ def simulate(
     from nlp_gait.simulation.film.film import picture_size
     from nlp_gait.simulation.film.video import check_video_path
     from nlp_gait.simulation.film.viewer import shown
+    from nlp_gait.simulation.load_sharing import Sharing
+    from nlp_gait.simulation.load_sharing import share_loads as anew
     from nlp_gait.simulation.mjcf import plan_model
     from nlp_gait.simulation.plan import plan_of
     from nlp_gait.simulation.playback import play
@@ -81,6 +89,8 @@ def simulate(
     drive, conditions = servos.chosen(), world.chosen()
     gaits = [(path, load_result(path)) for path in (result, film.beside) if path is not None]
     plans = [plan_of(gait, steps) for _, gait in gaits]
+    if share_loads:
+        plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
     plan, players = plans[0], [partial(play, plan, conditions, drive, sole) for plan in plans]
     if target is not None:
         titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]

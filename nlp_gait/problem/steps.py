@@ -15,10 +15,14 @@ JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
 SIDES_SWAPPED = {
     f"{side}_{what}": f"{other}_{what}"
     for side, other in (("left", "right"), ("right", "left"))
-    for what in ("foot", "bears")
+    for what in ("foot", "bears", "force", "moment")
 }
 # What stays where it is when a walk goes on, and what a reflection at the plane y = 0 does to a quaternion (w, x, y, z).
-UNMOVED = (*JOINT_ARRAYS, "attitude", "left_bears", "right_bears")
+UNMOVED = (
+    *JOINT_ARRAYS,
+    "attitude",
+    *(f"{side}_{what}" for side in ("left", "right") for what in ("bears", "force", "moment")),
+)
 MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
@@ -62,7 +66,9 @@ def mirror_image(signals: Signals, robot: Robot) -> Signals:
         elif name == "attitude":
             arrays[name] = array * MIRRORED_ATTITUDE
         else:
-            arrays[SIDES_SWAPPED.get(name, name)] = array * np.array([1.0, -1.0, 1.0])[: array.shape[1]]
+            # A reflection turns a moment, as any turning, the other way than a force.
+            reflected = np.array([1.0, -1.0, 1.0]) * (-1.0 if signals.columns[name].unit == "Nm" else 1.0)
+            arrays[SIDES_SWAPPED.get(name, name)] = array * reflected[: array.shape[1]]
     return replace(signals, arrays=arrays)
 
 

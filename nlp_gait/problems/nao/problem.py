@@ -51,6 +51,7 @@ def phase_problem(
     *,
     start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
     searchable: bool = True,
+    long_derivatives: bool = False,
 ) -> GaitProblem:
     """Problem of one phase.
 
@@ -61,6 +62,7 @@ def phase_problem(
         robot: name or file of the robot, with all its joints.
         start: start point; None for one within the bounds.
         searchable: False for a problem that only gradient methods can solve.
+        long_derivatives: True where one solve pays for compiling its derivatives.
     """
 
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
@@ -78,6 +80,7 @@ def phase_problem(
         start=start,
         durations=(phase.duration,),
         searchable=searchable,
+        long_derivatives=long_derivatives,
     )
     return with_robot(problem, robot, phase.robot.armatures_kgm2)
 
