@@ -9,8 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from nlp_gait.errors import InputError, kind_name, unknown
-from nlp_gait.problem.gait_problem import GaitProblem, is_number
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.problem.numbers import is_number
 
 # Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
@@ -43,8 +47,10 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
     """
 
     def decorate(make: Maker) -> Maker:
+        @one_at_a_time
         @functools.wraps(make)
         def made(**options: Any) -> GaitProblem:
+            options = {name: _plain(value) for name, value in options.items()}
             check(made, options)
             call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
             problem = make(**call)
@@ -57,9 +63,10 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
                     recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
             if refined_by is None:
-                return replace(problem, options=recorded)
+                return replace(problem, options=recorded).made_by(made, call)
             own = getattr(grid, refined_by)
-            return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
+            finer = replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
+            return finer.made_by(made, call)
 
         return made
 
@@ -97,7 +104,8 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
     known, allowed = inspect.signature(make).parameters, _choices(make)
-    for option, value in options.items():
+    for option, given in options.items():
+        value = _plain(given)
         if option not in known:
             raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
         expected = type(known[option].default)
@@ -108,6 +116,11 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
+
+
+def _plain(value: Any) -> Any:
+    """A number or a text of NumPy as Python's own."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @functools.cache
