@@ -16,6 +16,7 @@ ROOMS = (
     "nlp_gait.errors",
     "nlp_gait.files",
     "nlp_gait.decoding",
+    "nlp_gait.references",
     "nlp_gait.robots",
     "nlp_gait.symbolic",
     "nlp_gait.problem",
