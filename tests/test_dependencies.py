@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "nlp_gait.errors",
     "nlp_gait.files",
+    "nlp_gait.columns",
     "nlp_gait.decoding",
     "nlp_gait.references",
     "nlp_gait.robots",

@@ -1,8 +1,8 @@
 """Command line: ``nlp-gait COMMAND``.
 
-From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
-result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``.
+From the problems to the comparison: ``list | evaluate | solve | search | compare | import | report | sweep | reproduce |
+walk``. From a result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty |
+motors | motions | robust``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -16,6 +16,7 @@ from compare.cli.animate import animate
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.export import export
+from compare.cli.import_results import import_results
 from compare.cli.list import list_problems
 from compare.cli.questions.certainty import certainty
 from compare.cli.questions.motions import motions
@@ -43,6 +44,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.command("list")(list_problems)
+app.command("import")(import_results)
 for function in (*COMPARISON, *QUESTIONS, *ROBOT):
     app.command(function.__name__)(function)
 

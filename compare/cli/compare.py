@@ -13,7 +13,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say
-from compare.cli.options import RESULTS, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "as_json")
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "as_csv", "as_json")
 
 
 @command
@@ -53,6 +53,7 @@ def compare(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
+    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
     """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
@@ -100,7 +101,7 @@ def compare(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
     records += imported_records(out, records)
-    written = write_report(out, records, read_manifest(out))
+    written = write_report(out, records, read_manifest(out), as_csv=as_csv)
     data = {"problems": summaries_of(records)} if as_json else {}
     print_result(as_json, data, written, lambda: print_summaries(records))
 

@@ -35,6 +35,7 @@ Code = Annotated[
         help="Code of your own that the file names: it runs only if you say so; repeatable.",
     ),
 ]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 # Where results go unless --out names a folder.
 RESULTS = Path("results")

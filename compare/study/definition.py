@@ -83,6 +83,11 @@ def key_of(definition: Mapping[str, Any]) -> str:
     return sha256_of(_content(definition))
 
 
+def group_of(definition: Mapping[str, Any]) -> dict[str, Any]:
+    """What all runs of a solver in a study share: no seed, no start point, and nothing that says only where something lies."""
+    return {key: part for key, part in _content(definition).items() if key not in ("seed", "start", "imported")}
+
+
 def without_hashes(definition: Mapping[str, Any]) -> dict[str, Any]:
     """A definition as the first records have it; that of code of one's own, which they could not identify, is like no other."""
     problem = {key: value for key, value in definition["problem"].items() if key != HASH}

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +167,7 @@ def _keyed(path: Path, record: RunRecord) -> Path:
 
 
 def read_records(folder: Path) -> list[RunRecord]:
-    """All records below a folder, in the order of their names.
+    """All records below a folder, in the order of their names; those of earlier definitions come last.
 
     Raises:
         InputError: there are none, or one is damaged.
@@ -176,7 +176,9 @@ def read_records(folder: Path) -> list[RunRecord]:
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
-    return [_named_alike(path, read_record(path)) for path in paths]
+    records = [(path, _named_alike(path, read_record(path))) for path in paths]
+    records.sort(key=lambda item: item[0] != _file(folder, item[1].problem, item[1].algorithm, item[1].run))
+    return [record for _, record in records]
 
 
 def _named_alike(path: Path, record: RunRecord) -> RunRecord:
@@ -207,6 +209,9 @@ def _finished(study: Study) -> tuple[dict[int, RunRecord], dict[int, RunRecord]]
             if candidate.exists():
                 record = _named_alike(candidate, read_record(candidate))
                 if is_of(record, definition, task):
+                    if HASH not in record.definition["problem"]:  # the judge has agreed with it
+                        record = replace(record, definition=definition)
+                        write_json(candidate, record.to_json())
                     records[index] = record
                     break
                 others.setdefault(index, record)

@@ -14,7 +14,7 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.study.definition import SOURCE, key_of, problem_part, source_of
+from compare.study.definition import SOURCE, group_of, problem_part, sha256_of, source_of
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
 from nlp_gait.backends.solvers.solver import Solver
@@ -27,6 +27,7 @@ from nlp_gait.robots.loading import is_robot_file, robot_content
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
 LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])?")
+PYMOO = "pymoo:"  # before the names of that package's algorithms, which are no modules' names
 FUNCTION = "function"  # kind of a plain function in settings
 # Stands for an algorithm of one's own in checks before its code runs.
 UNREAD: Any = metaheuristics.PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
@@ -163,7 +164,9 @@ class Task:
     def is_own_code(self) -> bool:
         """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
         name = self.algorithm
-        return isinstance(name, str) and name not in solver_names() and is_own(name, "algorithm")
+        if not isinstance(name, str) or name in solver_names() or name.startswith(PYMOO):
+            return False
+        return is_own(name, "algorithm")
 
     @property
     def is_search(self) -> bool:
@@ -191,7 +194,7 @@ class Task:
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
             if self.polished is not None:
-                parts["polishes"]["key"] = key_of(self.polished.definition())
+                parts["polishes"]["key"] = sha256_of(group_of(self.polished.definition()))
         try:
             return json.loads(json.dumps(parts, allow_nan=False))
         except (TypeError, ValueError) as error:
