@@ -20,8 +20,9 @@ from nlp_gait.robots.mirror import mirror_sign, partner
 from nlp_gait.robots.tree import tree_from
 
 LEAST_ROWS = 5
+SAME_TIME_S = 1e-9
 LIFTED = 2e-3  # [m]; a foot that rises by less stands
-STILL = 1e-4  # [m]; a foot that is nearer than this to where it ends has landed
+STILL = 1e-5  # [m]; a foot that is nearer than this to where it ends has landed
 LEAST_SHARE = 0.02  # of the time; a shorter phase is none
 FINE = 400  # instants at which a whole motion is looked at
 # Joints of the arms that a file may leave out: they are held as in the paper, section 3.1 and in the middle of Table 3.
@@ -74,14 +75,16 @@ class Motion:
         return CubicSpline(self.t, self.q)
 
     def part(self, start_s: float, end_s: float) -> Motion:
-        """The motion between two times; its spline is of the samples in between, with the ends."""
-        inside = self.t[(self.t > start_s + 1e-9) & (self.t < end_s - 1e-9)]
+        """The motion between two times, from the samples in between alone: accelerations may jump at its ends."""
+        own = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
+        count = np.count_nonzero(own)
+        if count < LEAST_ROWS:
+            raise InputError(f"the phase from {start_s:g} s to {end_s:g} s has {count} samples; it needs {LEAST_ROWS}")
+        rows = self.t[own]
+        inside = rows[(rows > start_s + SAME_TIME_S) & (rows < end_s - SAME_TIME_S)]
         times = np.array([start_s, *inside, end_s])
-        if len(times) < LEAST_ROWS:
-            raise InputError(
-                f"a phase from {start_s:g} s to {end_s:g} s has {len(times)} samples; it needs {LEAST_ROWS}"
-            )
-        return Motion(robot=self.robot, t=times - start_s, q=self.spline(times), mirrored=self.mirrored, held=self.held)
+        q = CubicSpline(rows, self.q[own])(times)
+        return Motion(robot=self.robot, t=times - start_s, q=q, mirrored=self.mirrored, held=self.held)
 
     @cached_property
     def support(self) -> tuple[float, float, float]:
