@@ -19,6 +19,7 @@ from nlp_gait.problem.result import load_result
 from nlp_gait.references import is_reference, name_code
 
 if TYPE_CHECKING:
+    from nlp_gait.problems.nao.recorded.problem import Recorded
     from nlp_gait.simulation.drive import Drive
 
 ResultFile = Annotated[
@@ -120,6 +121,44 @@ class NamedProblem(ProblemOptions):
     def spec(self) -> ProblemSpec:
         """The problem, checked; raises as ``spec_of``."""
         return self.spec_of(self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyProblem(ProblemOptions):
+    """A problem that need not be named where a motion shows which it is."""
+
+    name: Annotated[
+        str | None, typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion.")
+    ] = None
+
+    def spec(self) -> ProblemSpec:
+        """The problem, checked; raises as ``spec_of``."""
+        if self.name is None:
+            raise InputError("name the problem that --x is a point of, for example nao-ssp")
+        return self.spec_of(self.name)
+
+    def recorded(self, motion: Path, touch_down_s: float | None) -> Recorded:
+        """The gait in a file of joint angles, with changed limits.
+
+        Raises:
+            InputError: the file holds no gait, or an option has no meaning for one.
+        """
+        from nlp_gait.export.motions import read_gait
+        from nlp_gait.problems.nao.recorded.problem import recorded
+        from nlp_gait.robots import load_robot
+
+        for flag, given in (("--option", self.option), ("--fix", self.fix), ("--derivatives", self.derivatives)):
+            if given:
+                raise InputError(f"{flag} has no meaning for a motion that is given; leave it out")
+        robot = self.robot or "nao-v5"
+        gait = recorded(
+            read_gait(motion, load_robot(robot)),
+            robot=robot,
+            gait=self.name,
+            touch_down_s=touch_down_s,
+            **({} if self.intervals is None else {"intervals": self.intervals}),
+        )
+        return replace(gait, problem=gait.problem.with_values(**_numbers(self.values, "--set")))
 
 
 @dataclass(frozen=True, kw_only=True)

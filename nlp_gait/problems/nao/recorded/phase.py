@@ -59,7 +59,7 @@ class RecordedPhase(Phase):
         Traces: ``hip`` (3, N + 1) and ``hip_rate``, ``heights`` (4, N + 1) of the right sole's corners, ``ground`` (2, N + 1),
         the right sole's place [m, m/s].
         """
-        q, qd, qdd = self._angles(at)
+        q, qd, qdd = (MX(part) for part in self._angles(at))
         torque, zmp, hip, hip_rate, ankle, corners, _ = self._instant.map(self.grid.parts + 1)(q, qd, qdd)
         rows_of = [JOINTS.index(name) for name in self.moving]
         planned = [JOINTS.index(name) for name in PLANNED_JOINTS]
@@ -112,7 +112,7 @@ class RecordedPhase(Phase):
         times = np.linspace(0.0, recorded.duration_s, n)
         speed = recorded.duration_s / ca.fmax(at[self.duration], LEAST_DURATION)
         q, qd, qdd = (DM(recorded.spline(times, order).T) for order in range(3))
-        return MX(q), qd * speed, qdd * speed**2
+        return q, qd * speed, qdd * speed**2
 
     @cached_property
     def _instant(self) -> ca.Function:
