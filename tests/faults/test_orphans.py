@@ -62,7 +62,7 @@ def command_line(number: int) -> str:
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL"])
 def test_workers_end_with_the_study(name: str, tmp_path: Path) -> None:
-    study = start("compare", "walk12", "--solvers", "pso", "--runs", "4", "--evaluations", "90000000", "--jobs", "2")
+    study = start("compare", "walk12", "--algorithms", "pso", "--runs", "4", "--evaluations", "90000000", "--jobs", "2")
     try:
         wait_for(lambda: sum("loky" in command_line(child) for child in offspring(study.pid)) >= 2)
         time.sleep(2.0)  # the runs are in progress
