@@ -25,6 +25,9 @@ PROBLEMS = {
     "stairs-ideal": "nlp_gait.problems.stairs.ideal:stairs_ideal",
 }
 
+# Makers of many problems each: they are loaded by name as well, but are no problem among the others.
+SUITES = {"gaitbench": "nlp_gait.gaitbench.problem:gaitbench"}
+
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
 
@@ -56,7 +59,7 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
                 if any(values[name] != value for name, value in group.items()):
                     recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
-            if refined_by is None:
+            if refined_by is None or refined_by not in call:  # a maker without that option refines its problem itself
                 return replace(problem, options=recorded)
             own = getattr(grid, refined_by)
             return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
@@ -77,9 +80,10 @@ def problem_maker(name: str) -> Maker:
     Raises:
         UnknownNameError: no such problem.
     """
-    if name not in PROBLEMS:
-        raise unknown("problem", name, PROBLEMS)
-    module, _, function = PROBLEMS[name].partition(":")
+    known = {**PROBLEMS, **SUITES}
+    if name not in known:
+        raise unknown("problem", name, known)
+    module, _, function = known[name].partition(":")
     make: Maker = getattr(importlib.import_module(module), function)
     return make
 
