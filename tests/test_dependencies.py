@@ -28,6 +28,7 @@ ROOMS = (
     "compare.judge",
     "compare.study",
     "compare.analysis",
+    "compare.logs",
     "compare.drawing",
     "compare.report",
     "compare.bench",

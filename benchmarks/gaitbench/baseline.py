@@ -38,7 +38,9 @@ def main() -> None:
         records: list[RunRecord] = []
         for solver in solvers:
             started = time.perf_counter()
-            study = Study(tasks=tuple(limited(t) for t in bench_tasks([id], solver)), folder=arguments.work, jobs=arguments.jobs)
+            study = Study(
+                tasks=tuple(limited(t) for t in bench_tasks([id], solver)), folder=arguments.work, jobs=arguments.jobs
+            )
             done = run_study(study)
             records += done
             feasible = sum(record.verdict.feasible for record in done)

@@ -113,9 +113,7 @@ def proof(instance: Instance, best: Array, limit_s: float) -> float | None:
     """How much better than the best known a feasible point may be at most, by branch and bound; None without a bound."""
     if len(instance.names) > 4 or not limit_s:
         return None
-    certificate = certify(
-        instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s
-    )
+    certificate = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
     return certificate.gap if math.isfinite(certificate.bound) else None
 
 

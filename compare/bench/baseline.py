@@ -59,9 +59,7 @@ def baseline_records(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, .
             f"no baseline records of {instance!r} are shipped; those that are: {', '.join(shipped(folder))}"
         )
     solvers = json.loads(gzip.decompress(path.read_bytes()))["solvers"]
-    return tuple(
-        _unpacked(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"]
-    )
+    return tuple(_unpacked(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"])
 
 
 def _packed(record: RunRecord) -> dict[str, Any]:

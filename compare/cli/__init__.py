@@ -2,7 +2,7 @@
 
 From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
 result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``.
+robust``. To and from other packages: ``bench | logs | export-objective``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -30,10 +30,14 @@ from compare.cli.reproduce import reproduce
 from compare.cli.search import search
 from compare.cli.simulate import simulate
 from compare.cli.solve import solve
+from compare.cli.suites.bench import bench
+from compare.cli.suites.export_objective import export_objective
+from compare.cli.suites.logs import logs
 
 COMPARISON = (evaluate, solve, search, compare, report, sweep, reproduce)
 QUESTIONS = (prices, pareto, certainty, motions, motors, robust, walk)
 ROBOT = (simulate, export, animate)
+SUITES = (bench, logs, export_objective)
 
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
@@ -43,8 +47,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.command("list")(list_problems)
-for function in (*COMPARISON, *QUESTIONS, *ROBOT):
-    app.command(function.__name__)(function)
+for function in (*COMPARISON, *QUESTIONS, *ROBOT, *SUITES):
+    app.command(function.__name__.replace("_", "-"))(function)
 
 
 def main() -> None:

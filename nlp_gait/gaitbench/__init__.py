@@ -1,10 +1,10 @@
 """GaitBench: frozen, constrained problems that cost microseconds and whose optimum is known.
 
-    from nlp_gait import gaitbench
+from nlp_gait import gaitbench
 
-    problem = gaitbench.load("ssp-v5")          # gaitbench.names(subset="small" | "full")
-    f, violation = problem(X)                   # X: (P, n)
-    problem.best_known, problem.best_x, str(problem.evidence)
+problem = gaitbench.load("ssp-v5")          # gaitbench.names(subset="small" | "full")
+f, violation = problem(X)                   # X: (P, n)
+problem.best_known, problem.best_x, str(problem.evidence)
 """
 
 from nlp_gait.gaitbench.definitions import Definition, names

@@ -71,9 +71,12 @@ def cpp_source(instance: Instance, sides: Sides) -> str:
     return "\n".join(
         [
             f"// GaitBench instance {instance.id}; see {prefix}.h. Generated: change nothing here.",
-            f"#pragma GCC visibility push(default)\n#include \"{prefix}.h\"\n#pragma GCC visibility pop",
+            f'#pragma GCC visibility push(default)\n#include "{prefix}.h"\n#pragma GCC visibility pop',
             "#ifndef LANES\n#define LANES 1  // points at a time: 1, 2, 4 or 8\n#endif",
+            "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
+            "namespace {  // so that several instances can stand in one program",
             kernel_source(kernel.function).replace('extern "C" EXPORT', "static"),
+            "}  // namespace",
             *(f"static const double {name}[] = {_numbers(values)};" for name, values in constants.items()),
             f"static const int instance_rows[] = {{{', '.join(map(str, sides.row.tolist()))}}};",
             f"static const char instance_upper_side[] = {{{', '.join('1' if s > 0 else '0' for s in sides.sign)}}};",

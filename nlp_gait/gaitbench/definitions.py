@@ -71,7 +71,11 @@ def _phase(
     **options: str | int | float | bool,
 ) -> Definition:
     """A phase of NAO, whose id begins with what it is: ``ssp``, ``dsp`` or ``cycle``."""
-    kinds = {"ssp": ("nao-ssp", "single support"), "dsp": ("nao-dsp", "double support"), "cycle": ("nao-cycle", "cycle")}
+    kinds = {
+        "ssp": ("nao-ssp", "single support"),
+        "dsp": ("nao-dsp", "double support"),
+        "cycle": ("nao-cycle", "cycle"),
+    }
     free = "-free-" in id
     problem, phase = kinds[id.split("-")[0]]
     return Definition(

@@ -23,10 +23,8 @@ PROBLEMS = {
     "stairs-plan": "nlp_gait.problems.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.problems.stairs.track:stairs_track",
     "stairs-ideal": "nlp_gait.problems.stairs.ideal:stairs_ideal",
+    "gaitbench": "nlp_gait.gaitbench.problem:gaitbench",
 }
-
-# Makers of many problems each: they are loaded by name as well, but are no problem among the others.
-SUITES = {"gaitbench": "nlp_gait.gaitbench.problem:gaitbench"}
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
@@ -80,10 +78,9 @@ def problem_maker(name: str) -> Maker:
     Raises:
         UnknownNameError: no such problem.
     """
-    known = {**PROBLEMS, **SUITES}
-    if name not in known:
-        raise unknown("problem", name, known)
-    module, _, function = known[name].partition(":")
+    if name not in PROBLEMS:
+        raise unknown("problem", name, PROBLEMS)
+    module, _, function = PROBLEMS[name].partition(":")
     make: Maker = getattr(importlib.import_module(module), function)
     return make
 

@@ -21,9 +21,7 @@ class GaitBenchProblem(BaseProblem):
         self.instance = instance
         self._space = {
             name: optuna.distributions.FloatDistribution(low, high)
-            for name, low, high in zip(
-                instance.names, instance.lower.tolist(), instance.upper.tolist(), strict=True
-            )
+            for name, low, high in zip(instance.names, instance.lower.tolist(), instance.upper.tolist(), strict=True)
         }
 
     @property

@@ -51,7 +51,9 @@ class UserDefinedProblem:
 
     def get_extra_info(self) -> str:
         """What it is, and the best known objective."""
-        return f"\t{self.instance.definition.what}\n\tbest known: {self.instance.best_known!r}, {self.instance.evidence}"
+        return (
+            f"\t{self.instance.definition.what}\n\tbest known: {self.instance.best_known!r}, {self.instance.evidence}"
+        )
 
 
 def to_pygmo(instance: Instance) -> Any:

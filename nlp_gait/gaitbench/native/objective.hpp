@@ -1,8 +1,6 @@
 
 // ---- the functions of the C header; the tables above are the instance's constants ----
 
-#include <stdlib.h>
-
 extern "C" EXPORT int FUNCTION(const double* X, long long points, double* f, double* violation, double* G) {
   const long long block = 64;  // points whose rows are held at once
   double* g = G ? (double*)malloc((size_t)(block * ROWS) * sizeof(double)) : 0;
