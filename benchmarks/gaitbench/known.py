@@ -22,10 +22,11 @@ from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.files import write_json
 from nlp_gait.gaitbench.instance import Instance
-from nlp_gait.gaitbench.known import Evidence, Known, Probe
+from nlp_gait.gaitbench.known import Evidence, Known, Probe, known
 from nlp_gait.problem import Array
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
+CATALOGUE = Path(nlp_gait.__file__).parents[1] / "docs" / "gaitbench.json"
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
 CMA_RUNS, CMA_EVALUATIONS, CMA_MOST_VARIABLES = 2, 30_000, 22
 SHARES, TIMED = 100_000, 20_000
@@ -51,6 +52,8 @@ def main() -> None:
         write_json(FILE, {name: kept[name] for name in gaitbench.names() if name in kept})
         evidence = Evidence(**kept[id]["evidence"])
         print(f"{id}: {kept[id]['best_known']:.10g}, {evidence} ({time.perf_counter() - started:.0f} s)", flush=True)
+    if set(known()) >= set(gaitbench.names()):
+        write_json(CATALOGUE, gaitbench.catalogue())
 
 
 def known_of(id: str, prove_s: float) -> Known:

@@ -25,6 +25,7 @@ OTHER: dict[str, Any] = {
     "samples_per_interval": 2,
     "motors": "limits,ankle",
     "duration_s": 3.0,
+    "instance": "walk12-w100",
 }
 # What the first studies recorded; their records must stay valid.
 FIRST_OPTIONS = ["robot", "intervals", "derivatives", "rotational_inertia", "step_length_m"]
