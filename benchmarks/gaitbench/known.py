@@ -29,7 +29,7 @@ FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
 CATALOGUE = Path(nlp_gait.__file__).parents[1] / "docs" / "gaitbench.json"
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
 # Starts of IPOPT by the greatest number of variables for which they are made; more variables take longer.
-STARTS = ((12, 20), (22, 12), (60, 5), (300, 3))
+STARTS = ((12, 12), (22, 8), (60, 4), (300, 2))
 CMA_RUNS, CMA_EVALUATIONS, CMA_MOST_VARIABLES = 1, 20_000, 12
 SHARES, TIMED = 100_000, 20_000
 # Slack that the best known point keeps to every row, in units of its scale: no machine's rounding makes it infeasible.
@@ -74,7 +74,7 @@ def known_of(id: str, prove_s: float) -> Known:
     solution = nlp_gait.solve(problem, starts=starts, seed=0)
     ends = [outcome for outcome in solution.starts if outcome.success]
     if not ends:
-        raise NothingFound(f"no start of IPOPT converged to a feasible point")
+        raise NothingFound("no start of IPOPT converged to a feasible point")
     ends.sort(key=lambda outcome: outcome.cost)
     best = strictly_feasible(instance, np.array(ends[0].x))
     best_known = float(instance(best[None])[0][0])
@@ -158,7 +158,7 @@ def strictly_feasible(instance: Instance, x: Array) -> Array:
     if instance.rows(x[None]).max() <= -SLACK / 2:
         found.append((float(instance(x[None])[0][0]), x))
     if not found:
-        raise NothingFound(f"no strictly feasible point near the end of IPOPT")
+        raise NothingFound("no strictly feasible point near the end of IPOPT")
     return min(found, key=lambda item: item[0])[1]
 
 

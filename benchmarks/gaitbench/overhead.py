@@ -58,6 +58,8 @@ def adapter(rounds: int, id: str = "ssp-v5") -> list[Row]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.gaitbench.overhead", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.gaitbench.overhead", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--rounds", type=int, default=15)
     print(table(adapter(parser.parse_args().rounds)))

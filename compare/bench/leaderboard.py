@@ -17,6 +17,8 @@ from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 
 ALPHA = 0.05
+# Relative gap below which two ends are the same: COCO's precision, too.
+SAME = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,14 +86,12 @@ class Leaderboard:
         found = [_by_name(comparison) for comparison in self.comparisons]
         if not others:
             return []
-        p = np.array([[rank_sum(on[solver].costs, on[other].costs) for on in found] for other in others])
-        effect = np.array([[a12(on[solver].costs, on[other].costs) for on in found] for other in others])
-        real = holm(p.ravel()).reshape(p.shape) < ALPHA
-        gaps = {
-            name: [c.gap(on[name].median_cost) for c, on in zip(self.comparisons, found, strict=True)]
-            for name in (solver, *others)
-        }
-        overall = holm([signed_rank(gaps[solver], gaps[other]) for other in others])
+        gaps = {name: [self._gaps(on[name], k) for k, on in enumerate(found)] for name in (solver, *others)}
+        p = np.array([[rank_sum(a, b) for a, b in zip(gaps[solver], gaps[other], strict=True)] for other in others])
+        effect = np.array([[a12(a, b) for a, b in zip(gaps[solver], gaps[other], strict=True)] for other in others])
+        real = holm(p.ravel().tolist()).reshape(p.shape) < ALPHA
+        medians = {name: [float(np.sort(gap)[len(gap) // 2]) for gap in on_all] for name, on_all in gaps.items()}
+        overall = holm([signed_rank(medians[solver], medians[other]) for other in others])
         return [
             Duel(
                 other=other,
@@ -102,6 +102,12 @@ class Leaderboard:
                 signed_rank=float(overall[k]),
             )
             for k, other in enumerate(others)
+        ]
+
+    def _gaps(self, runs: SolverRuns, number: int) -> list[float]:
+        """Final gap of each run on an instance; what is closer than ``SAME`` is the optimum, and no better than that."""
+        return [
+            max(self.comparisons[number].gap(cost), SAME) if math.isfinite(cost) else math.inf for cost in runs.costs
         ]
 
 

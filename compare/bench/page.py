@@ -148,9 +148,9 @@ def _duels(board: Leaderboard, solver: str) -> Section:
     return Section(
         title=f"{solver} against each of the others",
         parts=(
-            "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all "
-            "solvers and instances; A12 is the probability that a run of this solver ends better. The signed-rank test compares "
-            "the median gaps of all instances, Holm-corrected over the solvers.",
+            "Instances on which the rank-sum test of the final gaps finds a difference at 5 %, Holm-corrected over all solvers "
+            "and instances; gaps below 1e-6 % count as none. A12 is the probability that a run of this solver ends better. The "
+            "signed-rank test compares the median gaps of all instances, Holm-corrected over the solvers.",
             text_table(header, rows),
         ),
     )

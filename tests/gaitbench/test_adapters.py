@@ -1,4 +1,4 @@
-"""Every adapter with the real package: the same values, bounds and best point, and an optimiser of that package that runs on it."""
+"""Every adapter with the real package: the same values, bounds and best point, and an optimiser of that package on it."""
 
 from __future__ import annotations
 
@@ -169,7 +169,9 @@ def test_nevergrad(instance: gaitbench.Instance, X: Array) -> None:
 
 
 @pytest.mark.parametrize("name", ["pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad"])
-def test_a_package_that_lacks_is_named(name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_lacks_is_named(
+    name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("nlp_gait.gaitbench.adapters.find_spec", lambda package: None)
     with pytest.raises(MissingExtraError, match=rf"to_{name}\(\) needs the package {name}.*nlp-gait\[suites\]"):
         getattr(instance, f"to_{name}")()

@@ -117,7 +117,11 @@ def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     expected = np.concatenate([*instance(X), instance.rows(X).ravel()])
     np.testing.assert_allclose(found, expected, rtol=EQUAL, atol=EQUAL)
     refused = subprocess.run(
-        ["octave-cli", "--no-gui", "-q", "--eval", f"{prefix}(1)"], cwd=folder, capture_output=True, text=True, timeout=120
+        ["octave-cli", "--no-gui", "-q", "--eval", f"{prefix}(1)"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     assert "one point a row" in refused.stderr
 
@@ -129,7 +133,8 @@ def test_two_instances_stand_in_one_program(tmp_path: Path) -> None:
         export_objective(gaitbench.load(id), tmp_path)
         lines += [f'#include "{prefix_of(id)}.h"']
     calls = "\n".join(
-        f'  {prefix_of(id)}_evaluate({prefix_of(id)}_best_x, 1, &f, &v, 0); printf("%.17g %.17g\\n", f, v);' for id in IDS
+        f'  {prefix_of(id)}_evaluate({prefix_of(id)}_best_x, 1, &f, &v, 0); printf("%.17g %.17g\\n", f, v);'
+        for id in IDS
     )
     (tmp_path / "both.c").write_text(
         "\n".join(["#include <stdio.h>", *lines, "int main(void) {", "  double f, v;", calls, "  return 0;", "}", ""])

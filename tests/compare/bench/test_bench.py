@@ -41,7 +41,9 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
     first = path.read_bytes()
     assert pack(ID, runs, tmp_path).read_bytes() == first
     again = baseline_records(ID, tmp_path)
-    assert [(r.algorithm, r.run, r.seed, r.status) for r in again] == [(r.algorithm, r.run, r.seed, r.status) for r in runs]
+    assert [(r.algorithm, r.run, r.seed, r.status) for r in again] == [
+        (r.algorithm, r.run, r.seed, r.status) for r in runs
+    ]
     known = references([ID])
     (before,), (after,) = (compare_problems(records, references=known) for records in (runs, again))
     for old, new in zip(before.solvers, after.solvers, strict=True):
@@ -52,7 +54,9 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
     with pytest.raises(InputError, match="does not belong"):
         pack("ssp-v5", runs, tmp_path)
     with pytest.raises(InputError, match="differ in their settings"):
-        pack(ID, [runs[0], replace(runs[1], definition={**runs[1].definition, "settings": {"population": 7}})], tmp_path)
+        pack(
+            ID, [runs[0], replace(runs[1], definition={**runs[1].definition, "settings": {"population": 7}})], tmp_path
+        )
     with pytest.raises(InputError, match="no baseline records of 'ssp-v4'"):
         baseline_records("ssp-v4", tmp_path)
 
