@@ -80,7 +80,7 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
     dense_values = None if dense is None else exact_model(dense).at(point, dense.p)
     objective = problem.objective
     return Evaluation(
-        problem=problem.name,
+        problem=problem.address,
         options=dict(problem.options),
         parameters=dict(problem.values),
         x=problem.by_name(point),

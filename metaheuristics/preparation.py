@@ -82,7 +82,7 @@ def check_limits(
     """
     if not isinstance(evaluations, Integral) or evaluations < algorithm.population:
         raise SearchError(
-            f"evaluations must be a whole number >= the population of {algorithm.name!r}, {algorithm.population}, got "
+            f"evaluations must be a whole number >= the population of {called(algorithm)!r}, {algorithm.population}, got "
             f"{evaluations!r}: raise the budget or take a smaller population"
         )
     if target is not None and math.isnan(target):
@@ -93,6 +93,33 @@ def check_limits(
         )
     if time_limit_s is not None and not time_limit_s > 0.0:
         raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {time_limit_s!r}")
+
+
+def called(algorithm: Algorithm) -> str:
+    """Name of an algorithm; one of a user's own may have none."""
+    return str(getattr(algorithm, "name", type(algorithm).__name__))
+
+
+def checked_points(asked: object, lower: Array, upper: Array) -> Array:
+    """Points that an algorithm asks for, (P, n).
+
+    Raises:
+        SearchError: another shape, no point, NaN, or a point outside the bounds.
+    """
+    try:
+        points = np.asarray(asked, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SearchError(f"ask must return points (P, {len(lower)}); it returned no numbers: {error}") from error
+    if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
+        raise SearchError(f"ask must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}")
+    outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
+    if outside.any():
+        row, column = np.argwhere(outside)[0].tolist()
+        raise SearchError(
+            f"ask returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
+            f"{lower[column]}..{upper[column]}: clip the points"
+        )
+    return points
 
 
 def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from compare.study.definition import without_hashes
 from compare.study.record import History, RunRecord, Times, Verdict
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, without_nan
@@ -28,7 +29,8 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
     for record in records:
         if record.problem != instance:
             raise InputError(f"a record of {record.problem!r} does not belong to {instance!r}")
-        shared = {key: value for key, value in record.definition.items() if key != "seed"}
+        # Which mathematics an id stands for is held by its probe values, not by a hash that a version of CasADi may change.
+        shared = {key: value for key, value in without_hashes(record.definition).items() if key != "seed"}
         entry = solvers.setdefault(record.algorithm, {"definition": shared, "settings": record.settings, "runs": []})
         if entry["definition"] != shared:
             raise InputError(f"runs of {record.algorithm!r} on {instance!r} differ in their settings")

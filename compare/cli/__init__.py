@@ -2,7 +2,7 @@
 
 From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
 result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``. To and from other packages: ``bench | logs | export-objective``.
+robust``. To and from other packages: ``import | bench | logs | export-objective``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -15,6 +15,10 @@ import typer
 from compare.cli.animate import animate
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
+from compare.cli.exchange.bench import bench
+from compare.cli.exchange.export_objective import export_objective
+from compare.cli.exchange.import_results import import_results
+from compare.cli.exchange.logs import logs
 from compare.cli.export import export
 from compare.cli.list import list_problems
 from compare.cli.questions.certainty import certainty
@@ -30,14 +34,11 @@ from compare.cli.reproduce import reproduce
 from compare.cli.search import search
 from compare.cli.simulate import simulate
 from compare.cli.solve import solve
-from compare.cli.suites.bench import bench
-from compare.cli.suites.export_objective import export_objective
-from compare.cli.suites.logs import logs
 
 COMPARISON = (evaluate, solve, search, compare, report, sweep, reproduce)
 QUESTIONS = (prices, pareto, certainty, motions, motors, robust, walk)
 ROBOT = (simulate, export, animate)
-SUITES = (bench, logs, export_objective)
+EXCHANGE = (bench, logs, export_objective)
 
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
@@ -47,7 +48,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.command("list")(list_problems)
-for function in (*COMPARISON, *QUESTIONS, *ROBOT, *SUITES):
+app.command("import")(import_results)
+for function in (*COMPARISON, *QUESTIONS, *ROBOT, *EXCHANGE):
     app.command(function.__name__.replace("_", "-"))(function)
 
 

@@ -9,14 +9,14 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
-from compare.cli.options import ResultFile
+from compare.cli.options import StoredGait
 
 SHEET = ".png"
 
 
 @command
 def animate(
-    result: ResultFile,
+    stored: StoredGait,
     out: Annotated[
         Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
     ] = None,
@@ -30,13 +30,12 @@ def animate(
     """
     from compare.drawing.animation import contact_sheet, frames
     from compare.drawing.skeletons import skeleton_of
-    from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.video import check_video_path, write_video
 
-    target = output_file(result.with_suffix(".gif") if out is None else out)
+    target = output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:
         check_video_path(target)
-    loaded = load_result(result)
+    loaded = stored.load()
     skeleton = skeleton_of(loaded, frames_per_s / speed)
     if target.suffix.lower() == SHEET:
         contact_sheet(skeleton, target, poses)

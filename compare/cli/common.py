@@ -61,6 +61,11 @@ def fail(message: str, status: int = 1) -> NoReturn:
     raise typer.Exit(status)
 
 
+def say(sentence: str) -> None:
+    """A sentence on stderr, beside what a command prints."""
+    stderr.print(sentence, soft_wrap=True)
+
+
 def print_json(data: Any) -> None:
     """One JSON object on stdout; what is not finite is null, because not every reader accepts NaN."""
     sys.stdout.write(json.dumps(without_nan(data), indent=1, allow_nan=False) + "\n")

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar
-from compare.cli.options import RESULTS, AsJson, Jobs, ProblemOptions, SearchOptions, names_in
-from compare.study.settings import SolverSpec, read_settings
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
+from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "as_json")
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "as_csv", "as_json")
 
 
 @command
@@ -49,37 +49,43 @@ def compare(
     ] = RESULTS,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out, whatever it was.")] = False,
     jobs: Jobs = None,
+    code: Code = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
+    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
     """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
 
-    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way.
+    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way. More runs, solvers,
+    problems or a larger budget in the same folder continue it too; runs whose algorithm, problem or robot was edited are made
+    again. Problems and algorithms of your own take part as `FILE.py:NAME`.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import write_report
+    from compare.study.imported import imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.study import Study, check_study, default_jobs, run_study
 
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
+    name_all(code)
     if config is not None:
         settings = read_settings(config)
     elif resume:
         known = read_manifest(out).settings
         if known is None:
             raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
-        settings = known
+        settings = as_named(known, f"the study in {str(out)!r}")
     else:
         specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = _solvers(algorithms, starts, searches.polish)
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
-    check_study(study)
+    check_study(study)  # before the manifest names it
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
@@ -88,12 +94,14 @@ def compare(
                 study,
                 progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
                 kept=lambda count: _advance_by(advance, count),
+                anew=say,
             )
         except Interrupted as interrupt:
             end_interrupted(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
-    written = write_report(out, records, read_manifest(out))
+    records += imported_records(out, records)
+    written = write_report(out, records, read_manifest(out), as_csv=as_csv)
     data = {"problems": summaries_of(records)} if as_json else {}
     print_result(as_json, data, written, lambda: print_summaries(records))
 

@@ -2,34 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from compare.analysis.units import with_unit
+from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
-from compare.cli.common import fail, output_file, print_json, print_rows, print_table, stdout
+from compare.cli.common import fail, output_file, print_json, print_result, print_rows, print_table, stdout
 from compare.cli.options import AsJson, NamedProblem, numbers_in
 from compare.judge import Evaluation
+from nlp_gait.files import csv_text, write_text
 
 SHOWN_VIOLATIONS = 10
 
 
 @command
 def evaluate(
-    x: Annotated[str, typer.Option("--x", help="Decision variables in order, separated by commas.")],
+    x: Annotated[
+        str,
+        typer.Option(
+            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate a row."
+        ),
+    ],
     problem: NamedProblem,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
+    table: Annotated[Path | None, typer.Option("--csv", help="Write the judged points to this CSV file.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Evaluate one candidate by the exact functions, on the problem's samples and on a dense grid.
+    """Evaluate candidates by the exact functions, on the problem's samples and on a dense grid.
 
-    Example: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`
+    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`,
+    `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`
     """
     from compare.judge import evaluate as judge
+    from compare.study.imported import FINALS, read_points
 
     loaded = problem.spec().load()
+    if x.endswith(".csv"):
+        if signals is not None:
+            fail("--signals takes one candidate; give it as numbers")
+        target = None if table is None else output_file(table)
+        judged = [judge(loaded, row) for row in read_points(Path(x), loaded, FINALS)[1]]
+        if target is not None:
+            _write(target, judged)
+        points = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
+        print_result(as_json, points, [] if target is None else [target], lambda: _print_many(judged))
+        return
     point = loaded.check_x(numbers_in(x))
     if signals is not None:
         if loaded.motion is None:
@@ -39,10 +59,58 @@ def evaluate(
         target = output_file(signals)
         write_npz(target, loaded.signals(point))
     evaluation = judge(loaded, point)
+    if table is not None:
+        _write(output_file(table), [evaluation])
     if as_json:
         print_json(evaluation.to_json())
     else:
         _print(evaluation)
+
+
+def _print_many(judged: Sequence[Evaluation]) -> None:
+    """A row for each candidate; what is violated most names the reason."""
+    objective = judged[0].objective
+    print_table(
+        f"{judged[0].problem}: {len(judged)} candidates",
+        (
+            "row",
+            heading(objective["name"], objective["unit"]),
+            "violation",
+            "feasible",
+            "between samples",
+            "violated most",
+        ),
+        [
+            (
+                str(k),
+                f"{e.objective['value']:.6g}",
+                f"{e.violation:.3g}",
+                "yes" if e.feasible else "no",
+                "-" if e.dense is None else "no" if e.dense_violations else "yes",
+                next((row.name for row in (*e.violations, *e.dense_violations)), "-"),
+            )
+            for k, e in enumerate(judged, start=1)
+        ],
+    )
+
+
+def _write(path: Path, judged: Sequence[Evaluation]) -> None:
+    """One row a candidate: its variables, what the judge found, and the indexes."""
+    found = ("violation", "feasible", "feasible_between_samples")
+    name = judged[0].objective["name"]
+    indexes = [index for index in judged[0].indexes if index != name]
+    rows = [
+        [
+            *e.x.values(),
+            e.objective["value"],
+            e.violation,
+            e.feasible,
+            "" if e.dense is None else not e.dense_violations,
+            *(e.indexes[index] for index in indexes),
+        ]
+        for e in judged
+    ]
+    write_text(path, csv_text([[*judged[0].x, name, *found, *indexes], *rows]))
 
 
 def _print(evaluation: Evaluation) -> None:

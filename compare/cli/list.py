@@ -32,6 +32,7 @@ def list_problems(
 
 def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
+    from nlp_gait.references import installed
     from nlp_gait.robots import robot_names
 
     problems = {name: load(name) for name in problem_names()}
@@ -39,12 +40,19 @@ def _overview(as_json: bool) -> None:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
-        print_json({"problems": described, "algorithms": list(solver_names()), "robots": list(robot_names())})
+        algorithms = [*solver_names(), *installed("algorithm")]
+        data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names())}
+        print_json({**data, "installed": {"problems": installed("problem"), "algorithms": installed("algorithm")}})
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(solver_names())}")
     stdout.print(f"robots: {', '.join(robot_names())}")
+    for kind, listed in (("problems", installed("problem")), ("algorithms", installed("algorithm"))):
+        if listed:
+            packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
+            stdout.print(f"{kind} of other installed packages: {packages}")
+    stdout.print("your own problem or algorithm stands wherever a name does: FILE.py:NAME or MODULE:NAME")
 
 
 def _details(name: str, as_json: bool) -> None:

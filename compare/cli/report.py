@@ -10,7 +10,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import print_result
-from compare.cli.options import AsJson
+from compare.cli.options import AsCsv, AsJson
 from nlp_gait.errors import InputError
 
 
@@ -23,9 +23,12 @@ def report(
     hessian_weight: Annotated[
         float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts as (default (n + 1)(n + 2)/2).")
     ] = None,
+    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a study's report anew from its records, without running anything.
+    """Write a study's report anew from all records of its folder, without running anything.
+
+    Solvers that a later call left out are there too; runs of an earlier definition stand under a name that says how it differs.
 
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`
     """
@@ -36,5 +39,5 @@ def report(
         if weight is not None and not math.isfinite(weight):
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
-    written = rebuild_report(folder, weighting)
+    written = rebuild_report(folder, weighting, as_csv=as_csv)
     print_result(as_json, {}, written, lambda: None)

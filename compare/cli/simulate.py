@@ -11,7 +11,7 @@ import typer
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, output_file, print_json, print_table, stdout
-from compare.cli.options import AsJson, ResultFile
+from compare.cli.options import AsJson, StoredGait
 from nlp_gait.simulation.mjcf import FRICTION
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @command
 def simulate(
-    result: ResultFile,
+    stored: StoredGait,
     steps: Annotated[
         int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
     ] = None,
@@ -47,7 +47,6 @@ def simulate(
     from compare.drawing.playback_figure import plot_playback
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
-    from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.camera import filmed, shown
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
@@ -65,7 +64,7 @@ def simulate(
         fail("--viewer and --video exclude each other; film it in a second run")
     target = None if video is None else output_file(check_video_path(video))
     folder = None if out is None else writable_folder(out)
-    plan = plan_of(load_result(result), steps)
+    plan = plan_of(stored.load(), steps)
     drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
     if target is not None:
         trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)

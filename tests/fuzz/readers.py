@@ -89,7 +89,6 @@ def read_study(path: Path) -> None:
 
 def read_robot(path: Path) -> None:
     """A robot: every number of the file is in it."""
-    load_robot.cache_clear()
     robot = load_robot(str(path))
     same_robot(_plain(path), robot)
 
@@ -97,7 +96,6 @@ def read_robot(path: Path) -> None:
 def read_urdf(path: Path) -> None:
     """A robot from a URDF with the robot file beside it: masses, limits and ranges are those of the file."""
     path.with_suffix(".json").write_bytes((SEEDS / "urdf" / "tiny.json").read_bytes())
-    load_robot.cache_clear()
     robot, root = load_robot(str(path)), ElementTree.fromstring(path.read_bytes())
     masses = [float(mass.get("value", "")) for mass in root.iterfind("link/inertial/mass")]
     near(math.fsum(masses), robot.mass_kg, "mass")
