@@ -45,13 +45,13 @@ class Definition:
     source: str = NAO
 
 
-def _walk12(id: str, what: str, weight: float, *, small: bool = False, horizon: str = "step") -> Definition:
+def _walk12(id: str, what: str, weight: float, *, small: bool = False, **values: float) -> Definition:
     return Definition(
         id=id,
         what=f"12-joint walk, {what}",
         problem="walk12",
-        options={"horizon": horizon},
-        values={"lambda": weight},
+        options={"horizon": "1s"} if values else {},
+        values={"lambda": weight, **values},
         difficulty="easy",
         small=small,
         source=WALK12,
@@ -98,8 +98,8 @@ DEFINITIONS: tuple[Definition, ...] = (
     _walk12("walk12-w050", "weight 0.5 on stability", 0.5),
     _walk12("walk12-w085", "weight 0.85 on stability", 0.85),
     _walk12("walk12-w100", "stability alone", 1.0, small=True),
-    _walk12("walk12-second-w015", "one second of walking, weight 0.15", 0.15, horizon="1s"),
-    _walk12("walk12-second-w100", "one second of walking, stability alone", 1.0, horizon="1s"),
+    _walk12("walk12-fast-w015", "two steps a second, weight 0.15", 0.15, step_time_s=0.5),
+    _walk12("walk12-fast-w100", "two steps a second, stability alone", 1.0, step_time_s=0.5),
     _phase("ssp-v5", "steps of 0.06 m, as published", small=True, step_length_m=0.06),
     _phase("ssp-v5-step040", "steps of 0.04 m", step_length_m=0.04),
     _phase("ssp-v5-step050", "steps of 0.05 m", step_length_m=0.05),

@@ -73,6 +73,8 @@ def test_there_are_forty_and_more_and_the_small_ones_are_among_them() -> None:
     assert len(gaitbench.names("small")) == 10
     assert set(gaitbench.names("small")) < set(gaitbench.names("full")) == set(known())
     assert len({definition.id for definition in DEFINITIONS}) == len(DEFINITIONS)
+    ends = [(len(known()[id].best_x), known()[id].best_known) for id in gaitbench.names()]
+    assert len(set(ends)) == len(ends)  # no two are the same problem
     counts = [len(known()[id].best_x) for id in gaitbench.names()]
     assert min(counts) <= 9 and max(counts) == 264
     with pytest.raises(UnknownNameError, match="subset"):
@@ -188,5 +190,7 @@ def test_the_catalogue_has_an_entry_for_each() -> None:
     first = next(entry for entry in made["problems"] if entry["id"] == "ssp-v5")
     assert first["variables"]["dimension"] == 9
     assert first["best_known"]["objective"] == gaitbench.load("ssp-v5").best_known
-    written = Path(__file__).parents[2] / "docs" / "gaitbench.json"
-    assert json.loads(written.read_text(encoding="utf-8")) == made
+    docs = Path(__file__).parents[2] / "docs"
+    assert json.loads((docs / "gaitbench.json").read_text(encoding="utf-8")) == made
+    page = (docs / "gaitbench.md").read_text(encoding="utf-8")
+    assert all(f"| `{id}`" in page for id in gaitbench.names())
