@@ -1,4 +1,7 @@
-"""The catalogue and the table of instances in the documentation, from what is known: ``python -m benchmarks.gaitbench.documents``."""
+"""Catalogue and table of instances in the documentation, from what is known.
+
+``python -m benchmarks.gaitbench.documents``
+"""
 
 from __future__ import annotations
 

@@ -43,7 +43,10 @@ def _made(id: str) -> GaitProblem:
 
 def _instance(base: GaitProblem, definition: Definition) -> GaitProblem:
     """The problem, or a finer one, as the suite has it."""
-    problem = replace(held(base, definition.held).derived(change=_with_bands), name="gaitbench", searchable=True)
+    banded = held(base, definition.held).derived(
+        name="gaitbench", title=f"GaitBench: {definition.what}", change=_with_bands
+    )
+    problem = replace(banded, searchable=True)
     refine = base.refine
     if refine is None:
         return problem
@@ -51,7 +54,7 @@ def _instance(base: GaitProblem, definition: Definition) -> GaitProblem:
     def finer(factor: int) -> GaitProblem:
         return _instance(refine(factor).with_values(**definition.values), definition)
 
-    return replace(problem, title=definition.what, refine=finer)
+    return replace(problem, refine=finer)
 
 
 def held(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
