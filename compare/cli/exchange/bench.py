@@ -9,7 +9,7 @@ import typer
 
 from compare.bench.tasks import BASELINE, RUNS, bench_tasks
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stderr, stdout
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, names_in
 from nlp_gait.errors import InputError
@@ -56,11 +56,14 @@ def bench(
         gaitbench.load(id)  # says what is unknown
     known = shipped()
     missing = [id for id in chosen if id not in known]
-    if missing:
+    if missing and (instances is not None or len(missing) == len(chosen)):
         raise InputError(
             f"no baseline records of {', '.join(missing)} are shipped; choose others with --instances, for example "
             f"--instances {','.join(known)}"
         )
+    if missing:
+        stderr.print(f"left out, for no baseline records of them are shipped yet: {', '.join(missing)}", soft_wrap=True)
+        chosen = tuple(id for id in chosen if id in known)
     writable_folder(out)
     records: list[RunRecord] = []
     name: str | None = None
@@ -80,7 +83,9 @@ def bench(
         if stopped:
             end_interrupted(f"{stopped}; finished runs are kept in {out}: the same command continues")
     board = leaderboard(chosen, records)
-    suite_name = f"suite {suite}" if instances is None else "chosen instances"
+    suite_name = (
+        f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
+    )
     written = write_document(out, leaderboard_page(board, name, suite_name), "leaderboard")
 
     def tables() -> None:
@@ -98,6 +103,7 @@ def bench(
     data = {
         "suite": suite_name,
         "instances": list(chosen),
+        "left_out": missing,
         "solver": name,
         "place": None if name is None else board.place(name),
         "standings": [

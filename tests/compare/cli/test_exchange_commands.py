@@ -114,6 +114,10 @@ def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pyte
         "bench", "--instances", ID, "--out", tmp_path
     )
     assert shipped()
+    done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
+    assert "left out, for no baseline records of them are shipped yet: walk12-w015, ssp-v5," in done.stderr
+    found = json.loads(done.stdout)
+    assert found["instances"] == ["walk12-w100"] and len(found["left_out"]) == 9
 
 
 def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
