@@ -61,12 +61,12 @@ class Evaluation:
         return {"schema": 1, "problem": self.problem, **robot, **asdict(self)}
 
 
-def evaluate(problem: GaitProblem, x: Sequence[float] | Array) -> Evaluation:
+def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float]) -> Evaluation:
     """Exact values at a point.
 
     Args:
         problem: with its current parameter values.
-        x: (n,) decision variables, in the problem's order.
+        x: (n,) decision variables, in the problem's order or by name.
 
     Raises:
         InputError: x has the wrong length or is not finite.

@@ -5,6 +5,7 @@ functions to search algorithms.
 """
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from nlp_gait.errors import GaitError
@@ -42,7 +43,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """What is imported when first used."""
+    """What is imported or read when first used."""
+    if name == "__version__":
+        return version("nlp-gait")
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_LATER[name]), name)

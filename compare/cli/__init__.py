@@ -10,8 +10,11 @@ Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not 
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
+import nlp_gait
 from compare.cli.animate import animate
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
@@ -35,22 +38,42 @@ from compare.cli.search import search
 from compare.cli.simulate import simulate
 from compare.cli.solve import solve
 
-COMPARISON = (evaluate, solve, search, compare, report, sweep, reproduce)
-QUESTIONS = (prices, pareto, certainty, motions, motors, robust, walk)
-ROBOT = (simulate, export, animate)
-EXCHANGE = (bench, logs, export_objective)
+PANELS = {
+    "Problems, optima and searches": (list_problems, evaluate, solve, search),
+    "Comparison": (compare, import_results, report, reproduce, bench),
+    "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
+    "Show and share": (simulate, animate, export, logs, export_objective),
+}
 
 app = typer.Typer(
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-app.command("list")(list_problems)
-app.command("import")(import_results)
-for function in (*COMPARISON, *QUESTIONS, *ROBOT, *EXCHANGE):
-    app.command(function.__name__.replace("_", "-"))(function)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(nlp_gait.__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def options_of_all(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Take what belongs to no command."""
+
+
+# Commands whose names Python has taken, or does not allow.
+NAMES = {list_problems: "list", import_results: "import", export_objective: "export-objective"}
+for panel, functions in PANELS.items():
+    for function in functions:
+        app.command(NAMES.get(function, function.__name__), rich_help_panel=panel)(function)
 
 
 def main() -> None:

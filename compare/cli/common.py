@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, Literal, NoReturn, TypeVar
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -23,8 +25,10 @@ T = TypeVar("T")
 
 # Characters of an error; a value in it can be a whole file.
 LONGEST_SENTENCE = 2000
-# Wide enough for every table where there is no terminal to fit, for example in a pipe or a log.
-PIPE_WIDTH = 160
+STACKED_WIDTH = 60  # up to here a table is stacked: a block of lines for each row
+LONGEST_CELL = 24  # characters up to which a cell is kept on one line
+LOG_PERIOD_S = 30.0  # between two lines of progress in a log
+GAP = 3  # columns of a terminal between two columns of a table
 
 
 class PlainConsole(Console):
@@ -33,6 +37,12 @@ class PlainConsole(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """Text as it is printed, titles and cells of tables included."""
         return super().render_str(harmless(text), **options)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """As any console; where there is no terminal, a sentence is one line, so that a program can look for it."""
+        if not self.is_terminal and all(isinstance(item, str) for item in objects):
+            options.setdefault("soft_wrap", True)
+        super().print(*objects, **options)
 
 
 def harmless(text: str) -> str:
@@ -45,7 +55,7 @@ def harmless(text: str) -> str:
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
-stdout = PlainConsole(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+stdout = PlainConsole(highlight=False, markup=False)  # 80 columns where no terminal says otherwise
 
 
 def end_interrupted(sentence: str) -> NoReturn:
@@ -72,13 +82,52 @@ def print_json(data: Any) -> None:
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Table on stdout; the first column is left-aligned."""
-    table = Table(title=title, title_justify="left")
-    for i, name in enumerate(header):
-        table.add_column(name, justify="left" if i == 0 else "right", overflow="fold")
+    """Table on stdout, never wider than the terminal; numbers are right-aligned, but for the first column.
+
+    What does not fit beside the first column follows in a second table with that column again; on narrow terminals there
+    is a block of lines for each row.
+    """
+    if stdout.width <= STACKED_WIDTH and len(header) > 2:
+        _print_stacked(title, header, rows)
+        return
+    needs = [_needed(name, [row[i] for row in rows]) for i, name in enumerate(header)]
+    groups: list[list[int]] = [[0]]
+    room = stdout.width - needs[0] - GAP - 1
+    left = room
+    for i in range(1, len(header)):
+        if needs[i] + GAP > left and len(groups[-1]) > 1:
+            groups.append([0])
+            left = room
+        groups[-1].append(i)
+        left -= needs[i] + GAP
+    for k, group in enumerate(groups):
+        heading = title if k == 0 else f"{title}, continued"
+        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
+        for i in group:
+            need = min(needs[i], room)
+            justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"
+            table.add_column(header[i], justify=justify, overflow="fold", min_width=need)
+        for row in rows:
+            table.add_row(*(row[i] for i in group))
+        stdout.print(table)
+
+
+def _number(text: str) -> bool:
+    return len(text) <= LONGEST_CELL and (not text or text[0] in "+-.0123456789")
+
+
+def _needed(name: str, column: Sequence[str]) -> int:
+    """Width of a column whose heading is wrapped at spaces, and long cells too."""
+    words = [name.split(), *([text] if len(text) <= LONGEST_CELL else text.split() for text in column)]
+    return max((len(word) for line in words for word in line), default=1)
+
+
+def _print_stacked(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    stdout.print(title)
     for row in rows:
-        table.add_row(*row)
-    stdout.print(table)
+        stdout.print(f"{header[0]} {row[0]}".strip())
+        for name, text in zip(header[1:], row[1:], strict=True):
+            stdout.print(f"  {name}: {text}")
 
 
 def print_rows(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> None:
@@ -105,7 +154,7 @@ def print_written(*paths: Path) -> None:
 def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
     """Progress on stderr, of unknown length if total is None; the function inside advances it by one and shows a note."""
     if not stderr.is_terminal:
-        yield lambda note: None
+        yield _Log(description, total)
         return
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -118,6 +167,22 @@ def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str]
     with Progress(*columns, console=stderr, transient=True) as progress:
         task = progress.add_task(harmless(description), total=total, note="")
         yield lambda note: progress.update(task, advance=1, note=harmless(note))
+
+
+class _Log:
+    """Progress where there is no terminal: a line now and then, so that the log of long work is not empty."""
+
+    def __init__(self, description: str, total: int | None) -> None:
+        self.description, self.total, self.done = description, total, 0
+        self.began = self.said = time.monotonic()
+
+    def __call__(self, note: str) -> None:
+        self.done += 1
+        now = time.monotonic()
+        if now - self.said >= LOG_PERIOD_S:
+            self.said = now
+            of = "" if self.total is None else f" of {self.total}"
+            stderr.print(f"{self.description}: {self.done}{of} after {now - self.began:.0f} s; {note}", soft_wrap=True)
 
 
 def output_file(path: Path) -> Path:

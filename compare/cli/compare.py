@@ -119,6 +119,10 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
+# What the first table on a narrow terminal holds, in the order in which it is to be read.
+READ_FIRST = ("solver", "judged feasible", "median gap", "best", "median", "evaluations", "time a run")
+
+
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
@@ -126,7 +130,12 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 
     for comparison in compare_problems(records):
         rows = [cells(summary, comparison) for summary in summarise(comparison)]
-        print_table(title or f"{comparison.problem}: judged by the exact functions", HEADER, rows)
+        order = [HEADER.index(name) for name in (*READ_FIRST, *(n for n in HEADER if n not in READ_FIRST))]
+        print_table(
+            title or f"{comparison.problem}: judged by the exact functions",
+            [HEADER[i] for i in order],
+            [[row[i] for i in order] for row in rows],
+        )
 
 
 def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:

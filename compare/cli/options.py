@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,6 +17,9 @@ from nlp_gait.problem import Result
 from nlp_gait.problem.registry import problem_maker
 from nlp_gait.problem.result import load_result
 from nlp_gait.references import is_reference, name_code
+
+if TYPE_CHECKING:
+    from nlp_gait.simulation.drive import Drive
 
 ResultFile = Annotated[
     Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
@@ -124,6 +127,41 @@ class NaoPhase(NamedProblem):
     """A problem that is nao-ssp unless another is named."""
 
     name: ProblemName = "nao-ssp"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveOptions:
+    """How the simulated robot is driven: a drive by name, with settings of its own."""
+
+    drive: Annotated[
+        str,
+        typer.Option(
+            help="feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. "
+            "held: each held for 40 ms, nothing fed forward."
+        ),
+    ] = "feed-forward"
+    period_ms: Annotated[float | None, typer.Option(help="Time between set-points, if not the drive's own.")] = None
+    interpolation: Annotated[str | None, typer.Option(help="Between set-points: linear or held.")] = None
+    feed_forward: Annotated[str | None, typer.Option(help="torque (and velocity), velocity, or none.")] = None
+    torque_limits: Annotated[
+        str | None, typer.Option(help="urdf (default), stall or continuous: published limits differ.")
+    ] = None
+
+    def chosen(self) -> Drive:
+        """The drive, checked.
+
+        Raises:
+            UnknownNameError: no drive has this name.
+            InputError: a setting that is not allowed.
+        """
+        from nlp_gait.simulation.drive import DRIVES
+
+        if self.drive not in DRIVES:
+            raise unknown("drive", self.drive, DRIVES)
+        period_s = None if self.period_ms is None else self.period_ms / 1000.0
+        own = {**vars(self), "period_s": period_s}
+        names = ("period_s", "interpolation", "feed_forward", "torque_limits")
+        return replace(DRIVES[self.drive], **{name: own[name] for name in names if own[name] is not None})
 
 
 @dataclass(frozen=True, kw_only=True)

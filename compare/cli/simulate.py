@@ -11,7 +11,7 @@ import typer
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, output_file, print_json, print_table, stdout
-from compare.cli.options import AsJson, StoredGait
+from compare.cli.options import AsJson, DriveOptions, StoredGait
 from nlp_gait.simulation.mjcf import FRICTION
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 @command
 def simulate(
     stored: StoredGait,
+    *,
     steps: Annotated[
         int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
     ] = None,
@@ -32,15 +33,15 @@ def simulate(
         float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")
     ] = 25.0,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
-    torque_limits: Annotated[str, typer.Option(help="urdf, stall or continuous: published limits differ.")] = "urdf",
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    servos: DriveOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a NAO gait in MuJoCo, open loop with a set-point every 40 ms, and compare it with the model's predictions.
+    """Play a NAO gait in MuJoCo, open loop, and compare it with the model's predictions.
 
     Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
@@ -49,7 +50,6 @@ def simulate(
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.simulation.camera import filmed, shown
     from nlp_gait.simulation.conditions import Conditions
-    from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.measurements import measure
     from nlp_gait.simulation.mjcf import free_model
@@ -65,7 +65,7 @@ def simulate(
     target = None if video is None else output_file(check_video_path(video))
     folder = None if out is None else writable_folder(out)
     plan = plan_of(stored.load(), steps)
-    drive, conditions = Drive(torque_limits=torque_limits), Conditions(friction=friction)
+    drive, conditions = servos.chosen(), Conditions(friction=friction)
     if target is not None:
         trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)
         write_video(target, frames, frames_per_s)
@@ -102,21 +102,30 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
     stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
     powers = [
-        (name, *(f"{part:.3f}" for part in (power.mechanical_W, power.heat_W, power.total_W)))
+        (name, *(f"{part:.3f}" for part in (power.mechanical_W, power.heat_W, power.total_W, power.signed_W)))
         for name, power in (("model", report.predicted), ("engine", report.measured))
     ]
-    print_table("Mean power [W]", ("", "mechanical", "heat", "total"), powers)
+    print_table("Mean power [W]", ("", "mechanical", "heat", "total", "net mechanical"), powers)
     lengths = {
         "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
         "- largest": report.pressure_max_m,
         "- RMS in the middle 60 % of the phase": report.pressure_middle_rms_m,
-        "- RMS without averaging over 40 ms": report.pressure_raw_rms_m,
+        "- RMS without averaging over a period": report.pressure_raw_rms_m,
+        "- RMS, both relative to the feet": report.pressure_in_feet_rms_m,
         "slip of a supporting foot": report.slip_m,
         **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
     }
     rows = [(name, millimetres(value)) for name, value in lengths.items()]
     tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
     print_table("Against the plan", ("", "measured"), [*rows, ("tracking error of the joints", tracking)])
+    if report.earliest_landing_s is not None and report.landing_speed_m_s is not None:
+        early = 1000.0 * report.earliest_landing_s
+        stdout.print(
+            f"Feet land at most {abs(early):.0f} ms {'early' if early >= 0.0 else 'late'}, "
+            f"at {report.landing_speed_m_s:.3f} m/s or less"
+        )
+    for joint, share in report.beyond_limit.items():
+        stdout.print(f"{joint} is planned to give up to {share:.2f} times its torque limit")
     for joint, share in report.saturated.items():
         stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
     for joint in report.joint_limits:
@@ -137,5 +146,6 @@ def _print_course(walk: Walk) -> None:
     stdout.print(
         f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "
         f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:.1f} degrees to the left; "
-        f"{with_unit(walk.energy_J_per_m, 'J/m', '.1f')}"
+        f"{with_unit(walk.engine_J_per_planned_m, 'J', '.1f')} per planned metre (model: {walk.model_J_per_m:.1f} J), "
+        f"{with_unit(walk.engine_J_per_m, 'J', '.1f')} per walked metre"
     )

@@ -16,6 +16,7 @@ from compare.cli.common import (
     print_json,
     print_rows,
     print_table,
+    print_written,
     progress_bar,
     stdout,
 )
@@ -67,12 +68,16 @@ def solve(
                 progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
             )
         )
-    if as_json:
-        print_json(solution.to_json())
-    else:
-        _print(solution)
-    if target is not None:  # after printing, so that a full disk does not take the result with it
-        write_json(target, without_nan(solution.to_json()))
+    try:  # before printing, so that a reader who has gone does not take the file with him
+        if target is not None:
+            write_json(target, without_nan(solution.to_json()))
+    finally:  # nor a full disk what is printed
+        if as_json:
+            print_json(solution.to_json())
+        else:
+            _print(solution)
+            if target is not None and target.exists():
+                print_written(target)
     if stopped:
         where = "printed" if target is None else f"in {target}"
         end_interrupted(f"{stopped}; the best point until then is {where}")
@@ -83,8 +88,12 @@ def solve(
 def _print(solution: Solution) -> None:
     value = with_unit(solution.objective, solution.objective_unit)
     converged = sum(start.success for start in solution.starts)
-    stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
-    print_table("Optimum", ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
+    if solution.feasible:
+        stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
+    else:
+        stdout.print(f"{solution.problem}: no feasible point was found ({solution.status})")
+    kind = "Optimum" if solution.success else "Best feasible point" if solution.feasible else "Least infeasible point"
+    print_table(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
         print_rows(
             "What holds it back",

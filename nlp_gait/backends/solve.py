@@ -12,7 +12,7 @@ from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 
 # A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
@@ -20,11 +20,11 @@ PRICE_TOLERANCE = 1e-6
 
 
 def solve(
-    problem: GaitProblem,
+    problem: GaitProblem | str,
     *,
     starts: int = 1,
     seed: int = 0,
-    x0: Sequence[float] | Array | None = None,
+    x0: Sequence[float] | Array | Mapping[str, float] | None = None,
     fix: Mapping[str, float] | None = None,
     solver: Solver | None = None,
     progress: Callable[[Outcome], None] | None = None,
@@ -32,10 +32,10 @@ def solve(
     """Best local optimum from several starts.
 
     Args:
-        problem: with its current parameter values.
+        problem: with its current parameter values; a name is loaded with its defaults.
         starts: number of start points, from ``problem.start_point``.
         seed: of the start points.
-        x0: first start point (n,); the remaining ``starts - 1`` are random.
+        x0: first start point (n,), in order or by name; the remaining ``starts - 1`` are random.
         fix: variables held at a value.
         solver: with its settings; None for IPOPT with its defaults.
         progress: called after each start.
@@ -50,7 +50,7 @@ def solve(
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
-    problem = problem.fix(**(fix or {}))
+    problem = (load(problem) if isinstance(problem, str) else problem).fix(**(fix or {}))
     points = _start_points(problem, starts, seed, x0)
     ready = (solver or IpoptSettings()).ready_for(problem, starts)
     outcomes: list[Outcome] = []
@@ -68,7 +68,9 @@ def solve(
     return solution
 
 
-def _start_points(problem: GaitProblem, starts: int, seed: int, x0: Sequence[float] | Array | None) -> list[Array]:
+def _start_points(
+    problem: GaitProblem, starts: int, seed: int, x0: Sequence[float] | Array | Mapping[str, float] | None
+) -> list[Array]:
     rng = np.random.default_rng(seed)
     points = [problem.start_point(rng) for _ in range(starts)]
     if x0 is not None:

@@ -160,7 +160,7 @@ class Outcome:
         return 2.0, math.inf if math.isnan(self.violation) else self.violation
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Solution:
     """Best of all starts, judged by the exact functions.
 
@@ -205,6 +205,17 @@ class Solution:
     active_constraints: tuple[ActiveConstraint, ...]
     starts: tuple[Outcome, ...]
     seed: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the exact functions find x feasible."""
+        return self.violation <= FEASIBILITY_TOLERANCE
+
+    def __repr__(self) -> str:
+        """One line: what was found, and from how many starts."""
+        found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
+        converged = sum(start.success for start in self.starts)
+        return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with the schema version of results."""

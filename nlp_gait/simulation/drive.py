@@ -1,16 +1,23 @@
-"""How the simulated robot is driven: position servos with limited torque, and set-points at a fixed period."""
+"""How the simulated robot is driven: position servos with limited torque, set-points, and what is fed forward."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from nlp_gait.errors import InputError
+from nlp_gait.problem import Array
 from nlp_gait.robots import Joint
 
 # Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
 # stall or in continuous service, times the gear ratio.
 TORQUE_LIMITS = ("urdf", "stall", "continuous")
+ROUNDING = 1e-9  # in periods: a set-point's own time belongs to it
+INTERPOLATIONS = ("linear", "held")  # between two set-points
+FEED_FORWARD = ("torque", "velocity", "none")  # each with those after it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,27 +25,36 @@ class Drive:
     """Servo of every joint: torque = stiffness (set-point - angle) - damping rate, within the limits.
 
     The stiffness is proportional to what the joint's motor gives at stall: each reaches it at the same error.
+    A position servo follows a planned velocity and torque as well if its set-point is shifted by
+    damping / stiffness times the velocity, and by the torque / stiffness (``set_points``).
 
     Attributes:
         full_error_rad: error at which a motor would give its stall torque.
         time_constant_s: damping / stiffness.
-        period_s: time between set-points, each held until the next.
+        period_s: time between set-points; NAO's own controller works in cycles of 10 ms.
+        interpolation: ``linear`` between set-points, as NAO's controller does between timed commands, or each ``held``.
+        feed_forward: ``torque`` (and velocity), ``velocity``, or ``none``.
         torque_limits: which of the published limits holds.
     """
 
     full_error_rad: float = 0.08
     time_constant_s: float = 0.02
-    period_s: float = 0.04
+    period_s: float = 0.01
+    interpolation: str = "linear"
+    feed_forward: str = "torque"
     torque_limits: str = "urdf"
 
     def __post_init__(self) -> None:
-        """Positive numbers, a known limit."""
+        """Positive numbers, known names."""
         for name in ("full_error_rad", "time_constant_s", "period_s"):
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
                 raise InputError(f"{name} of a drive must be > 0, got {value!r}")
-        if self.torque_limits not in TORQUE_LIMITS:
-            raise InputError(f"torque limits must be one of {', '.join(TORQUE_LIMITS)}, got {self.torque_limits!r}")
+        allowed = {"interpolation": INTERPOLATIONS, "feed_forward": FEED_FORWARD, "torque_limits": TORQUE_LIMITS}
+        for name, names in allowed.items():
+            if getattr(self, name) not in names:
+                said = name.replace("_", " ")
+                raise InputError(f"{said} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
 
     def stiffness(self, joint: Joint) -> float:
         """[Nm/rad]."""
@@ -47,6 +63,31 @@ class Drive:
     def damping(self, joint: Joint) -> float:
         """[Nm s/rad]."""
         return self.stiffness(joint) * self.time_constant_s
+
+    def set_points(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
+        """What the servos are told at given times (T, J) [rad]: planned angles, shifted by what is fed forward.
+
+        Args:
+            at: planned ``q`` [rad], ``qd`` [rad/s] and ``tau`` [Nm] at any times (N,), each (N, J).
+            times: (T,) [s].
+            joints: as in the columns.
+        """
+        before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
+        last = int(before[-1]) + 1
+        sent = self._sent(at, self.period_s * np.arange(last + 1.0), joints)
+        k = before.astype(int)
+        if self.interpolation == "held":
+            return sent[k]
+        return np.asarray(sent[k] + np.maximum(share - ROUNDING, 0.0)[:, None] * (sent[k + 1] - sent[k]))
+
+    def _sent(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
+        angles = at("q", times)
+        if self.feed_forward == "none":
+            return angles
+        shifted = angles + self.time_constant_s * at("qd", times)
+        if self.feed_forward == "velocity":
+            return shifted
+        return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
 
     def torque_limit(self, joint: Joint) -> float:
         """[Nm]."""
@@ -62,3 +103,10 @@ def stall_torque(joint: Joint) -> float:
     if joint.motor is None:
         return joint.torque_limit_Nm
     return joint.motor.stall_torque_Nm
+
+
+# By name: NAO's own way of moving, and set-points each held for 40 ms as the paper's gaits were sampled.
+DRIVES = {
+    "feed-forward": Drive(),
+    "held": Drive(period_s=0.04, interpolation="held", feed_forward="none"),
+}

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from nlp_gait.problem import Array
@@ -22,10 +23,28 @@ MIDDLE = (0.2, 0.8)  # part of the phase that neither the start from unloaded se
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Power:
-    """Mean power over the phase: |torque rate| summed over the joints, and heat K torque^2 [W]."""
+    """Mean power over the phase [W].
+
+    Attributes:
+        mechanical_W: |torque rate|, summed over the joints.
+        signed_W: torque times rate: what the servos do less what they take back. Where set-points jump, |torque rate|
+            depends on the engine's step and this does not.
+        heat_W: K torque^2.
+    """
 
     mechanical_W: float
+    signed_W: float
     heat_W: float
+
+    @classmethod
+    def of(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Power:
+        """From torques [Nm] and rates [rad/s] (T, J), K [W/(Nm)^2], and how a time mean is taken of samples (T,)."""
+        work = torque * rate
+        return cls(
+            mechanical_W=mean(np.abs(work).sum(axis=1)),
+            signed_W=mean(work.sum(axis=1)),
+            heat_W=heat_loss * mean((torque**2).sum(axis=1)),
+        )
 
     @property
     def total_W(self) -> float:
@@ -40,6 +59,23 @@ class Landing:
     planned_m: tuple[float, float]
     measured_m: tuple[float, float]
     error_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touchdown:
+    """One swinging foot's first touch of the ground in the second half of its swing.
+
+    Attributes:
+        side: of the foot.
+        planned_s: when the plan sets it down.
+        measured_s: when the ground first carried it.
+        speed_m_s: of the sole under the ankle towards the ground just before.
+    """
+
+    side: str
+    planned_s: float
+    measured_s: float
+    speed_m_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,9 +94,14 @@ class Measurements:
         pressure_max_m: largest.
         pressure_middle_rms_m: over the middle 60 % of the phase.
         pressure_raw_rms_m: without averaging; contact forces ring at every new set-point.
+        pressure_in_feet_rms_m: both relative to the supporting feet, where they were and where they were planned.
+        touchdowns: of the swinging feet, in order of time.
+        earliest_landing_s: by how much a foot touched the ground before the plan, at most; negative if all were late.
+        landing_speed_m_s: largest of the touchdowns; None without any.
         predicted: power by the rigid model.
         measured: power of the servos.
         saturated: share of time at the torque limit, by joint, where not zero.
+        beyond_limit: largest planned torque over the torque limit, by joint, where above 1: no drive can follow that.
         joint_limits: joints that went beyond their mechanical range.
     """
 
@@ -75,9 +116,14 @@ class Measurements:
     pressure_max_m: float | None
     pressure_middle_rms_m: float | None
     pressure_raw_rms_m: float | None
+    pressure_in_feet_rms_m: float | None
+    touchdowns: tuple[Touchdown, ...]
+    earliest_landing_s: float | None
+    landing_speed_m_s: float | None
     predicted: Power
     measured: Power
     saturated: Mapping[str, float]
+    beyond_limit: Mapping[str, float]
     joint_limits: tuple[str, ...]
 
     @property
@@ -91,8 +137,12 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
     during = trace.t <= plan.duration_s
     error = plan.at("q", trace.t[during]) - trace.q[during]
     torque, rate = trace.torque[during], trace.qd[during]
+    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
     raw = np.linalg.norm(trace.pressure - plan.at("zmp", trace.t), axis=1)[during]
-    deviation = np.linalg.norm(averaged_pressure(trace, drive.period_s) - plan.at("zmp", trace.t), axis=1)[during]
+    pressure, planned = averaged_pressure(trace, drive.period_s), plan.at("zmp", trace.t)
+    deviation = np.linalg.norm(pressure - planned, axis=1)[during]
+    in_feet = np.linalg.norm(pressure - planned - _feet_moved(plan, trace), axis=1)[during]
+    landed = _touchdowns(plan, trace)
     share = trace.t[during] / plan.duration_s
     middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
     return Measurements(
@@ -107,14 +157,23 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
         pressure_max_m=_if_any(np.max, deviation),
         pressure_middle_rms_m=_if_any(_rms, middle),
         pressure_raw_rms_m=_if_any(_rms, raw),
-        predicted=Power(mechanical_W=plan.mechanical_power_W, heat_W=plan.heat_power_W),
-        measured=Power(
-            mechanical_W=float(np.abs(torque * rate).sum(axis=1).mean()),
-            heat_W=plan.heat_loss * float((torque**2).sum(axis=1).mean()),
-        ),
-        saturated=_saturated(plan, torque, drive),
+        pressure_in_feet_rms_m=_if_any(_rms, in_feet),
+        touchdowns=landed,
+        earliest_landing_s=max((at.planned_s - at.measured_s for at in landed), default=None),
+        landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
+        predicted=predicted(plan),
+        measured=Power.of(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
+        saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
+        beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
         joint_limits=_beyond_range(plan, trace.q[during]),
     )
+
+
+def predicted(plan: Plan) -> Power:
+    """What the rigid model says of the planned motion."""
+    arrays, duration = plan.signals.arrays, plan.duration_s
+    mean = lambda samples: float(trapezoid(samples, arrays["t"]) / duration)  # noqa: E731
+    return Power.of(arrays["tau"], arrays["qd"], plan.heat_loss, mean)
 
 
 def averaged_pressure(trace: Trace, period_s: float) -> Array:
@@ -139,6 +198,38 @@ def _slip(plan: Plan, trace: Trace) -> float:
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 
 
+def _feet_moved(plan: Plan, trace: Trace) -> Array:
+    """How far the feet that should stand are from where they should (T, 2) [m], averaged over these feet."""
+    weights = np.stack([plan.stands(side, trace.t) for side in SIDES], axis=1)
+    moved = np.stack(
+        [trace.feet[:, i, :2] - plan.at(f"{side}_foot", trace.t)[:, :2] for i, side in enumerate(SIDES)], axis=1
+    )
+    with np.errstate(invalid="ignore"):
+        return np.asarray((weights[:, :, None] * moved).sum(axis=1) / weights.sum(axis=1)[:, None])
+
+
+def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
+    found = []
+    for i, side in enumerate(SIDES):
+        swings = np.diff(np.concatenate([[1.0], plan.stands(side, trace.t), [1.0]]))
+        for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
+            planned = min(int(set_down), len(trace.t) - 1)
+            middle = (int(lifted) + planned) // 2
+            carried = np.flatnonzero(trace.loads[middle:, i] > LEAST_LOAD)
+            if middle > 0 and carried.size:
+                first = middle + int(carried[0])
+                speed = float(trace.feet[first - 1, i, 2] - trace.feet[first, i, 2]) / TIME_STEP
+                found.append(
+                    Touchdown(
+                        side=side,
+                        planned_s=float(trace.t[planned]),
+                        measured_s=float(trace.t[first]),
+                        speed_m_s=speed,
+                    )
+                )
+    return tuple(sorted(found, key=lambda at: at.planned_s))
+
+
 def _landing(plan: Plan, trace: Trace, side: str) -> Landing:
     planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2]
     measured = trace.feet[-1, SIDES.index(side), :2]
@@ -149,10 +240,8 @@ def _landing(plan: Plan, trace: Trace, side: str) -> Landing:
     )
 
 
-def _saturated(plan: Plan, torque: Array, drive: Drive) -> dict[str, float]:
-    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
-    shares = (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0)
-    return {name: float(share) for name, share in zip(plan.joints, shares, strict=True) if share > 0.0}
+def _by_joint(plan: Plan, shares: Array, above: float) -> dict[str, float]:
+    return {name: share for name, share in zip(plan.joints, shares.tolist(), strict=True) if share > above}
 
 
 def _beyond_range(plan: Plan, q: Array) -> tuple[str, ...]:

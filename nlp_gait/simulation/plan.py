@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
@@ -64,8 +63,21 @@ class Plan:
         return {name: CubicSpline(arrays["t"], arrays[name]) for name in names}
 
     def at(self, name: str, times: Array) -> Array:
-        """Planned ``q``, ``zmp``, ``hip``, ``left_foot`` or ``right_foot`` at any times; beyond the end it stays [rad, m]."""
-        return np.asarray(self._splines[name](np.clip(times, 0.0, self.duration_s)))
+        """Planned values at any times: beyond the end positions and torques stay, and rates are zero.
+
+        Args:
+            name: ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` or ``right_foot`` [m].
+            times: (T,) [s].
+        """
+        within = np.clip(times, 0.0, self.duration_s)
+        if name in self._splines:
+            return np.asarray(self._splines[name](within))
+        samples = self.signals.arrays
+        if name == "qd":
+            return np.asarray(self._splines["q"](within, 1) * (times <= self.duration_s)[:, None])
+        # Torques jump where a foot lands or lifts: no spline runs through them.
+        columns = [np.interp(within, samples["t"], column) for column in samples[name].T]
+        return np.stack(columns, axis=1)
 
     def rate_at_start(self, name: str) -> Array:
         """Planned velocity at time zero."""
@@ -75,21 +87,6 @@ class Plan:
         """Shapes of the simulated robot's links."""
         welded = [joint for joint in self.full_robot.joints if joint not in self.robot.joints]
         return link_shapes(self.full_robot, sole, welded=welded)
-
-    @cached_property
-    def mechanical_power_W(self) -> float:
-        """Mean of the sum of |torque rate| over the phase."""
-        arrays = self.signals.arrays
-        return self._mean(np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1))
-
-    @cached_property
-    def heat_power_W(self) -> float:
-        """Mean of K times the sum of squared torques over the phase."""
-        return self.heat_loss * self._mean((self.signals.arrays["tau"] ** 2).sum(axis=1))
-
-    def _mean(self, samples: Array) -> float:
-        """Time mean by the trapezoidal rule."""
-        return float(trapezoid(samples, self.signals.arrays["t"]) / self.duration_s)
 
 
 def plan_of(result: Result, steps: int | None = None) -> Plan:

@@ -1,4 +1,4 @@
-"""A planned gait played back open loop: set-points at a fixed period, no sensor read."""
+"""A planned gait played back open loop: what the servos are told is known before it begins."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Trace:
         q: (T, J) joint angles, columns as in the plan [rad].
         qd: (T, J) [rad/s].
         torque: (T, J) of the servos [Nm].
-        set_points: (T, J) [rad].
+        set_points: (T, J) that the servos were told, shifted by what is fed forward [rad].
         torso: (T, 3) its origin [m].
         tilt: (T,) angle between the torso's axis and the floor's normal [rad].
         heading: (T,) angle of the torso's forward axis about that normal, positive to the left [rad].
@@ -93,8 +93,7 @@ def play(
     at = _Addresses(model, plan)
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
     times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
-    # A set-point holds until the next one.
-    commands = plan.at("q", np.floor(times / drive.period_s + 1e-9) * drive.period_s)
+    commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
     least_height = FALLEN_HEIGHT * float(plan.at("hip", np.zeros(1))[0, 2])
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None

@@ -23,7 +23,9 @@ class Walk:
         walked_m: distance forward; None after a fall.
         drift_m: distance to the left; None after a fall.
         heading_deg: direction of the torso at the end, positive to the left; None after a fall.
-        energy_J_per_m: of the servos, mechanical and heat, for each metre walked; None after a fall or without progress.
+        model_J_per_m: what the model says: mechanical and heat, for each metre planned.
+        engine_J_per_planned_m: of the servos; None after a fall.
+        engine_J_per_m: for each metre walked; None after a fall or without progress.
         measurements: as of any playback.
     """
 
@@ -33,7 +35,9 @@ class Walk:
     walked_m: float | None
     drift_m: float | None
     heading_deg: float | None
-    energy_J_per_m: float | None
+    model_J_per_m: float
+    engine_J_per_planned_m: float | None
+    engine_J_per_m: float | None
     measurements: Measurements
 
     def course(self) -> dict[str, Any]:
@@ -57,6 +61,8 @@ def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
         walked_m=walked if fell is None else None,
         drift_m=drift if fell is None else None,
         heading_deg=math.degrees(float(trace.heading[-1])) if fell is None else None,
-        energy_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
+        model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned,
+        engine_J_per_planned_m=energy / planned if fell is None else None,
+        engine_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
         measurements=measurements,
     )

@@ -10,7 +10,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import CycleOptions, Seed
+from compare.cli.options import CycleOptions, DriveOptions, Seed
 from compare.cli.questions.answers import Output
 
 
@@ -27,6 +27,7 @@ def walk(
     ] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
+    servos: DriveOptions,
     problem: CycleOptions,
     output: Output,
 ) -> None:
@@ -42,6 +43,7 @@ def walk(
     from compare.questions.walk.study import CYCLE, optimal_gaits, played
     from nlp_gait.simulation.engine import mujoco
 
+    drive = servos.chosen()
     if steps:
         mujoco()  # if it is missing, say so before the work
     axis = parse_axis(over)
@@ -54,7 +56,7 @@ def walk(
         try:
             with progress_bar("walks", len(gaits)) as advance:
                 for i, gait in enumerate(gaits):
-                    gaits[i] = played(spec, gait, steps)
+                    gaits[i] = played(spec, gait, steps, drive)
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"

@@ -33,7 +33,16 @@ INDEXES = (
     "touch_down_torque_jump_Nm lift_off_torque_jump_Nm"
 ).split()
 # What it says of the walk in the engine, and of the measurements there.
-WALKED = ("steps", "steps_done", "planned_m", "walked_m", "drift_m", "heading_deg", "energy_J_per_m")
+WALKED = (
+    "steps",
+    "steps_done",
+    "planned_m",
+    "walked_m",
+    "drift_m",
+    "heading_deg",
+    "engine_J_per_planned_m",
+    "engine_J_per_m",
+)
 MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
 
 
@@ -96,8 +105,10 @@ def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
         "tilt": lambda row: with_unit(row[2].largest_tilt_deg, "deg", ".1f"),
         "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".3f"),
         "mechanical power": lambda row: with_unit(row[2].measured.mechanical_W, "W", ".3f"),
-        "model": lambda row: with_unit(row[2].predicted.mechanical_W, "W", ".3f"),
-        "energy": lambda row: with_unit(row[1].energy_J_per_m, "J/m", ".1f"),
+        "its model": lambda row: with_unit(row[2].predicted.mechanical_W, "W", ".3f"),
+        "energy per planned metre": lambda row: with_unit(row[1].engine_J_per_planned_m, "J", ".2f"),
+        "model's": lambda row: with_unit(row[1].model_J_per_m, "J", ".2f"),
+        "per walked metre": lambda row: with_unit(row[1].engine_J_per_m, "J", ".2f"),
     }
     return [table_of(f"{walks[0][1].steps} steps in the physics engine, open loop", walks, columns)]
 
@@ -155,9 +166,9 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
 def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
     """What the played walks drew from the servos, over the distance that they really came."""
     points = [
-        (gait.at, gait.walk.energy_J_per_m / gait.indexes["energy_J_per_m"] * gait.indexes["cost_of_transport"])
+        (gait.at, gait.walk.engine_J_per_m / gait.indexes["energy_J_per_m"] * gait.indexes["cost_of_transport"])
         for gait in gaits
-        if gait.walk is not None and gait.walk.energy_J_per_m is not None
+        if gait.walk is not None and gait.walk.engine_J_per_m is not None
     ]
     if points:
         axes.plot(*zip(*points, strict=True), "s--", color=ENGINE, label="physics engine")

@@ -78,7 +78,7 @@ def optimal_gaits(
         raise Interrupted(interrupt.sentence, gaits(cast("list[SweepPoint]", interrupt.partial))) from None
 
 
-def played(spec: ProblemSpec, gait: Gait, steps: int) -> Gait:
+def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive) -> Gait:
     """The gait with a playback of this many steps; unchanged where no feasible gait was found.
 
     Raises:
@@ -86,7 +86,7 @@ def played(spec: ProblemSpec, gait: Gait, steps: int) -> Gait:
     """
     if not gait.found.feasible:
         return gait
-    drive, plan = Drive(), plan_of(result_of(spec, gait.found), steps)
+    plan = plan_of(result_of(spec, gait.found), steps)
     return replace(gait, walk=measure_walk(plan, play(plan, drive=drive), drive, steps))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cached_property
 from typing import Literal
@@ -58,11 +59,11 @@ class CompiledObjective:
         self._threads = threads
         self._time_per_row_s = 0.0
 
-    def __call__(self, X: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
         """Evaluate candidates.
 
         Args:
-            X: (P, n) candidates, one a row.
+            X: (P, n) candidates, one a row; or one candidate by name, as in ``solution.x``, which counts as one row.
 
         Returns:
             (P,) cost, which is to be minimised: the objective, negated if the problem maximises it; and (P,) violation
@@ -77,7 +78,7 @@ class CompiledObjective:
         self._evaluate(X, f, violation, None)
         return f, violation
 
-    def constraints(self, X: Array) -> Array:
+    def constraints(self, X: Array | Mapping[str, float]) -> Array:
         """(P, m) values of all constraint rows, named by ``row_names``; bounds of the variables are the last n."""
         X = self._checked(X)
         f, violation, g = np.empty(len(X)), np.empty(len(X)), np.empty((len(X), len(self.row_names)))
@@ -108,8 +109,10 @@ class CompiledObjective:
     def _pool(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
 
-    def _checked(self, X: Array) -> Array:
+    def _checked(self, X: Array | Mapping[str, float]) -> Array:
         """X as contiguous, aligned doubles, copied only if it is not that already."""
+        if isinstance(X, Mapping):
+            return self.problem.check_x(X)[None]
         try:
             array = np.require(X, dtype=np.float64, requirements=("C", "A"))
         except (TypeError, ValueError) as error:

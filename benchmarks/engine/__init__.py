@@ -1,0 +1,1 @@
+"""Every table about the physics engine: ``python -m benchmarks.engine [TABLE ...]`` (extra ``sim``)."""

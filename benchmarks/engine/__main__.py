@@ -1,0 +1,41 @@
+"""Print the tables about the physics engine as Markdown, all or those named.
+
+    python -m benchmarks.engine [TABLE ...]
+
+About half an hour for all on one core; each table says above it what it shows. Nothing is tuned per gait or speed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable
+
+from benchmarks.engine import agreement, sensitivity
+
+TABLES: dict[str, Callable[[], Iterable[str]]] = {
+    "waterfall": agreement.waterfall,
+    "speeds": agreement.speeds,
+    "far": agreement.far,
+    "ranking": agreement.ranking,
+    "published": agreement.published,
+    "gains": sensitivity.gains,
+    "survival": sensitivity.survival,
+}
+
+
+def main() -> None:
+    """Print as the lines come."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.engine", description=__doc__.splitlines()[0])
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"{', '.join(TABLES)} (default: all)")
+    named = parser.parse_args().tables or list(TABLES)
+    unknown = [name for name in named if name not in TABLES]
+    if unknown:
+        parser.error(f"unknown table {unknown[0]!r}; known: {', '.join(TABLES)}")
+    for name in named:
+        print(f"\n### {name}: {(TABLES[name].__doc__ or '').splitlines()[0]}\n", flush=True)
+        for line in TABLES[name]():
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""What hangs on the assumptions, and what a gait survives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from benchmarks.engine.agreement import STEPS, energies, walked
+from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum, phase_gaits
+from benchmarks.engine.markdown import cells, header
+from nlp_gait.simulation import measurements, mjcf, playback
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import measure
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.robustness import DIRECTIONS, robustness
+
+SPEED = 0.05  # [m/s]
+VARIANTS = {
+    "default": Drive(),
+    **{f"stall torque at {error:g} rad": Drive(full_error_rad=error) for error in (0.16, 0.05, 0.04, 0.03)},
+    **{f"damping / stiffness {seconds:g} s": Drive(time_constant_s=seconds) for seconds in (0.01, 0.03, 0.05)},
+    **{f"set-points every {1e3 * seconds:g} ms": Drive(period_s=seconds) for seconds in (0.04, 0.02, mjcf.TIME_STEP)},
+    **{f"torque limits: {name}": Drive(torque_limits=name) for name in ("stall", "continuous")},
+}
+
+
+@contextmanager
+def engine_step(step_s: float) -> Iterator[None]:
+    """Another time step for all that simulates."""
+    before = mjcf.TIME_STEP
+    for module in (mjcf, playback, measurements):
+        module.TIME_STEP = step_s
+    try:
+        yield
+    finally:
+        for module in (mjcf, playback, measurements):
+            module.TIME_STEP = before
+
+
+def gains() -> Iterator[str]:
+    """How the optima fare with other gains, limits, periods, soles, and steps of the engine."""
+    yield header(
+        "variant",
+        "nao-ssp W",
+        "nao-dsp W",
+        f"nao-cycle at {SPEED:g} m/s: J per planned m",
+        "model",
+        "per walked m",
+        "way",
+    )
+    cycle = optimal_cycles()[SPEED]
+    plans = [plan_of(optimum(name)) for name in PAPER]
+
+    def row(label: str, drive: Drive, sole: str = "rectangle") -> str:
+        powers = [measure(plan, play(plan, drive=drive, sole=sole), drive) for plan in plans]
+        phases = [f"{m.measured.total_W:.4f}{', falls' if m.fallen else ''}" for m in powers]
+        return cells(label, *phases, *energies(walked(cycle, STEPS, drive, sole)))
+
+    for label, drive in VARIANTS.items():
+        yield row(label, drive)
+    yield row("true outline of the soles", Drive(), "polygon")
+    for step_s in (0.001, 0.00025, 0.0001):
+        with engine_step(step_s):
+            yield row(f"engine step {1e3 * step_s:g} ms", Drive())
+
+
+def survival() -> Iterator[str]:
+    """What the optima and the paper's gaits survive in open loop, one disturbance at a time."""
+    ways = " / ".join(DIRECTIONS)
+    yield header("gait", f"push N s {ways}", f"slope deg, rising {ways}", "friction 0.3 to 1.0", "mass -10 % / +10 %")
+    for name in PAPER:
+        for label, gait in phase_gaits(name).items():
+            r = robustness(plan_of(gait))
+            pushes, slopes = (" / ".join(f"{v:g}" for v in values.values()) for values in (r.push_Ns, r.slope_deg))
+            falls = [f"{value:g}" for value, survived in r.friction.items() if not survived]
+            masses = " / ".join("stays up" if survived else "falls" for survived in r.mass_factor.values())
+            frictions = f"falls at {', '.join(falls)}" if falls else "stays up"
+            yield cells(f"{name}, {label}", pushes, slopes, frictions, masses)

@@ -1,0 +1,98 @@
+"""What somebody meets who uses the package for the first time."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import nlp_gait
+from compare.cli import PANELS, app, common
+from compare.cli.common import PlainConsole, print_table
+
+ROOT = Path(__file__).parents[3]
+HEADER = (
+    "solver",
+    "judged feasible",
+    "best known objective",
+    "worst of all runs",
+    "evaluations",
+    "what it says of itself",
+)
+ROWS = [
+    ("ipopt", "5/5", "0.531886 W", "0.531886 W", "1 793", "converged to a locally optimal point, as always"),
+    ("aco", "3/3", "0.531886 W", "0.531889 W", "10 000", "evaluation budget used"),
+]
+
+
+def printed(monkeypatch, capsys, width):
+    monkeypatch.setattr(common, "stdout", PlainConsole(highlight=False, markup=False, width=width))
+    print_table("Solvers", HEADER, ROWS)
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("width", [200, 80, 70])
+def test_no_table_is_wider_than_the_terminal_and_none_loses_a_cell(monkeypatch, capsys, width):
+    text = printed(monkeypatch, capsys, width)
+    assert max(map(len, text.splitlines())) <= width
+    for row in ROWS:
+        assert all(" ".join(cell.split()) in text for cell in row if len(cell) <= common.LONGEST_CELL)
+    assert text.count("continued") == (0 if width == 200 else 1)
+
+
+def test_at_sixty_columns_a_table_is_stacked(monkeypatch, capsys):
+    text = printed(monkeypatch, capsys, 60)
+    assert "solver aco\n  judged feasible: 3/3\n  best known objective: 0.531886 W\n" in text
+
+
+def test_help_shows_every_command_in_a_panel_and_the_version_is_the_package_s():
+    shown = CliRunner().invoke(app, ["-h"]).stdout
+    assert all(panel in shown for panel in PANELS)
+    assert CliRunner().invoke(app, ["--version"]).stdout.strip() == nlp_gait.__version__
+
+
+def test_a_users_own_compare_py_is_not_taken_for_the_package(tmp_path):
+    (tmp_path / "compare.py").write_text("raise SystemExit('the wrong compare')")
+    environment = {**os.environ, "PYTHONPATH": ""}
+    command = [sys.executable, "-m", "nlp_gait", "--version"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.strip() == nlp_gait.__version__
+
+
+def test_the_python_of_the_readme_runs_as_pasted():
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    found: dict[str, object] = {}
+    exec(code.replace("starts=20", "starts=1").replace("10_000", "500"), found)  # noqa: S102
+    assert found["power"].shape == (1000,) and found["optimum"].success
+
+
+def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_taken():
+    solution = nlp_gait.solve("nao-dsp", starts=1)
+    assert len(repr(solution)) < 120 and "power 0.531886 W; 1 of 1 starts" in repr(solution)
+    problem = nlp_gait.load("nao-dsp")
+    power, violation = nlp_gait.compile_objective(problem)(solution.x)
+    np.testing.assert_allclose(power, [solution.objective])
+    assert violation[0] < 1e-6
+    assert nlp_gait.solve(problem, x0=solution.x).iterations < 30
+
+
+def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
+    monkeypatch.setattr(common, "LOG_PERIOD_S", 0.0)
+    monkeypatch.setattr(common, "stderr", PlainConsole(stderr=True, highlight=False, markup=False))
+    with common.progress_bar("starts", 2) as advance:
+        advance("0.53 W")
+        advance("0.54 W")
+    assert re.fullmatch(
+        r"starts: 1 of 2 after 0 s; 0.53 W\nstarts: 2 of 2 after 0 s; 0.54 W\n", capsys.readouterr().err
+    )
+
+
+def test_the_solution_is_in_its_file_although_the_reader_of_the_output_has_gone(tmp_path):
+    target = tmp_path / "best.json"
+    command = f"{sys.executable} -P -m nlp_gait solve nao-dsp --starts 1 --out {target} | true"
+    subprocess.run(command, shell=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
+    assert '"success": true' in target.read_text()
