@@ -12,6 +12,7 @@ from compare.analysis.statistics.intervals import bootstrap_interval
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import seconds, with_unit
 
+ROUNDING = 1e-12  # a share below this is none
 HEADER = (
     "solver",
     "runs",
@@ -124,7 +125,9 @@ def percent(share: float | None) -> str:
     """Share in percent, to four decimals or in scientific notation below."""
     if share is None or not math.isfinite(share):
         return "-"
-    return f"{100 * share:.4f} %" if share == 0.0 or abs(share) >= 5e-7 else f"{100 * share:.1e} %"
+    if abs(share) < ROUNDING:
+        return "0.0000 %"
+    return f"{100 * share:.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
 def count(number: float) -> str:

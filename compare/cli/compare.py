@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say, stdout
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
@@ -120,7 +120,8 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
 
 
 # What the first table on a narrow terminal holds, in the order in which it is to be read.
-READ_FIRST = ("solver", "judged feasible", "median gap", "best", "median", "evaluations", "time a run")
+READ_FIRST = ("solver", "judged feasible", "median gap", "median", "evaluations", "time a run")
+HOW_TO_READ = "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
 
 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
@@ -136,6 +137,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
             [HEADER[i] for i in order],
             [[row[i] for i in order] for row in rows],
         )
+    stdout.print(HOW_TO_READ)
 
 
 def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:

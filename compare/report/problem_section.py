@@ -11,7 +11,7 @@ from compare.analysis.significance import compare_pairs
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
 from compare.analysis.units import heading, seconds
-from compare.drawing.convergence import convergence_figure
+from compare.drawing.convergence import SMALLEST_GAP, convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, text_table
 from compare.study.record import RunRecord
@@ -28,7 +28,8 @@ def problem_section(comparison: Comparison) -> Section:
     figures = (
         Figure(
             name=f"{stem}-convergence",
-            caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end.",
+            caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. "
+            f"Gaps below {100 * SMALLEST_GAP:g} % are drawn at that value: the solvers' tolerances end near it.",
             drawing=convergence_figure(comparison),
         ),
         Figure(

@@ -41,6 +41,11 @@ def prices_answer(found: Prices, problem: GaitProblem) -> Answer:
         f"First-order conditions hold to {found.residual:.1e}; {found.dependent} of the active rows follow from others. "
         "x* moves along a line only as far as the last column says: beyond it, another kink or limit takes over."
     )
+    parts.append(
+        "The slope is the derivative of the optimum with respect to the quantity, from the multipliers; beside it, what solving "
+        "again one step lower and one step higher gives. The line is the straight line on which x* moves, in steps of the "
+        "quantity; dbm is the dynamic balance margin, the distance of the zero-moment point from the edge of the soles."
+    )
     if found.weak:
         parts.append(f"Held without a price, so that derivatives may differ on both sides: {', '.join(found.weak)}")
     if found.limits or found.robot:
