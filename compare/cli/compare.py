@@ -121,7 +121,9 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
 
 # What the first table on a narrow terminal holds, in the order in which it is to be read.
 READ_FIRST = ("solver", "judged feasible", "median gap", "median", "evaluations", "time a run")
-HOW_TO_READ = "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
+HOW_TO_READ = (
+    "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
+)
 
 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
