@@ -12,6 +12,8 @@ import numpy as np
 from casadi import DM, MX
 from scipy.optimize import dual_annealing
 
+import metaheuristics
+import nlp_gait
 from nlp_gait.problem import (
     Assembly,
     Constraint,
@@ -140,3 +142,19 @@ class Shrunk:
 def annealing(f, lower, upper, evaluations, seed):
     """SciPy's simulated annealing: a plain function, stopped by the loop at its budget."""
     dual_annealing(f, list(zip(lower, upper, strict=True)), maxfun=evaluations, seed=seed)
+
+
+def main() -> None:
+    """What ``nlp-gait compare`` does with all three, in short."""
+    problem = two_link()
+    optimum = nlp_gait.solve(problem, starts=5)
+    print(f"IPOPT: power {optimum.objective:.4f} W")
+    objective = nlp_gait.compile_objective(problem)
+    for own in (Shrinking, annealing):
+        algorithm = metaheuristics.as_algorithm(own, own.__name__)
+        result = metaheuristics.minimize(objective, algorithm, evaluations=2000)
+        print(f"{own.__name__}, {result.evaluations} evaluations: power {result.objective:.4f} W")
+
+
+if __name__ == "__main__":
+    main()

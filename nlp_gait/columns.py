@@ -77,7 +77,7 @@ def read_columns(path: Path, what: str) -> Columns:
     lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
     found = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
     header: tuple[str, ...] = ()
-    if found and not all(_is_number(cell) for cell in found[0][1]):
+    if found and not all(_is_number(cell) for cell in found[0][1] if cell):
         header = tuple(found.pop(0)[1])
         if len(set(header)) < len(header):
             raise InputError(f"{owner}: two columns have the same name")

@@ -136,7 +136,7 @@ def source_digest(path: Path, content: bytes, name: str) -> str:
 
 def _used_by(name: str, body: Sequence[ast.stmt]) -> list[ast.stmt]:
     """Statements of a module that a name depends on, in their order."""
-    body = [statement for statement in body if not _is_text(statement)]
+    body = [statement for statement in body if not _is_idle(statement)]
     bound = [set(_bound([statement])) for statement in body]
     if any("*" in names for names in bound):
         return list(body)
@@ -153,8 +153,10 @@ def _used_by(name: str, body: Sequence[ast.stmt]) -> list[ast.stmt]:
             wanted |= {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 
 
-def _is_text(statement: ast.stmt) -> bool:
-    """Whether a statement is a docstring."""
+def _is_idle(statement: ast.stmt) -> bool:
+    """Whether a statement does nothing where a file is loaded: a docstring, or what stands under ``__name__ == "__main__"``."""
+    if isinstance(statement, ast.If):
+        return ast.unparse(statement.test) in ("__name__ == '__main__'", "'__main__' == __name__")
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
 
 

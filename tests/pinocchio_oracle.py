@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from nlp_gait.problem import Array
+from nlp_gait.problem import Array, Signals
 from nlp_gait.robots import Link, Robot
 
 
@@ -113,3 +113,41 @@ def stand(
         com=np.array(com),
         torso=np.array(base.translation),
     )
+
+
+def left_over(robot: Robot, signals: Signals, sample: int, gravity: float, stance: str = "L") -> Array:
+    """What equations of motion with both wrenches as forces from outside leave: base rows first, then joints [N, Nm].
+
+    The foot on the side ``stance`` stands flat and still.
+    """
+    model = floating_model(robot)
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    data = model.createData()
+    q, v, a, tau = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv), np.zeros(model.nv)
+    for joint, *values in zip(
+        signals.joints, *(signals.arrays[k][sample] for k in ("q", "qd", "qdd", "tau")), strict=True
+    ):
+        entry = model.joints[model.getJointId(joint)]
+        q[entry.idx_q], v[entry.idx_v], a[entry.idx_v], tau[entry.idx_v] = values
+    stands, foot = model.getJointId(f"{stance}AnkleRoll"), {"L": "left", "R": "right"}[stance]
+    pin.forwardKinematics(model, data, q)
+    height = np.array([0.0, 0.0, robot.feet[foot].ankle_height_m])
+    base = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample] + height) * data.oMi[stands].inverse()
+    q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+    pin.computeJointJacobians(model, data, q)
+    jacobian = pin.getJointJacobian(model, data, stands, pin.LOCAL_WORLD_ALIGNED)
+    v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
+    pin.forwardKinematics(model, data, q, v, a)
+    drift = pin.getAcceleration(model, data, stands, pin.LOCAL_WORLD_ALIGNED).vector
+    a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+    forces = pin.StdVec_Force()
+    for _ in range(model.njoints):
+        forces.append(pin.Force.Zero())
+    for side, foot in (("L", "left"), ("R", "right")):
+        index = model.getJointId(f"{side}AnkleRoll")
+        # The placement of the foot's axes in the world, at the point under its ankle.
+        below = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample])
+        wrench = pin.Force(signals.arrays[f"{foot}_force"][sample], signals.arrays[f"{foot}_moment"][sample])
+        forces[index] = data.oMi[index].actInv(below.act(wrench))
+    driven = [model.joints[model.getJointId(joint)].idx_v for joint in signals.joints]  # the head is locked
+    return np.asarray((pin.rnea(model, data, q, v, a, forces) - tau)[[*range(6), *driven]])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable
 
-from benchmarks.engine import agreement, sensitivity
+from benchmarks.engine import agreement, feedback, other_robots, rotors, sensitivity
 
 TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "waterfall": agreement.waterfall,
@@ -20,6 +20,12 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "published": agreement.published,
     "gains": sensitivity.gains,
     "survival": sensitivity.survival,
+    "disturbed": feedback.disturbed,
+    "feedback": feedback.settings,
+    "rotors": rotors.rotors,
+    "walk12": other_robots.walk12,
+    "stairs": other_robots.stairs,
+    "other-gains": other_robots.other_gains,
 }
 
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from compare.study.definition import edition, group_of, sha256_of
 from compare.study.record import RunRecord
+
+# An edition's name is a label, so that files can be named after it.
+NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
+LONGEST = 30
 
 
 def told_apart(records: Sequence[RunRecord]) -> list[RunRecord]:
@@ -34,9 +39,9 @@ def _name(
     if key not in named:
         name = label
         if label in first:
-            name = f"{label} ({edition(definition, first[label])})"
-            taken = set(named.values())
-            name = name if name not in taken else f"{name} {key[1][:8]}"
+            said = NOT_IN_LABELS.sub("", edition(definition, first[label]))[:LONGEST]
+            name = f"{label} ({said})"
+            name = name if name not in named.values() else f"{label} ({key[1][:8]})"
         first.setdefault(label, dict(definition))
         named[key] = name
     return named[key]

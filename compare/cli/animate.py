@@ -30,7 +30,7 @@ def animate(
     """
     from compare.drawing.animation import contact_sheet, frames
     from compare.drawing.skeletons import skeleton_of
-    from nlp_gait.simulation.video import check_video_path, write_video
+    from nlp_gait.simulation.film.video import check_video_path, write_video
 
     target = output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:

@@ -14,6 +14,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say, stdout
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
+from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "as_csv", "as_json")
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
 
 @command
@@ -53,6 +54,9 @@ def compare(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Then play every solver's best gait in MuJoCo (extra sim).")
+    ] = False,
     as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
@@ -61,6 +65,7 @@ def compare(
     Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way. More runs, solvers,
     problems or a larger budget in the same folder continue it too; runs whose algorithm, problem or robot was edited are made
     again. Problems and algorithms of your own take part as `FILE.py:NAME`.
+    With `--engine` the report says how each solver's best gait fares in a physics engine, and whether that confirms the model.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
@@ -69,7 +74,11 @@ def compare(
     from compare.study.imported import imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.study import Study, check_study, default_jobs, run_study
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.engine import mujoco
 
+    if engine:
+        mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
     name_all(code)
@@ -86,6 +95,10 @@ def compare(
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
     check_study(study)  # before the manifest names it
+    if engine and not any(task.problem.load().playback for task in study.tasks):
+        raise InputError(
+            f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
+        )
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
@@ -101,9 +114,15 @@ def compare(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
     records += imported_records(out, records)
+    plays = play_best(out, records, Drive()) if engine else []
     written = write_report(out, records, read_manifest(out), as_csv=as_csv)
-    data = {"problems": summaries_of(records)} if as_json else {}
-    print_result(as_json, data, written, lambda: print_summaries(records))
+    data = {"problems": summaries_of(records), **plain_plays(plays)} if as_json else {}
+
+    def tables() -> None:
+        print_summaries(records)
+        print_plays(plays)
+
+    print_result(as_json, data, written, tables)
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:

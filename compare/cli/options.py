@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,8 @@ from nlp_gait.problem.result import load_result
 from nlp_gait.references import is_reference, name_code
 
 if TYPE_CHECKING:
+    from nlp_gait.problems.nao.recorded.problem import Recorded
+    from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
 
 ResultFile = Annotated[
@@ -123,6 +126,44 @@ class NamedProblem(ProblemOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AnyProblem(ProblemOptions):
+    """A problem that need not be named where a motion shows which it is."""
+
+    name: Annotated[
+        str | None, typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion.")
+    ] = None
+
+    def spec(self) -> ProblemSpec:
+        """The problem, checked; raises as ``spec_of``."""
+        if self.name is None:
+            raise InputError("name the problem that --x is a point of, for example nao-ssp")
+        return self.spec_of(self.name)
+
+    def recorded(self, motion: Path, touch_down_s: float | None) -> Recorded:
+        """The gait in a file of joint angles, with changed limits.
+
+        Raises:
+            InputError: the file holds no gait, or an option has no meaning for one.
+        """
+        from nlp_gait.export.motions import read_gait
+        from nlp_gait.problems.nao.recorded.problem import recorded
+        from nlp_gait.robots import load_robot
+
+        for flag, given in (("--option", self.option), ("--fix", self.fix), ("--derivatives", self.derivatives)):
+            if given:
+                raise InputError(f"{flag} has no meaning for a motion that is given; leave it out")
+        robot = self.robot or "nao-v5"
+        gait = recorded(
+            read_gait(motion, load_robot(robot)),
+            robot=robot,
+            gait=self.name,
+            touch_down_s=touch_down_s,
+            **({} if self.intervals is None else {"intervals": self.intervals}),
+        )
+        return replace(gait, problem=gait.problem.with_values(**_numbers(self.values, "--set")))
+
+
+@dataclass(frozen=True, kw_only=True)
 class NaoPhase(NamedProblem):
     """A problem that is nao-ssp unless another is named."""
 
@@ -146,6 +187,13 @@ class DriveOptions:
     torque_limits: Annotated[
         str | None, typer.Option(help="urdf (default), stall or continuous: published limits differ.")
     ] = None
+    feedback: Annotated[
+        str,
+        typer.Option(help="none, in open loop, or torso-spring: balance by measured place and attitude of the torso."),
+    ] = "none"
+    feedback_delay_ms: Annotated[float | None, typer.Option(help="From measuring to acting, if not its own.")] = None
+    feedback_noise: Annotated[float, typer.Option(help="Factor on the noise of its sensors; 0 for none.")] = 1.0
+    feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
 
     def chosen(self) -> Drive:
         """The drive, checked.
@@ -155,13 +203,74 @@ class DriveOptions:
             InputError: a setting that is not allowed.
         """
         from nlp_gait.simulation.drive import DRIVES
+        from nlp_gait.simulation.feedback import FEEDBACKS
 
-        if self.drive not in DRIVES:
-            raise unknown("drive", self.drive, DRIVES)
+        for kind, name, known in (("drive", self.drive, DRIVES), ("feedback", self.feedback, FEEDBACKS)):
+            if name not in known:
+                raise unknown(kind, name, known)
+        feedback = FEEDBACKS[self.feedback]
+        if feedback is not None:
+            delay_s = feedback.delay_s if self.feedback_delay_ms is None else self.feedback_delay_ms / 1000.0
+            feedback = replace(feedback.with_noise(self.feedback_noise), delay_s=delay_s, seed=self.feedback_seed)
         period_s = None if self.period_ms is None else self.period_ms / 1000.0
         own = {**vars(self), "period_s": period_s}
         names = ("period_s", "interpolation", "feed_forward", "torque_limits")
-        return replace(DRIVES[self.drive], **{name: own[name] for name in names if own[name] is not None})
+        settings = {name: own[name] for name in names if own[name] is not None}
+        return replace(DRIVES[self.drive], feedback=feedback, **settings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditionOptions:
+    """World and robot of a simulation, where they differ from the plan's."""
+
+    friction: Annotated[float | None, typer.Option(help="Coefficient of sliding friction (default: 0.7).")] = None
+    slope_deg: Annotated[str, typer.Option(metavar="X,Y", help="Rise of the floor forward and to the left.")] = "0,0"
+    mass_factor: Annotated[float, typer.Option(help="On all masses; the gait was planned for 1.")] = 1.0
+    stiffness_factor: Annotated[
+        float, typer.Option(help="True stiffness of the servos over what their drive assumes.")
+    ] = 1.0
+    push: Annotated[
+        str, typer.Option(metavar="X,Y", help="Impulse on the torso in the middle, forward and to the left [N s].")
+    ] = "0,0"
+
+    def chosen(self) -> Conditions:
+        """The conditions, checked.
+
+        Raises:
+            InputError: a value that is not allowed.
+        """
+        from nlp_gait.simulation.conditions import Conditions, Push
+
+        slope, impulse = (_two(text, flag) for text, flag in ((self.slope_deg, "--slope-deg"), (self.push, "--push")))
+        conditions = Conditions(
+            mass_factor=self.mass_factor,
+            stiffness_factor=self.stiffness_factor,
+            slope_rad=(math.radians(slope[0]), math.radians(slope[1])),
+            push=Push(impulse_Ns=impulse) if any(impulse) else None,
+        )
+        return conditions if self.friction is None else replace(conditions, friction=self.friction)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmOptions:
+    """A film of a simulated gait, and how it is made."""
+
+    video: Annotated[
+        Path | None, typer.Option(help="Film it to this .gif or .mp4 file, from the side, the front and above.")
+    ] = None
+    beside: Annotated[
+        Path | None, typer.Option(metavar="OTHER.json", help="Play this gait as well, beside the other in the film.")
+    ] = None
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Of the film [pixels].")] = "1280x720"
+    speed: Annotated[float, typer.Option(min=0.05, max=20.0, help="Speed of the film; 0.25 is slow motion.")] = 1.0
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")] = 25.0
+
+    @property
+    def note(self) -> str:
+        """What the film says of its speed."""
+        if self.speed == 1.0:
+            return ""
+        return f"{'slow motion' if self.speed < 1.0 else 'fast'}: {self.speed:g} x real time"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,6 +362,13 @@ def _pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:
 
 def _numbers(items: Sequence[str] | None, flag: str) -> dict[str, float]:
     return {name: _number(name, text, flag) for name, text in _pairs(items, flag)}
+
+
+def _two(text: str, flag: str) -> tuple[float, float]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(f"{flag} takes two numbers X,Y, got {text!r}")
+    return _number("X", parts[0], flag), _number("Y", parts[1], flag)
 
 
 def _number(name: str, text: str, flag: str) -> float:

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, output_file, print_json, print_table, stdout
-from compare.cli.options import AsJson, DriveOptions, StoredGait
-from nlp_gait.simulation.mjcf import FRICTION
+from compare.cli.common import (
+    end_interrupted,
+    fail,
+    output_file,
+    print_json,
+    print_table,
+    print_written,
+    progress_bar,
+    stdout,
+)
+from compare.cli.options import AsJson, ConditionOptions, DriveOptions, FilmOptions, StoredGait
 
 if TYPE_CHECKING:
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.film.recording import Player
+    from nlp_gait.simulation.film.video import Frame
     from nlp_gait.simulation.measurements import Measurements
+    from nlp_gait.simulation.plan import Plan
+    from nlp_gait.simulation.playback import Trace
     from nlp_gait.simulation.robustness import Robustness
     from nlp_gait.simulation.walking import Walk
 
@@ -24,62 +39,75 @@ if TYPE_CHECKING:
 def simulate(
     stored: StoredGait,
     *,
-    steps: Annotated[
-        int | None, typer.Option(help="Play this many steps of a nao-cycle, every second one mirrored.")
-    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Play this many steps of a gait that repeats.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
-    video: Annotated[Path | None, typer.Option(help="Film it to this .gif or .mp4 file.")] = None,
-    frames_per_s: Annotated[
-        float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")
-    ] = 25.0,
     out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
-    friction: Annotated[float, typer.Option(help="Coefficient of sliding friction.")] = FRICTION,
+    world: ConditionOptions,
     servos: DriveOptions,
+    share_loads: Annotated[
+        bool, typer.Option("--share-loads", help="Share load anew in double support for least power (extra qp).")
+    ] = False,
+    load_rate: Annotated[
+        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load, weights a second.")
+    ] = 12.5,
+    film: FilmOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a NAO gait in MuJoCo, open loop, and compare it with the model's predictions.
+    """Play a gait in MuJoCo, in open loop or with balance feedback, and compare it with the model's predictions.
 
-    Needs the extra `sim`. Example: `nlp-gait simulate best.json --video walk.gif` after `nlp-gait solve nao-ssp --out best.json`
+    Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
+    `nlp-gait simulate best.json --video walk.mp4`,
+    `nlp-gait simulate best.json --beside other.json --video both.gif --speed 0.25`
     """
     from compare.drawing.playback_figure import plot_playback
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
-    from nlp_gait.simulation.camera import filmed, shown
-    from nlp_gait.simulation.conditions import Conditions
+    from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.engine import mujoco
-    from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.mjcf import free_model
+    from nlp_gait.simulation.film.film import picture_size
+    from nlp_gait.simulation.film.video import check_video_path
+    from nlp_gait.simulation.film.viewer import shown
+    from nlp_gait.simulation.load_sharing import Sharing
+    from nlp_gait.simulation.load_sharing import share_loads as anew
+    from nlp_gait.simulation.mjcf import plan_model
     from nlp_gait.simulation.plan import plan_of
     from nlp_gait.simulation.playback import play
     from nlp_gait.simulation.robustness import robustness as sweep
-    from nlp_gait.simulation.video import check_video_path, write_video
-    from nlp_gait.simulation.walking import measure_walk
 
-    mujoco(pictures=video is not None)
-    if viewer and video is not None:
+    mujoco(pictures=film.video is not None)
+    if viewer and film.video is not None:
         fail("--viewer and --video exclude each other; film it in a second run")
-    target = None if video is None else output_file(check_video_path(video))
+    if film.beside is not None and film.video is None:
+        fail("--beside puts a second gait into a film; name the film with --video FILE.mp4 or FILE.gif")
+    size = picture_size(film.size)
+    target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else writable_folder(out)
-    plan = plan_of(stored.load(), steps)
-    drive, conditions = servos.chosen(), Conditions(friction=friction)
+    drive, conditions = servos.chosen(), world.chosen()
+    gaits = [(stored.result, stored.load())]
+    gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
+    plans = [plan_of(gait, steps) for _, gait in gaits]
+    if share_loads:
+        plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
+    plan, players = plans[0], [partial(play, plan, conditions, drive, sole) for plan in plans]
     if target is not None:
-        trace, frames = filmed(plan, conditions, drive, sole, frames_per_s)
-        write_video(target, frames, frames_per_s)
+        titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]
+        traces = _filmed(film, target, size, list(zip(titles, plans, players, strict=True)))
     else:
-        trace = (shown if viewer else play)(plan, conditions, drive, sole)
-    walk = None if steps is None else measure_walk(plan, trace, drive, steps)
-    report = measure(plan, trace, drive) if walk is None else walk.measurements
+        traces = [shown(players[0]) if viewer else players[0]()]
+    measured = [_measured(plan, trace, drive, steps) for plan, trace in zip(plans, traces, strict=True)]
     survival = None
-    data = {"schema": 1, **asdict(report), **({} if walk is None else {"walk": walk.course()})}
+    data = {"schema": 1, **_plain(*measured[0])}
+    if film.beside is not None:
+        data["beside"] = _plain(*measured[1])
     if folder is not None:
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, friction))
-        write_npz(folder / "playback.npz", trace.signals(plan.joints))
-        plot_playback(plan, trace, drive, folder / "playback")
+        write_text(folder / "model.xml", plan_model(plan, drive, sole, conditions.friction))
+        write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
+        plot_playback(plan, traces[0], drive, folder / "playback")
     if robustness:
         try:
             survival = sweep(plan, drive)
@@ -93,9 +121,49 @@ def simulate(
     if as_json:
         print_json(data)
     else:
-        _print(report, survival)
-        if walk is not None:
-            _print_course(walk)
+        for i, ((path, _), (report, walk)) in enumerate(zip(gaits, measured, strict=True)):
+            if len(gaits) > 1:
+                stdout.print(f"{path}:")
+            _print(report, survival if i == 0 else None)
+            if walk is not None:
+                _print_course(walk)
+        if target is not None:
+            print_written(target)
+
+
+def _filmed(
+    film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Player]]
+) -> list[Trace]:
+    """Play the gaits and write the film."""
+    from nlp_gait.simulation.film.film import pictures
+    from nlp_gait.simulation.film.recording import recorded
+    from nlp_gait.simulation.film.video import write_video
+
+    interval_s = film.speed / film.frames_per_s
+    recordings = [recorded(title, plan, player, interval_s) for title, plan, player in gaits]
+
+    def watched() -> Iterator[Frame]:
+        with progress_bar("pictures", max(len(recording.t) for recording in recordings)) as advance:
+            for picture in pictures(recordings, size, film.note):
+                yield picture
+                advance("")
+
+    write_video(target, watched(), film.frames_per_s)
+    return [recording.trace for recording in recordings]
+
+
+def _measured(plan: Plan, trace: Trace, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.walking import measure_walk
+
+    if steps is None:
+        return measure(plan, trace, drive), None
+    walk = measure_walk(plan, trace, drive, steps)
+    return walk.measurements, walk
+
+
+def _plain(report: Measurements, walk: Walk | None) -> dict[str, Any]:
+    return {**asdict(report), **({} if walk is None else {"walk": walk.course()})}
 
 
 def _print(report: Measurements, survival: Robustness | None) -> None:

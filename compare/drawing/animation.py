@@ -12,20 +12,25 @@ from compare.drawing.figures import new_figure, style
 from nlp_gait.files import new_file
 from nlp_gait.problem import Array
 from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
-from nlp_gait.simulation.video import Frame
+from nlp_gait.simulation.film.video import Frame
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = {LEFT: "#0072B2", RIGHT: "#D55E00", TRUNK: "#404040"}
 GROUND, SUPPORT, COM, ZMP = "#909090", "#009E73", "#000000", "#CC79A7"
 MARGIN = 0.04  # [m] around everything that moves
-FRAME_DPI, SHEET_DPI = 80, 150
+FRAME_DPI, SHEET_DPI = 120, 150
 # Views by name: the coordinates across and up.
 VIEWS = {"side": (0, 2), "front": (1, 2), "above": (0, 1)}
-# Of the views in a frame: left, bottom, width, height.
-PLACES = {"side": (0.53, 0.48, 0.19, 0.45), "front": (0.79, 0.48, 0.2, 0.45), "above": (0.55, 0.09, 0.42, 0.3)}
+# Of a frame [inch], and in it of the picture in 3D, the views, and the upper left corner of the legend.
+FRAME, PLANAR_FRAME = (8.0, 4.5), (6.4, 4.0)
+PLACE_3D = (-0.02, 0.0, 0.42, 0.94)
+PLACES = {"side": (0.455, 0.53, 0.15, 0.38), "front": (0.67, 0.53, 0.15, 0.38), "above": (0.455, 0.12, 0.365, 0.28)}
+PLANAR_PLACE = (0.11, 0.13, 0.63, 0.77)
+LEGEND_CORNER, PLANAR_LEGEND_CORNER = (0.835, 0.92), (0.76, 0.92)
 AXIS_NAMES = ("x [m]", "y [m]", "z [m]")
 
 
@@ -34,7 +39,7 @@ def frames(skeleton: Skeleton) -> Iterator[Frame]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with style():
-        figure = new_figure(*((6.0, 5.0) if skeleton.planar else (8.0, 5.0)))
+        figure = new_figure(*(PLANAR_FRAME if skeleton.planar else FRAME))
         figure.set_layout_engine("none")  # fixed places: solving for them costs more than drawing
         figure.set_dpi(FRAME_DPI)
         canvas: Any = FigureCanvasAgg(figure)
@@ -64,7 +69,7 @@ def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[s
     widths, heights = ([float((high - low)[VIEWS[view][i]] + 2 * MARGIN) for view in views] for i in (0, 1))
     with style():
         rows_in = [0.35 + 1.45 * height / max(widths) for height in heights]
-        figure = new_figure(1.6 * len(chosen), 0.7 + sum(rows_in))
+        figure = new_figure(1.6 * len(chosen), 0.95 + sum(rows_in))
         axes = figure.subplots(len(views), len(chosen), squeeze=False, sharey="row", height_ratios=heights)
         for row, view in zip(axes, views, strict=True):
             for axis, k in zip(row, chosen, strict=True):
@@ -73,16 +78,20 @@ def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[s
                     axis.set_ylabel("")
         for axis, k in zip(axes[0], chosen, strict=True):
             axis.set_title(f"{skeleton.t[k]:.2f} s")
-        figure.suptitle(f"{skeleton.title}: {_legend(skeleton, views)}", fontsize=9)
+        handles = _legend(skeleton, views)
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 1 + len(chosen)))
+        figure.suptitle(skeleton.title, fontsize=9)
     return figure
 
 
 def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
-    figure.suptitle(f"{skeleton.title}, {skeleton.t[k]:.2f} s: {_legend(skeleton, VIEWS)}", fontsize=8)
+    figure.text(0.01, 0.985, f"{skeleton.t[k]:.2f} s   {skeleton.title}", fontsize=10, va="top")
+    views, corner = (["side"], PLANAR_LEGEND_CORNER) if skeleton.planar else (list(VIEWS), LEGEND_CORNER)
+    figure.legend(handles=_legend(skeleton, views), loc="upper left", bbox_to_anchor=corner, borderaxespad=0.0)
     if skeleton.planar:
-        _draw_view(figure.add_axes((0.1, 0.1, 0.85, 0.8)), skeleton, k, "side")
+        _draw_view(figure.add_axes(PLANAR_PLACE), skeleton, k, "side")
         return
-    _draw_3d(figure.add_axes((-0.02, 0.02, 0.5, 0.9), projection="3d"), skeleton, k)
+    _draw_3d(figure.add_axes(PLACE_3D, projection="3d"), skeleton, k)
     for view, place in PLACES.items():
         _draw_view(figure.add_axes(place), skeleton, k, view)
 
@@ -142,11 +151,22 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     axis.set(xticklabels=[], yticklabels=[], zticklabels=[])
 
 
-def _legend(skeleton: Skeleton, views: Collection[str]) -> str:
-    marks = [
-        "left blue, right orange",
-        "support polygon green" if skeleton.soles and "above" in views else "",
-        "ZMP cross" if skeleton.zmp is not None else "",
-        "centre of mass dot" if skeleton.com is not None else "",
+def _legend(skeleton: Skeleton, views: Collection[str]) -> list[Artist]:
+    """Samples of everything that is drawn, with their names."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    drawn = {limb.side for limb in skeleton.limbs}
+    names = {LEFT: "left", RIGHT: "right", TRUNK: "trunk"}
+    handles: list[Artist] = [
+        Line2D([], [], color=COLOURS[side], marker="o", ms=2.5, label=name)
+        for side, name in names.items()
+        if side in drawn
     ]
-    return ", ".join(mark for mark in marks if mark)
+    if skeleton.com is not None:
+        handles.append(Line2D([], [], color=COM, marker="o", ms=5, ls="none", label="centre of mass"))
+    if skeleton.zmp is not None:
+        handles.append(Line2D([], [], color=ZMP, marker="X", ms=5, ls="none", label="ZMP"))
+    if skeleton.soles and "above" in views:
+        handles.append(Patch(color=SUPPORT, alpha=0.3, lw=0, label="support polygon"))
+    return handles

@@ -32,7 +32,8 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
     for problem, stem in stems.items():
         own = [record for record in records if record.problem == problem]
         names = list(dict.fromkeys(name for record in own for name in record.x))
-        indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in JUDGED))
+        taken = {*names, *JUDGED}
+        indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in taken))
         rows = [
             _cells(
                 [

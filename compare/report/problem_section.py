@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.natural_steps import BY_UNIT
@@ -14,14 +15,16 @@ from compare.analysis.units import heading, seconds
 from compare.drawing.convergence import SMALLEST_GAP, convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, text_table
+from compare.report.engine_section import engine_section
+from compare.study.engine import Played
 from compare.study.record import RunRecord
 from nlp_gait.problem.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
 
 
-def problem_section(comparison: Comparison) -> Section:
-    """Tables, figures and lists on one problem."""
+def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Section:
+    """Tables, figures and lists on one problem, and how its best gaits fared in the engine if they were played."""
     summaries = summarise(comparison)
     objective = comparison.objective
     stem = file_stem(comparison.problem)
@@ -40,6 +43,7 @@ def problem_section(comparison: Comparison) -> Section:
         Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),
     )
     where_needed = (
+        engine_section(plays),
         _tests(comparison),
         _binding(comparison),
         _published(comparison),

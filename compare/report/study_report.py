@@ -7,14 +7,17 @@ from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
 from compare.analysis.editions import told_apart
+from compare.analysis.engine import best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import verdict
 from compare.drawing.distributions import expected_costs, profile_figure
 from compare.report.csv_files import write_csv_files
 from compare.report.document import Document, Figure, Section
+from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
 from compare.report.problem_section import file_stem, problem_section
 from compare.report.writing import write_document
+from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
 from compare.study.study import read_records
@@ -38,23 +41,32 @@ def write_report(
     *,
     as_csv: bool = False,
 ) -> list[Path]:
-    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and CSV files if asked for; returns all paths."""
-    written = write_document(folder, document_of(records, manifest, weighting))
+    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and CSV files if asked for; returns all paths.
+
+    What the folder keeps of gaits that were played in the engine is part of it.
+    """
+    plays = kept_plays(folder, best_gaits(records))
+    written = write_document(folder, document_of(records, manifest, weighting, plays))
     if as_csv:
         written += write_csv_files(folder, records, {record.problem: file_stem(record.problem) for record in records})
     return written
 
 
-def document_of(records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING) -> Document:
-    """Document of a study's records."""
+def document_of(
+    records: Sequence[RunRecord],
+    manifest: Manifest,
+    weighting: Weighting = DEFAULT_WEIGHTING,
+    plays: Sequence[Played] = (),
+) -> Document:
+    """Document of a study's records, and of their best gaits that were played in the engine."""
     comparisons = compare_problems(records, weighting)
-    sections = [problem_section(comparison) for comparison in comparisons]
+    sections = [problem_section(c, [play for play in plays if play.problem == c.problem]) for c in comparisons]
     if len(comparisons) > 1 and expected_costs(comparisons):
         sections.append(_over_problems(comparisons))
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
         verdict=verdict(comparisons),
-        parts=(*sections, method_section(comparisons, manifest, weighting)),
+        parts=(*sections, *(() if plays else (HOW,)), method_section(comparisons, manifest, weighting)),
     )
 
 

@@ -75,7 +75,7 @@ def imported(
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
     problem = spec.load()
     table, points = read_points(finals, problem, FINALS)
-    given = {name: table.column(name) for name in FINALS}
+    given = {name: None if name in problem.names else table.column(name) for name in FINALS}
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run stands twice")

@@ -124,6 +124,8 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
         OutputError: the file cannot be written.
     """
     path = _file(folder, record.problem, record.algorithm, record.run)
+    if not path.parent.is_dir():
+        writable_folder(path.parent)
     if path.exists():
         with suppress(InputError):  # a damaged one is written over
             earlier = read_record(path)

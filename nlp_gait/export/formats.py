@@ -12,7 +12,7 @@ from nlp_gait.export.webots import write_motion
 from nlp_gait.files import write_text
 from nlp_gait.problem import Result, sampled
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import free_model
+from nlp_gait.simulation.mjcf import plan_model
 from nlp_gait.simulation.plan import plan_of
 
 # Usual ending of a file by format.
@@ -42,7 +42,7 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
         write_naoqi(path, _motor_set_points(result, period_ms))
     elif name == "mjcf":
         plan = plan_of(result)
-        write_text(path, free_model(plan.robot, plan.shapes("rectangle"), Drive(), plan.gravity))
+        write_text(path, plan_model(plan, Drive()))
     elif name == "csv":
         write_csv(path, sampled(result, period_ms / 1000.0))
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -12,6 +13,8 @@ from nlp_gait.problem.assembly import Assembly
 from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Exact
 
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
+
 
 def check_mathematics(problem: GaitProblem) -> None:
     """Assemble a problem once, and refuse what no backend could use.
@@ -21,6 +24,8 @@ def check_mathematics(problem: GaitProblem) -> None:
             on the variables, or a start point of another length.
     """
     owner = f"problem {problem.name!r}"
+    if not NAME.fullmatch(problem.name):  # files are named after it
+        raise InputError(f"{owner}: a name has 1 to 64 letters, digits and . _ + -, and begins with a letter or digit")
     if not problem.variables:
         raise InputError(f"{owner} has no variables")
     point = problem.symbols()

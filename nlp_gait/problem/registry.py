@@ -51,6 +51,8 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
             check(made, options)
             call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
             problem = make(**call)
+            if not isinstance(problem, GaitProblem):
+                raise InputError(f"{make.__name__!r} must make a GaitProblem, it made {type(problem).__name__}")
             grid, values = problem.grid, dict(call)
             if grid is not None and "samples_per_interval" in call:
                 values["samples_per_interval"] = grid.samples_per_interval  # as chosen where that was left to it
@@ -118,8 +120,6 @@ def own_maker(name: str) -> Maker:
     def made(**options: Any) -> GaitProblem:
         check(make, options)
         problem = guarded(name, path, lambda: make(**options))
-        if not isinstance(problem, GaitProblem):
-            raise InputError(f"{name!r} must make a GaitProblem, it made {type(problem).__name__}")
         guarded(name, path, lambda: check_mathematics(problem))
         return replace(problem, loaded_as=name)
 

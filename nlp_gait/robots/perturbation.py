@@ -134,4 +134,6 @@ def _along(value: float, positive: str, negative: str, shares: Mapping[str, int]
     if positive in shares and negative in shares:
         return value + shares[positive] * metres
     extent = positive if value > 0.0 else negative
-    return value * (1.0 + shares.get(extent, 0) * metres / getattr(foot, extent))
+    if extent not in shares or value == 0.0:
+        return value
+    return value * (1.0 + shares[extent] * metres / getattr(foot, extent))

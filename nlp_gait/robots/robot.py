@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -56,18 +56,25 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
-    """Motor and gear of a joint (data-sheet values at the motor shaft)."""
+    """Motor and gear of a joint (data-sheet values at the motor shaft); the rotor's inertia if it is known."""
 
     make: str
     gear_ratio: float
     no_load_rpm: float
     stall_torque_mNm: float
     continuous_torque_mNm: float
+    rotor_inertia_gcm2: float | None = None
 
     def __post_init__(self) -> None:
         """All ratings are positive."""
-        ratings = ("gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm")
-        check_numbers(f"motor {self.make!r}", self, positive=ratings)
+        ratings = ["gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"]
+        known = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
+        check_numbers(f"motor {self.make!r}", self, positive=known)
+
+    @property
+    def reflected_inertia_kgm2(self) -> float | None:
+        """Of the rotor at the joint: it turns as many times faster as the gear's ratio, which counts twice [kg m^2]."""
+        return None if self.rotor_inertia_gcm2 is None else self.gear_ratio**2 * self.rotor_inertia_gcm2 * 1e-7
 
     @property
     def stall_torque_Nm(self) -> float:
@@ -153,9 +160,12 @@ class Foot:
     sole_polygon_m: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        """A sole has an extent on all four sides."""
-        extents = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
-        check_numbers(f"foot {self.link!r}", self, positive=extents)
+        """A sole has an extent; the ankle may lie on the ground, and above the sole's rear edge."""
+        owner = f"foot {self.link!r}"
+        check_numbers(owner, self, positive=("front_m", "left_m", "right_m"))
+        for name in ("ankle_height_m", "back_m"):
+            if getattr(self, name) < 0.0:
+                raise RobotDataError(f"{owner}: {name} must be >= 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -170,6 +180,8 @@ class Robot:
         links: by name.
         joints: by name.
         feet: ``"left"`` and ``"right"``.
+        toes: what lies on the ground beyond a toe joint, by side; its link's frame stands at that joint.
+        armatures_kgm2: by joint, inertia of rotors at the joint, where the dynamics take it into account; none by default.
     """
 
     name: str
@@ -179,6 +191,8 @@ class Robot:
     links: Mapping[str, Link]
     joints: Mapping[str, Joint]
     feet: Mapping[str, Foot]
+    toes: Mapping[str, Foot] = field(default_factory=dict)
+    armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Links and joints form one tree."""
@@ -200,6 +214,14 @@ class Robot:
         for side in ("left", "right"):
             if side not in self.feet or self.feet[side].link not in self.links:
                 raise RobotDataError(f"robot {self.name!r}: foot {side!r} is missing or names no link")
+        for side, toe in self.toes.items():
+            if side not in self.feet or toe.link not in self.links:
+                raise RobotDataError(f"robot {self.name!r}: toe {side!r} belongs to no foot or names no link")
+
+    @cached_property
+    def soles(self) -> Mapping[str, Foot]:
+        """Everything that stands on the ground, feet and toes, by link."""
+        return {foot.link: foot for part in (self.feet, self.toes) for foot in part.values()}
 
     @cached_property
     def mass_kg(self) -> float:

@@ -22,6 +22,7 @@ class Body:
         direction: +1 if the joint is passed from its parent to its child link, else -1.
         offset_m: from the parent's reference point to this one, in the parent's axes [m].
         com_offset_m: from the reference point to the centre of mass, in link axes [m].
+        armature_kgm2: inertia of the rotor at the joint, if the robot's dynamics take it into account [kg m^2].
     """
 
     link: Link
@@ -30,6 +31,7 @@ class Body:
     direction: int
     offset_m: Vector
     com_offset_m: Vector
+    armature_kgm2: float = 0.0
 
 
 def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:
@@ -65,6 +67,7 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
                 direction=1 if forward else -1,
                 offset_m=_minus(centre_in_parent, parent_reference),
                 com_offset_m=_minus(link.com_m, reference),
+                armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
             )
         )
         index = len(bodies) - 1

@@ -29,18 +29,20 @@ class Conditions:
     Attributes:
         friction: coefficient of sliding friction.
         mass_factor: on masses and inertias of all links; the gait was planned for 1.
+        stiffness_factor: of the servos against what their drive assumes; their damping is as assumed.
         slope_rad: (x, y) slope of the floor: positive rises forward or to the left.
         push: none by default.
     """
 
     friction: float = FRICTION
     mass_factor: float = 1.0
+    stiffness_factor: float = 1.0
     slope_rad: tuple[float, float] = (0.0, 0.0)
     push: Push | None = None
 
     def __post_init__(self) -> None:
         """Physical values only."""
-        for name in ("friction", "mass_factor"):
+        for name in ("friction", "mass_factor", "stiffness_factor"):
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
                 raise InputError(f"{name} must be > 0, got {value!r}")

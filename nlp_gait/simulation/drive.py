@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
 from nlp_gait.robots import Joint
+from nlp_gait.simulation.feedback import Balance, Feedback
+from nlp_gait.simulation.plan import Plan
 
 # Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
 # stall or in continuous service, times the gear ratio.
@@ -35,6 +38,7 @@ class Drive:
         interpolation: ``linear`` between set-points, as NAO's controller does between timed commands, or each ``held``.
         feed_forward: ``torque`` (and velocity), ``velocity``, or ``none``.
         torque_limits: which of the published limits holds.
+        feedback: what the set-points are corrected by; None plays in open loop.
     """
 
     full_error_rad: float = 0.08
@@ -43,6 +47,7 @@ class Drive:
     interpolation: str = "linear"
     feed_forward: str = "torque"
     torque_limits: str = "urdf"
+    feedback: Feedback | None = None
 
     def __post_init__(self) -> None:
         """Positive numbers, known names."""
@@ -88,6 +93,13 @@ class Drive:
         if self.feed_forward == "velocity":
             return shifted
         return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
+
+    def balance(self, plan: Plan, model: Any) -> Balance | None:
+        """The feedback, if there is one, ready for one simulation of a plan by the engine's model."""
+        if self.feedback is None:
+            return None
+        stiffness = np.array([self.stiffness(plan.robot.joint(name)) for name in plan.joints])
+        return Balance(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
         """[Nm]."""

@@ -211,7 +211,7 @@ def _feet_moved(plan: Plan, trace: Trace) -> Array:
 def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
     found = []
     for i, side in enumerate(SIDES):
-        swings = np.diff(np.concatenate([[1.0], plan.stands(side, trace.t), [1.0]]))
+        swings = np.diff(np.concatenate([[1.0], plan.bears(side, trace.t), [1.0]]))
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
             planned = min(int(set_down), len(trace.t) - 1)
             middle = (int(lifted) + planned) // 2

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 from xml.etree import ElementTree as Xml
 
+from nlp_gait.problem.playback import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.looks import FLOOR, add_light, add_world, paint
+from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.root import add_root_joints
 from nlp_gait.simulation.shapes import Prism, Shape
 
 # Against 0.1 ms, power is 1 % high in single support; in double support 12 % with set-points held for 40 ms, equal with smooth
@@ -16,20 +21,38 @@ TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
-FLOOR = "floor"
+LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 Shapes = Mapping[str, Sequence[Shape]]
 
 
-def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, friction: float = FRICTION) -> str:
-    """The whole robot on a floor, driven by position servos; every shape can touch the floor, and nothing else.
+def plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
+    """Model of the robot and the ground of a plan; see ``free_model``."""
+    return free_model(
+        plan.robot, plan.shapes(sole), drive, plan.gravity, friction, ground=plan.ground, planar=plan.planar
+    )
+
+
+def free_model(
+    robot: Robot,
+    shapes: Shapes,
+    drive: Drive,
+    gravity: float,
+    friction: float = FRICTION,
+    *,
+    ground: Sequence[Tread] = (),
+    planar: bool = False,
+) -> str:
+    """The whole robot on a floor, driven by position servos; solid shapes can touch the ground, and nothing else.
 
     Args:
         robot: to be simulated.
         shapes: by link.
         drive: gains and limits of the servos.
         gravity: [m/s^2], along -z.
-        friction: coefficient of sliding friction between robot and floor.
+        friction: coefficient of sliding friction between robot and ground.
+        ground: stairs on the floor.
+        planar: the robot's root stays in the plane y = 0.
     """
     root, option = document(robot.name, gravity)
     Xml.SubElement(option, "flag", autoreset="disable")  # a simulation that diverges must show it
@@ -41,13 +64,14 @@ def free_model(robot: Robot, shapes: Shapes, drive: Drive, gravity: float, frict
         condim="3",
         solref=_numbers(CONTACT_TIME_CONSTANT, 1.0),
         friction=_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION),
-        rgba="0.86 0.87 0.9 1",
     )
-    _add_assets(Xml.SubElement(root, "asset"), shapes)
+    _add_hulls(add_world(root), shapes)
     world = Xml.SubElement(root, "worldbody")
-    Xml.SubElement(world, "light", pos="0.6 -1 2", dir="-0.3 0.5 -1", diffuse="0.7 0.7 0.7")
     Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
-    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, free=True)
+    _add_stairs(world, ground)
+    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
+    paint(bodies, robot)
+    add_light(bodies[robot.root])
     for side, foot in robot.feet.items():
         Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
     actuators = Xml.SubElement(root, "actuator")
@@ -73,13 +97,19 @@ def document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
     return root, option
 
 
-def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
-    """Texture of the floor and convex hulls of the soles."""
-    sky = Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384")
-    sky.attrib |= {"rgb1": "1 1 1", "rgb2": "0.85 0.9 0.95"}
-    tiles = Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", width="256", height="256")
-    tiles.attrib |= {"rgb1": "0.95 0.96 0.97", "rgb2": "0.85 0.87 0.9"}
-    Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texrepeat="60 60")
+def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
+    """Boxes one on the other's front; the last tread is as long as a stair can be."""
+    edges = [tread.edge_m for tread in ground[1:]]
+    for i, tread in enumerate(ground):
+        end = edges[i] if i < len(edges) else tread.edge_m + LAST_TREAD
+        half = ((end - tread.edge_m) / 2, STAIR_HALF_WIDTH, tread.height_m / 2)
+        middle = (tread.edge_m + half[0], 0.0, half[2])
+        box = Xml.SubElement(world, "geom", name=f"tread {i}", type="box", size=_numbers(*half), pos=_numbers(*middle))
+        box.attrib |= {"contype": "1", "rgba": "0.8 0.78 0.74 1"}
+
+
+def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
+    """Convex hulls of the soles."""
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
             if isinstance(shape, Prism):
@@ -88,7 +118,9 @@ def _add_assets(assets: Xml.Element, shapes: Shapes) -> None:
                 Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
 
 
-def add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free: bool) -> dict[str, Xml.Element]:
+def add_bodies(
+    world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, root: Literal["free", "planar", "fixed"]
+) -> dict[str, Xml.Element]:
     """Bodies nested as in the tree, each with its frame at its reference point; elements by link."""
     elements: list[Xml.Element] = []
     for body in tree:
@@ -98,9 +130,11 @@ def add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free
         if body.joint is not None:
             axis = (body.direction * a for a in body.joint.axis)
             limits = _numbers(*body.joint.limits_rad)
-            Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
-        elif free:
-            Xml.SubElement(element, "freejoint")
+            joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
+            if body.armature_kgm2:
+                joint.set("armature", _numbers(body.armature_kgm2))
+        elif root != "fixed":
+            add_root_joints(element, planar=root == "planar")
         link = body.link
         tensor = _numbers(*link.inertia_com_kgm2)  # the same order in MJCF: xx, yy, zz, xy, xz, yz
         mass = _numbers(link.mass_kg)
@@ -112,14 +146,15 @@ def add_bodies(world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, free
 
 def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
     if isinstance(shape, Prism):
-        Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name, rgba="0.35 0.38 0.42 1")
-    elif shape.start == shape.end:
-        Xml.SubElement(
-            element, "geom", name=name, type="sphere", pos=_numbers(*shape.start), size=_numbers(shape.radius)
-        )
+        Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name)
+        return
+    if shape.start == shape.end:
+        place = {"type": "sphere", "pos": _numbers(*shape.start)}
     else:
-        ends = _numbers(*shape.start, *shape.end)
-        Xml.SubElement(element, "geom", name=name, type="capsule", fromto=ends, size=_numbers(shape.radius))
+        place = {"type": "capsule", "fromto": _numbers(*shape.start, *shape.end)}
+    geometry = Xml.SubElement(element, "geom", {"name": name, **place, "size": _numbers(shape.radius)})
+    if not shape.solid:
+        geometry.set("conaffinity", "0")
 
 
 def _numbers(*values: float) -> str:

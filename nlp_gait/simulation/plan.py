@@ -1,4 +1,4 @@
-"""The planned motion of a NAO gait as functions of time, and what the model predicts for it."""
+"""The planned motion of a gait as functions of time, and what the model predicts for it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, Signals, finely_sampled
+from nlp_gait.problem.playback import Tread
+from nlp_gait.problem.steps import walk
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
-from nlp_gait.simulation.steps import walk
 
 SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 
 
@@ -29,6 +31,8 @@ class Plan:
         signals: planned time histories on a dense grid.
         heat_loss: K [W/(Nm)^2].
         gravity: [m/s^2].
+        ground: stairs on the floor, which is at z = 0.
+        planar: the robot's root stays in the plane y = 0.
     """
 
     robot: Robot
@@ -36,6 +40,8 @@ class Plan:
     signals: Signals
     heat_loss: float
     gravity: float
+    ground: tuple[Tread, ...] = ()
+    planar: bool = False
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -53,8 +59,45 @@ class Plan:
         return tuple(side for side in SIDES if np.ptp(self.signals.arrays[f"{side}_foot"], axis=0).max() < STANDING)
 
     def stands(self, side: str, times: Array) -> Array:
-        """1 where a sole is planned to stand on the ground, else 0."""
-        return np.asarray(self.at(f"{side}_foot", times)[:, 2] < ON_GROUND, dtype=float)
+        """1 where a sole is planned to stand flat on the ground, else 0."""
+        foot = self.at(f"{side}_foot", times)
+        return np.asarray(foot[:, 2] - self.level(foot[:, 0]) < ON_GROUND, dtype=float)
+
+    def bears(self, side: str, times: Array) -> Array:
+        """1 where any part of a foot is planned to be on the ground, else 0."""
+        name = f"{side}_bears"
+        if name not in self.signals.arrays:
+            return self.stands(side, times)
+        return np.round(self.at(name, times)[:, 0])
+
+    def level(self, x: Array) -> Array:
+        """(N,) height of the ground at places along x [m]."""
+        heights = np.array([0.0, *(tread.height_m for tread in self.ground)])
+        return heights[np.searchsorted([tread.edge_m for tread in self.ground], x, side="right")]
+
+    def attitude(self, times: Array) -> Array:
+        """(T, 4) planned attitude of the root, a unit quaternion (w, x, y, z); of a jump, the side that is nearer in time."""
+        samples = self.signals.arrays
+        if "attitude" not in samples:
+            return np.tile(UPRIGHT, (len(times), 1))
+        t = samples["t"]
+        nearest = np.searchsorted((t[1:] + t[:-1]) / 2, np.clip(times, 0.0, self.duration_s))
+        return np.asarray(samples["attitude"][nearest])
+
+    def torso_axis(self, times: Array) -> Array:
+        """(T, 3) planned direction of the root's upright axis."""
+        w, x, y, z = self.attitude(times).T
+        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+
+    @property
+    def spin_at_start(self) -> Array:
+        """(3,) planned angular velocity of the root at time zero, in its own axes [rad/s]."""
+        samples = self.signals.arrays
+        if "attitude" not in samples:
+            return np.zeros(3)
+        first = samples["attitude"][:3]
+        (w, *vector), rate = first[0], np.gradient(first, samples["t"][:3], axis=0, edge_order=2)[0]
+        return np.asarray(2 * (w * rate[1:] - rate[0] * np.array(vector) - np.cross(vector, rate[1:])))
 
     @cached_property
     def _splines(self) -> dict[str, CubicSpline]:
@@ -74,10 +117,15 @@ class Plan:
             return np.asarray(self._splines[name](within))
         samples = self.signals.arrays
         if name == "qd":
-            return np.asarray(self._splines["q"](within, 1) * (times <= self.duration_s)[:, None])
+            return self.rate("q", times)
         # Torques jump where a foot lands or lifts: no spline runs through them.
         columns = [np.interp(within, samples["t"], column) for column in samples[name].T]
         return np.stack(columns, axis=1)
+
+    def rate(self, name: str, times: Array) -> Array:
+        """Planned rates of what has a spline at any times (T,): zero beyond the end."""
+        within = np.clip(times, 0.0, self.duration_s)
+        return np.asarray(self._splines[name](within, 1) * (times <= self.duration_s)[:, None])
 
     def rate_at_start(self, name: str) -> Array:
         """Planned velocity at time zero."""
@@ -90,32 +138,36 @@ class Plan:
 
 
 def plan_of(result: Result, steps: int | None = None) -> Plan:
-    """Plan of a solved NAO problem.
+    """Plan of a solved problem.
 
     Args:
-        result: of a phase or a cycle.
-        steps: how often a cycle is played, every second time mirrored; once by default. A phase cannot be repeated.
+        result: of a problem that says how its gaits are played.
+        steps: how many are played one after the other; by default what the gait is, one phase or one cycle.
 
     Raises:
-        InputError: another problem, a gait so damaged that its angles are not finite, or several steps of a phase.
+        InputError: a problem that says nothing of it, a gait so damaged that its angles are not finite, or several steps of
+            what cannot be repeated.
     """
     problem = result.problem
-    playback, robot = problem.playback, problem.robot
-    if playback is None or robot is None:
-        raise InputError(f"problem {problem.name!r} cannot be simulated: only gaits of the NAO problems can")
-    signals = finely_sampled(result)
+    playback = problem.playback
+    if playback is None:
+        raise InputError(f"problem {problem.name!r} cannot be simulated: it does not say how its gaits are played")
+    if steps is not None and not playback.repeats:
+        raise InputError(f"problem {problem.name!r} is no cycle that can be repeated; leave out the number of steps")
+    at = problem.at(result.x)
+    if playback.motion is not None:
+        signals = playback.motion(at, 1 if steps is None else steps)
+    else:
+        signals = finely_sampled(result)
+        signals = signals if steps is None else walk(signals, playback.robot, steps)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
-    if steps is not None:
-        if not playback.repeats:
-            raise InputError(
-                f"problem {problem.name!r} is no cycle that can be repeated; several steps can be played of 'nao-cycle'"
-            )
-        signals = walk(signals, playback.robot, steps)
     return Plan(
         robot=playback.robot,
-        full_robot=robot,
+        full_robot=problem.robot or playback.robot,
         signals=signals,
-        heat_loss=problem.value(playback.heat_loss),
+        heat_loss=0.0 if playback.heat_loss is None else problem.value(playback.heat_loss),
         gravity=playback.gravity,
+        ground=() if playback.ground is None else playback.ground(at, steps or 1),
+        planar=playback.planar,
     )

@@ -1,4 +1,4 @@
-"""A planned gait played back open loop: what the servos are told is known before it begins."""
+"""A planned gait played back: what the servos are told is known before it begins, unless the drive has a feedback."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from nlp_gait.problem import Array, Columns, Signals, in_space
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.mjcf import FLOOR, TIME_STEP, free_model
+from nlp_gait.simulation.looks import FLOOR
+from nlp_gait.simulation.mjcf import TIME_STEP, plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.root import place_root
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
-FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start
+FALLEN_HEIGHT = (
+    0.6  # of the torso's planned height at the start; it has fallen where it sinks by the rest below its plan
+)
 COLUMNS = {
     "torso": in_space("m"),
     "tilt": Columns(unit="rad"),
@@ -44,7 +48,7 @@ class Trace:
         torque: (T, J) of the servos [Nm].
         set_points: (T, J) that the servos were told, shifted by what is fed forward [rad].
         torso: (T, 3) its origin [m].
-        tilt: (T,) angle between the torso's axis and the floor's normal [rad].
+        tilt: (T,) angle between the torso's axis and its planned direction [rad].
         heading: (T,) angle of the torso's forward axis about that normal, positive to the left [rad].
         feet: (T, 2, 3) soles under the ankles, left and right [m].
         loads: (T, 2) force of the floor on the left and right foot, along its normal [N].
@@ -94,10 +98,14 @@ def play(
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
     times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
     commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
-    least_height = FALLEN_HEIGHT * float(plan.at("hip", np.zeros(1))[0, 2])
+    heights, axes_planned = plan.at("hip", times)[:, 2], plan.torso_axis(times)
+    least_heights = (heights - (1.0 - FALLEN_HEIGHT) * heights[0]).tolist()
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None
-    for t, command in zip(times.tolist(), commands, strict=True):
+    balance = drive.balance(plan, model)
+    for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
+        if balance is not None:
+            command += balance.shift(data)  # in place: these are the set-points that the trace keeps
         data.ctrl[at.actuators] = command
         data.xfrc_applied[at.torso, :2] = _push(conditions, plan.duration_s, t)
         if observe is not None:
@@ -105,7 +113,7 @@ def play(
         q, qd = data.qpos[at.angles], data.qvel[at.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
         torso, axes = data.xpos[at.torso].copy(), data.xmat[at.torso]
-        upright, heading = float(axes[8]), math.atan2(axes[3], axes[0])
+        upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
         rows.append((q, qd, torque, torso, upright, heading, feet, *_pressure(data, at)))
         diverged = not np.isfinite(data.qvel).all()  # no such row is kept
@@ -122,19 +130,19 @@ def play(
 def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
     """The engine's model and data, the robot in its planned state at time zero."""
     engine = mujoco()
-    text = free_model(plan.robot, plan.shapes(sole), drive, plan.gravity, conditions.friction)
+    text = plan_model(plan, drive, sole, conditions.friction)
     model = engine.MjModel.from_xml_string(text)
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
+    model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
+    model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
     model.opt.gravity[:] = conditions.gravity(plan.gravity)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
     at = _Addresses(model, plan)
-    start = np.zeros(1)
-    data.qpos[:3], data.qpos[3:7] = plan.at("hip", start)[0], (1.0, 0.0, 0.0, 0.0)  # the torso starts upright
-    data.qpos[at.angles] = plan.at("q", start)[0]
     data.qvel[:] = 0.0
-    data.qvel[:3], data.qvel[at.rates] = plan.rate_at_start("hip"), plan.rate_at_start("q")
+    place_root(data, plan)
+    data.qpos[at.angles], data.qvel[at.rates] = plan.at("q", np.zeros(1))[0], plan.rate_at_start("q")
     engine.mj_forward(model, data)
     return model, data
 
@@ -152,7 +160,9 @@ class _Addresses:
         self.floor = model.geom(FLOOR).id
         self.foot_of_geometry = np.full(model.ngeom, -1)
         for i, side in enumerate(SIDES):
-            self.foot_of_geometry[model.geom_bodyid == model.body(plan.robot.feet[side].link).id] = i
+            for part in (plan.robot.feet, plan.robot.toes):
+                if side in part:
+                    self.foot_of_geometry[model.geom_bodyid == model.body(part[side].link).id] = i
 
 
 def _push(conditions: Conditions, duration_s: float, t: float) -> tuple[float, float]:
@@ -168,7 +178,7 @@ def _pressure(data: Any, at: _Addresses) -> tuple[Array, Array]:
     contact = data.contact
     active = contact.efc_address >= 0
     forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
-    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the floor is geometry 0
+    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's come first
     loads = np.array([forces[feet == i].sum() for i in range(len(SIDES))])
     total = forces.sum()
     centre = forces @ contact.pos[active, :2] / total if total > LEAST_LOAD else np.full(2, np.nan)

@@ -1,4 +1,4 @@
-"""How much disturbance a gait survives in open loop: pushes, slippery floors, wrong masses, slopes."""
+"""How much disturbance a gait survives: pushes, slippery floors, wrong masses, slopes."""
 
 from __future__ import annotations
 

@@ -23,11 +23,12 @@ SHORTEST_LIMB = 0.02  # [m]; joints closer together than this share a centre
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capsule:
-    """Cylinder with round ends [m]; a ball where both ends are one."""
+    """Cylinder with round ends [m]; a ball where both ends are one. One that is not solid is drawn and touches nothing."""
 
     start: Vector
     end: Vector
     radius: float
+    solid: bool = True
 
     def shifted(self, by: Vector) -> Capsule:
         """The same shape elsewhere."""
@@ -63,22 +64,40 @@ def link_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] =
         InputError: an outline that does not exist.
     """
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
+    low = _low_joints(robot)
     for joint in robot.joints.values():
         radius = TRUNK_RADIUS if joint.parent == robot.root else LIMB_RADIUS
-        if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB:
-            shapes[joint.parent].append(Capsule(start=(0.0, 0.0, 0.0), end=joint.origin_m, radius=radius))
-    soles = {foot.link: foot for foot in robot.feet.values()}
+        if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB and joint.parent not in robot.soles:
+            solid = joint.name not in low
+            shapes[joint.parent].append(Capsule(start=(0.0, 0.0, 0.0), end=joint.origin_m, radius=radius, solid=solid))
     parents = {joint.parent for joint in robot.joints.values()}
     for name, link in robot.links.items():
-        if name in soles:
-            outline, bottom = sole_outline(soles[name], sole), -soles[name].ankle_height_m
-            shapes[name].append(Prism(outline=outline, bottom=bottom, thickness=SOLE_THICKNESS))
+        if name in robot.soles:
+            foot = robot.soles[name]
+            outline = sole_outline(foot, sole)
+            shapes[name].append(Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS))
+        elif name == robot.root and not shapes[name]:  # a trunk that all limbs leave at one point: a rod from there
+            x, y, z = link.com_m
+            shapes[name].append(Capsule(start=(0.0, 0.0, 0.0), end=(2 * x, 2 * y, 2 * z), radius=TRUNK_RADIUS))
         elif name not in parents:  # a hand or a head, about its centre of mass
             radius = TRUNK_RADIUS if np.linalg.norm(link.com_m) > SHORTEST_LIMB + LIMB_RADIUS else LIMB_RADIUS
             shapes[name].append(Capsule(start=link.com_m, end=link.com_m, radius=radius))
     for joint in sorted((robot.joint(name) for name in welded), key=lambda j: -len(robot.path_to_root(j.child))):
         shapes[joint.parent] += [shape.shifted(joint.origin_m) for shape in shapes.pop(joint.child)]
     return shapes
+
+
+def _low_joints(robot: Robot) -> set[str]:
+    """Joints so near the ground that a limb's round end about them would stand on it in the sole's place."""
+    low = set()
+    for foot in robot.feet.values():
+        for joint in robot.path_to_root(foot.link):
+            if foot.ankle_height_m >= LIMB_RADIUS:
+                break
+            low.add(joint.name)
+            if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB:
+                break
+    return low
 
 
 def sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:

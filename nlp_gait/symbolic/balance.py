@@ -1,7 +1,8 @@
-"""Zero-moment point."""
+"""Zero-moment point, and what a sole on the ground can bear."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import casadi as ca
@@ -39,6 +40,52 @@ def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
 def ground_load(wrench: Wrench, weight: float) -> SX:
     """Vertical force of the ground [N], at least ``LEAST_LOAD`` of the robot's weight [N]."""
     return ca.fmax(wrench.force[2], LEAST_LOAD * weight)
+
+
+def below(wrench: Wrench, height: float) -> SX:
+    """A wrench (6,) about the point that lies a height [m] below its own point [N, Nm]."""
+    return ca.vertcat(wrench.force, wrench.moment + ca.cross(SX(DM([0.0, 0.0, height])), wrench.force))
+
+
+def above(wrench: SX, height: float) -> Wrench:
+    """A wrench (6,) as one about the point that lies a height [m] above its own point."""
+    force, moment = ca.vertsplit(wrench, 3)
+    return Wrench(force, moment - ca.cross(SX(DM([0.0, 0.0, height])), force))
+
+
+def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, float], friction: SX) -> tuple[SX, SX, SX]:
+    """What must not be negative for flat ground to give a wrench to a rectangular sole by pushing and rubbing alone.
+
+    Linear in the wrench; all of them together also say that the ground does not pull. Friction has the pyramid inside its cone,
+    with sides along and across.
+
+    Args:
+        wrench: (6,) of the ground on the sole, about a point of it [N, Nm].
+        along: from that point to the back and the front edge [m], the back edge negative.
+        across: to the right and the left edge [m], the right edge negative.
+        friction: coefficient of Coulomb's friction.
+
+    Returns:
+        (4,) friction [N], (4,) centre of pressure within the edges, as moments [Nm], (8,) turning about the vertical [Nm].
+
+    Source:
+        Caron, Pham, Nakamura (2015), "Stability of surface contacts for humanoid robots: closed-form formulae of the contact
+        wrench cone for rectangular support areas", with its absolute values as pairs of rows.
+    """
+    mu = friction / math.sqrt(2.0)
+    fx, fy, fz, nx, ny, nz = ca.vertsplit(wrench)
+    x, y = (along[1] - along[0]) / 2, (across[1] - across[0]) / 2
+    middle_x, middle_y = sum(along) / 2, sum(across) / 2
+    roll, pitch, turn = nx - middle_y * fz, ny + middle_x * fz, nz - middle_x * fy + middle_y * fx
+    rubbing = [mu * fz + sign * force for force in (fx, fy) for sign in (1, -1)]
+    pressing = [edge * fz + sign * moment for edge, moment in ((y, roll), (x, pitch)) for sign in (1, -1)]
+    turning = [
+        mu * (x + y) * fz + sense * turn + first * (y * fx - sense * mu * roll) + second * (x * fy - sense * mu * pitch)
+        for sense in (1, -1)
+        for first in (1, -1)
+        for second in (1, -1)
+    ]
+    return ca.vertcat(*rubbing), ca.vertcat(*pressing), ca.vertcat(*turning)
 
 
 def combined_zmp(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:

@@ -36,6 +36,7 @@ def newton_euler(
     gravity: float,
     shares: Mapping[str, SX] | None = None,
     upright: Collection[str] = (),
+    pushes: Mapping[str, Wrench] | None = None,
 ) -> tuple[dict[str, SX], Wrench]:
     """Joint torques of a tree whose first body stands still on the ground.
 
@@ -47,6 +48,7 @@ def newton_euler(
         gravity: magnitude, acting along -z [m/s^2].
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
         upright: links that do not turn in the motions asked for; to know it saves operations.
+        pushes: what else acts on links by name, about their reference point and in their axes.
 
     Returns:
         Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
@@ -54,7 +56,8 @@ def newton_euler(
     Source:
         Gives the torques of Gupta, Pratihar, Deb (2023), eqs. (15)-(18); the recursion is that of Luh, Walker and Paul
         (1980), with each link seen from the joint through which it is reached, inertias regrouped and products of spins
-        shared as Khalil and Kleinfinger (1987) do.
+        shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
+        gyroscopic torques: Featherstone (2008), section 9.6.
     """
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
@@ -64,11 +67,16 @@ def newton_euler(
         if body.link.name in shares:  # force and moment are linear in mass and inertia
             forces[i] *= shares[body.link.name]
             moments[i] *= shares[body.link.name]
+        if pushes and body.link.name in pushes:  # what pushes a body need not come through its joint
+            forces[i] -= pushes[body.link.name].force
+            moments[i] -= pushes[body.link.name].moment
     torques: dict[str, SX] = {}
     for i in range(len(tree) - 1, 0, -1):
         body = tree[i]
         assert body.joint is not None  # only the first body has none; for the type checker
         torques[body.joint.name] = body.direction * ca.dot(DM(body.joint.axis), moments[i])
+        if body.armature_kgm2:
+            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
         force = rotations[i] @ forces[i]
         moment = rotations[i] @ moments[i]
         forces[body.parent] += force

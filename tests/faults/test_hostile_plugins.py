@@ -72,6 +72,7 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
 ROUNDS = 5
+ENDED = ("evaluation budget used", "time limit reached")
 
 
 def written(folder: Path, name: str, way: str) -> Path:
@@ -110,7 +111,7 @@ def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
         if record.algorithm in ways:
             said = WAYS[ways[record.algorithm]][2]
             if said is None:
-                assert record.success and record.evaluations == {"f": 200}, (ways[record.algorithm], record.status)
+                assert record.success and record.status in ENDED, (ways[record.algorithm], record.status)
             else:
                 assert not record.success and not record.verdict.feasible
                 assert pytest.approx(0) == record.time_s.solve

@@ -48,11 +48,12 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (4, ("compare", "--config", "study.toml", "--out", "study", "--jobs", "1", "--runs", "3")),
     (4, ("compare", "--resume", "--out", "absent")),
     (4, ("compare", "walk12", "--algorithms", "psso", "--starts", "1", "--runs", "1", "--out", "study")),
-    (2, ("report", "absent", "--gradient-weight", "5", "--json")),
+    (2, ("report", "absent", "--gradient-weight", "5", "--engine", "--drive", "held", "--json")),
     (6, ("export", "result.json", "--format", "csv", "--period-ms", "100", "--out", "out/gait.csv")),
     (4, ("export", "result.json", "--format", "webots")),
     (3, ("animate", "result.json", "--out", "gait.txt", "--fps", "10", "--speed", "1")),
     (3, ("simulate", "result.json", "--sole", "round", "--torque-limits", "none", "--friction", "0.5")),
+    (3, ("simulate", "result.json", "--video", "out/film.txt", "--size", "640x360", "--speed", "0.5")),
     (2, ("reproduce", "nothing", "--out", "reproduction")),
 )
 # Studies of minutes: they are asked for what does not exist.

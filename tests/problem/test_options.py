@@ -24,6 +24,7 @@ OTHER: dict[str, Any] = {
     "step_length_m": 0.07,
     "samples_per_interval": 2,
     "motors": "limits,ankle",
+    "load_degree": 3,
     "duration_s": 3.0,
     "instance": "walk12-w100",
 }

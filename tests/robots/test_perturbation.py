@@ -73,7 +73,7 @@ def test_every_quantity_can_be_changed() -> None:
         ({"mass": 0.0}, RobotDataError, "mass_kg must be > 0"),
         ({"mass": float("nan")}, InputError, "finite"),
         ({"thigh_m": -0.2}, InputError, "leaves nothing"),
-        ({"sole_x_m": 0.2}, RobotDataError, "back_m must be > 0"),
+        ({"sole_x_m": 0.2}, RobotDataError, "back_m must be >= 0"),
     ],
 )
 def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], said: str) -> None:

@@ -15,7 +15,7 @@ from nlp_gait.errors import OutputError
 from nlp_gait.export.tables import write_npz
 from nlp_gait.files import new_file, write_text
 from nlp_gait.problem import Signals
-from nlp_gait.simulation.video import write_video
+from nlp_gait.simulation.film.video import write_video
 
 
 def test_a_link_is_replaced_not_followed(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree as Xml
 
 import casadi as ca
@@ -11,8 +11,9 @@ from casadi import SX
 
 from nlp_gait.problem import Array, Result, Signals
 from nlp_gait.problems.biped.phase import BOTH_FEET
-from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.problems.nao.double_support import torso_shares
+from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.mjcf import add_bodies, document, text_of
@@ -28,8 +29,9 @@ def engine_torques(result: Result, signals: Signals) -> Array:
         result: gait of ``nao-ssp`` or ``nao-dsp``, with rotational inertia: an engine takes no point masses.
         signals: its time histories.
     """
-    options = result.problem.options
-    robot = nao(str(options["robot"]), rotational_inertia=True)
+    options, playback = result.problem.options, result.problem.playback
+    assert playback is not None  # a gait of NAO has one; for the type checker
+    robot = playback.robot
     torques = np.zeros_like(signals.arrays["tau"])
     if result.problem.name == "nao-ssp":
         _fill(torques, tree_from(robot, robot.feet["left"].link), signals)
@@ -62,9 +64,43 @@ def _fill(
         torques[k, columns] = data.qfrc_inverse
 
 
-def fixed_model(tree: Sequence[Body]) -> str:
+def standing_on(
+    robot: Robot, gravity: float, side: str, signals: Signals, forces: Mapping[str, Array] | None = None
+) -> tuple[Array, Array]:
+    """Torques (T, J) that MuJoCo needs with one foot still, and the wrench (T, 6) of the ground on it about its ankle.
+
+    Args:
+        robot: any tree.
+        gravity: [m/s^2].
+        side: of the foot that stands.
+        signals: angles, rates and accelerations.
+        forces: of the ground (T, 3) [N] on the frame of each of these links, beyond its sole's front.
+    """
+    engine, forces = mujoco(), forces or {}
+    model = engine.MjModel.from_xml_string(fixed_model(tree_from(robot, robot.feet[side].link), gravity))
+    data = engine.MjData(model)
+    columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
+    torques, wrench = np.zeros_like(signals.arrays["q"]), np.zeros((len(signals.arrays["t"]), 6))
+    for k in range(len(torques)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = (signals.arrays[name][k, columns] for name in ("q", "qd", "qdd"))
+        engine.mj_inverse(model, data)
+        engine.mj_rnePostConstraint(model, data)
+        moment, force = data.cfrc_int[1, :3], data.cfrc_int[1, 3:]  # about the centre of mass of all
+        wrench[k] = *force, *(moment + np.cross(data.subtree_com[1], force))
+        needed = data.qfrc_inverse.copy()
+        for link, force_on in forces.items():
+            body = model.body(link).id
+            tip = data.xpos[body] + data.xmat[body].reshape(3, 3) @ (robot.soles[link].front_m, 0.0, 0.0)
+            given = np.zeros(model.nv)
+            engine.mj_applyFT(model, data, force_on[k], np.zeros(3), tip, body, given)
+            needed -= given
+        torques[k, columns] = needed
+    return torques, wrench
+
+
+def fixed_model(tree: Sequence[Body], gravity: float = GRAVITY) -> str:
     """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to."""
-    root, option = document("fixed", GRAVITY)
+    root, option = document("fixed", gravity)
     Xml.SubElement(option, "flag", constraint="disable")
-    add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, free=False)
+    add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, root="fixed")
     return text_of(root)

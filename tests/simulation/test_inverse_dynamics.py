@@ -22,6 +22,16 @@ def test_engine_and_model_need_the_same_torques(gait, name, options):
     np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
 
 
+@pytest.mark.parametrize("name", ["ssp optimum", "dsp optimum"])
+def test_rotors_weigh_alike_in_plan_and_engine(gait, name):
+    result, without = gait(name, motors="rotor"), gait(name)
+    for one in (result, without):
+        one.x[-1] = 0.5  # accelerations many times as large
+    signals = result.problem.signals(result.x)
+    np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
+    assert np.abs(engine_torques(without, signals) - signals.arrays["tau"]).max() > 0.05
+
+
 def test_lever_rule_and_fast_motion(gait):
     result = gait("dsp optimum", torso_share="lever")
     result.x[-1] = 0.3  # accelerations fifty times as large

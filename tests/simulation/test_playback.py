@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -154,11 +155,11 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
 def test_without_a_display_the_viewer_is_refused_in_one_sentence(played, monkeypatch):
     glfw = pytest.importorskip("glfw")
     from nlp_gait.errors import OutputError
-    from nlp_gait.simulation.camera import shown
+    from nlp_gait.simulation.film.viewer import shown
 
     monkeypatch.setattr(glfw, "init", lambda: False)
     with pytest.raises(OutputError, match="no display; use --video"):
-        shown(played("dsp optimum")[0], Conditions(), Drive(), "rectangle")
+        shown(partial(play, played("dsp optimum")[0]))
 
 
 def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(played):

@@ -21,7 +21,7 @@ def motors(
     problem: NaoPhase,
     output: Output,
 ) -> None:
-    """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat of each motor.
+    """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat and rotor of each motor.
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """

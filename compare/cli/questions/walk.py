@@ -21,10 +21,10 @@ def walk(
         str,
         typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,..."),
     ] = "speed_m_s=0.01:0.1:10",
-    steps: Annotated[
-        int,
-        typer.Option(min=0, max=1000, help="Play this many steps of each gait in MuJoCo (extra sim); 0 plays none."),
-    ] = 0,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Play ten steps of each gait in MuJoCo (extra sim): is the model right?")
+    ] = False,
+    steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Play this many; 0 plays none.")] = None,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     servos: DriveOptions,
@@ -33,17 +33,20 @@ def walk(
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
-    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. A cycle is played open loop.
+    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. Played is in open loop unless
+    a feedback is named.
 
-    Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --steps 10`,
+    Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLE, optimal_gaits, played
+    from compare.study.engine import STEPS
     from nlp_gait.simulation.engine import mujoco
 
     drive = servos.chosen()
+    steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
         mujoco()  # if it is missing, say so before the work
     axis = parse_axis(over)

@@ -26,6 +26,7 @@ VARIANTS: Mapping[str, str] = {
     "with these, braking gives back": "limits,ankle,regeneration",
     "with these, K of each motor": "limits,ankle,heat",
     "with these, K and free braking": "limits,ankle,heat,free-braking",
+    "with these, inertia of rotors": "limits,ankle,rotor",
 }
 # Rows of the problem with limits, and what their largest share of the limit is called.
 USES = {
@@ -94,7 +95,7 @@ def motor_variants(
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
     if "motors" not in inspect.signature(problem_maker(spec.called)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
-    limited = spec.with_options(motors="limits").load()
+    limited = {rotor: spec.with_options(motors=f"limits{rotor}").load() for rotor in ("", ",rotor")}
     found: list[Variant] = []
     try:
         for name, features in VARIANTS.items():
@@ -117,7 +118,7 @@ def motor_variants(
                     published_power_W=exact_model(published).at(x, published.p).cost,
                     x=solution.x,
                     moved=(float(moves.max()), problem.names[int(moves.argmax())]),
-                    uses=limit_uses(limited, x),
+                    uses=limit_uses(limited[",rotor" if "rotor" in features else ""], x),
                 )
             )
             progress(name)

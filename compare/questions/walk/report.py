@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from compare.analysis.engine import agreement
 from compare.analysis.units import millimetres, with_unit
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
@@ -17,13 +18,15 @@ from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
+from nlp_gait.problem.steps import walk
 from nlp_gait.simulation.measurements import Measurements
-from nlp_gait.simulation.steps import walk
 from nlp_gait.simulation.walking import Walk
 
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
+# Value on the axis, walk, and its measurements.
+Played = tuple[float, Walk, Measurements]
 LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 # Indexes of the table of numbers.
@@ -52,15 +55,15 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     feasible = [gait for gait in gaits if gait.found.feasible]
     placed = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
     cheapest_cycles = table_of(
-        "Cheapest cycles",
+        "Cheapest cycles, with the times of single and double support",
         feasible,
         {
             name: lambda gait: f"{gait.at:g}",
             "power": lambda gait: f"{gait.indexes['power_W']:.4f} W",
             "cost of transport": lambda gait: f"{gait.indexes['cost_of_transport']:.4f}",
             "step": lambda gait: f"{gait.indexes['step_length_m']:.4f} m",
-            "single support": lambda gait: f"{gait.found.x[problem.durations[0]]:.3f} s",
-            "double support": lambda gait: f"{gait.found.x[problem.durations[1]]:.3f} s",
+            "single": lambda gait: f"{gait.found.x[problem.durations[0]]:.3f} s",
+            "double": lambda gait: f"{gait.found.x[problem.durations[1]]:.3f} s",
         },
     )
     costs = Figure(
@@ -90,27 +93,50 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
     )
 
 
-def _walks(name: str, gaits: Sequence[Gait]) -> list[Table]:
-    """How the gaits that were played fared."""
+def _walks(name: str, gaits: Sequence[Gait]) -> list[Part]:
+    """How the gaits that were played fared, and how far that confirms the model."""
     walks = [(gait.at, gait.walk, gait.walk.measurements) for gait in gaits if gait.walk is not None]
     if not walks:
         return []
-    columns: dict[str, Callable[[tuple[float, Walk, Measurements]], str]] = {
+    energies: dict[str, Callable[[Played], str]] = {
         name: lambda row: f"{row[0]:g}",
+        "model": lambda row: with_unit(row[1].model_J_per_m, "J/m", ".2f"),
+        "engine": lambda row: with_unit(row[1].engine_J_per_planned_m, "J/m", ".2f"),
+        "error": lambda row: _error(row[1]),
+        "per walked m": lambda row: with_unit(row[1].engine_J_per_m, "J/m", ".2f"),
+        "way": lambda row: _way(row[1]),
         "fate": lambda row: _fate(row[1]),
+    }
+    courses: dict[str, Callable[[Played], str]] = {
+        name: lambda row: f"{row[0]:g}",
         "walked": lambda row: millimetres(row[1].walked_m, ".0f"),
         "of": lambda row: millimetres(row[1].planned_m, ".0f"),
-        "drift": lambda row: millimetres(row[1].drift_m, ".0f"),
-        "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".1f"),
+        "drift": lambda row: millimetres(row[1].drift_m),
+        "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".2f"),
         "tilt": lambda row: with_unit(row[2].largest_tilt_deg, "deg", ".1f"),
-        "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".3f"),
-        "mechanical power": lambda row: with_unit(row[2].measured.mechanical_W, "W", ".3f"),
-        "its model": lambda row: with_unit(row[2].predicted.mechanical_W, "W", ".3f"),
-        "energy per planned metre": lambda row: with_unit(row[1].engine_J_per_planned_m, "J", ".2f"),
-        "model's": lambda row: with_unit(row[1].model_J_per_m, "J", ".2f"),
-        "per walked metre": lambda row: with_unit(row[1].engine_J_per_m, "J", ".2f"),
+        "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".4f"),
     }
-    return [table_of(f"{walks[0][1].steps} steps in the physics engine, open loop", walks, columns)]
+    steps = walks[0][1].steps
+    agreed = agreement(
+        [walk.model_J_per_m for _, walk, _ in walks], [walk.engine_J_per_planned_m for _, walk, _ in walks]
+    )
+    return [
+        table_of(f"Energy of {steps} steps in the physics engine, for each planned metre", walks, energies),
+        agreed.sentence(),
+        table_of(f"Course of the {steps} steps", walks, courses),
+    ]
+
+
+def _error(walked: Walk) -> str:
+    """Of the model."""
+    if walked.engine_J_per_planned_m is None:
+        return "-"
+    return f"{100.0 * (walked.engine_J_per_planned_m / walked.model_J_per_m - 1.0):+.2f} %"
+
+
+def _way(walked: Walk) -> str:
+    """Walked part of the planned way."""
+    return "-" if walked.walked_m is None else f"{100.0 * walked.walked_m / walked.planned_m:.1f} %"
 
 
 def _fate(walked: Walk) -> str:

@@ -19,8 +19,9 @@ from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-# Violations that count alike in the total, by unit: 10 mm of a margin or a height counts like 1 rad.
-SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "m": 0.01, "1": 1.0}
+# Violations that count alike in the total, by unit: 10 mm of a margin or a height counts like 1 rad, and like a change of a
+# foot's load that is too fast by a weight in 0.1 s.
+SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0}
 REACH_MARGIN = "reach_margin"
 
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
@@ -41,11 +42,13 @@ class Part(ABC):
     Attributes:
         parameters: its limits.
         reads_motion: whether it reads angles and their derivatives.
+        reads_wrenches: whether it reads those of the ground on the soles.
         traces: what else it reads of each instant, by name.
     """
 
     parameters: tuple[Parameter, ...] = ()
     reads_motion: bool = False
+    reads_wrenches: bool = False
     traces: Mapping[str, Trace] = MappingProxyType({})
 
     @abstractmethod

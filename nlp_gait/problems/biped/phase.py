@@ -36,9 +36,14 @@ from nlp_gait.symbolic.trajectories import Motion
 Derivatives = Literal["analytic", "finite-difference"]
 
 BOTH_FEET = {"L": "left", "R": "right"}
+# Of the ground on each sole: its force, and its moment about the point under the ankle.
+WRENCHES = {
+    f"{foot}_{half}": in_space(unit) for foot in BOTH_FEET.values() for half, unit in (("force", "N"), ("moment", "Nm"))
+}
 COLUMNS = {
     "zmp": in_space("m", "xy"),
     **{name: in_space("m") for name in ("hip", "com", "left_foot", "right_foot")},
+    **WRENCHES,
 }
 
 
@@ -50,12 +55,14 @@ class PlannedInstant(NamedTuple):
         hip: (3,) position of the torso's origin [m].
         ankles: (3,) positions by side ``"L"``, ``"R"`` [m].
         reach: (2,) cosines of the left and the right knee.
+        wrench: (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty where it is not planned.
     """
 
     joints: Mapping[str, Motion]
     hip: SX
     ankles: Mapping[str, SX]
     reach: SX
+    wrench: SX = SX(0, 1)
 
 
 class Loads(NamedTuple):
@@ -64,16 +71,19 @@ class Loads(NamedTuple):
     Attributes:
         torques: by joint name [Nm].
         zmp: (2,) in the world [m].
+        wrenches: (6,) of the ground on each sole by side, about the point under its ankle [N, Nm].
     """
 
     torques: Mapping[str, SX]
     zmp: SX
+    wrenches: Mapping[str, SX]
 
 
 # From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
 Planner = Callable[[InstantPoint, SX, Nonsmooth], PlannedInstant]
-# From joint motions by name, the hip's position (3,), and points (2,) on the ground under the ankles by side.
-Loader = Callable[[Mapping[str, Motion], SX, Mapping[str, SX]], Loads]
+# From joint motions by name, the hip's position (3,), points (2,) on the ground under the ankles by side, and what is planned
+# of the ground's wrench on the right sole.
+Loader = Callable[[Mapping[str, Motion], SX, Mapping[str, SX], SX], Loads]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,14 +135,16 @@ class Phase:
 
     def samples(self, at: Point, ops: Nonsmooth) -> Samples:
         """The phase at N + 1 equidistant samples, each evaluated once; mapped, never unrolled."""
-        traces, motion = self._traces, self._reads_motion
+        traces, motion, pressed = self._traces, self._reads_motion, len(BOTH_FEET) * self._reads_wrenches
         if self.derivatives == "analytic":
-            planned, reach, torque, power, zmp, *rest = self._mapped(self._sample(ops, motion, traces), at)
-            moved, seen = rest[: 3 * motion], rest[3 * motion :]
+            planned, reach, torque, power, zmp, *rest = self._mapped(self._sample(ops, motion, pressed > 0, traces), at)
+            wrenches, moved, seen = rest[:pressed], rest[pressed : pressed + 3 * motion], rest[pressed + 3 * motion :]
         else:
             q, _, _, hip, planned, reach, world, *seen = self._mapped(self._kinematics(ops, traces), at)
             qd, qdd = self._differences(q, at)
-            torque, moving, zmp = self._dynamics.map(self.grid.parts + 1)(q, qd, qdd, hip, world)
+            n = self.grid.parts + 1
+            torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
+            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if pressed else []
             power, moved = qd * moving, [q, qd, qdd]
         return Samples(
             joints=self.joints,
@@ -145,6 +157,7 @@ class Phase:
             power=power,
             zmp=zmp,
             motion=tuple(moved),
+            wrenches=dict(zip(BOTH_FEET, wrenches, strict=False)),
             traces=dict(zip(traces, seen, strict=True)),
         )
 
@@ -155,6 +168,7 @@ class Phase:
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
         torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
+        wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
         still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
         held = np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
         rows = [self.joints.index(name) for name in self.moving]
@@ -166,7 +180,8 @@ class Phase:
             return values
 
         still_rates = np.zeros(len(self.joints))
-        com, left, right = (_numbers(part) for part in ca.vertsplit(world, 3))
+        com, left, right, *_ = (_numbers(part) for part in ca.vertsplit(world, 3))
+        halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
             "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
             "q": full(q, held),
@@ -178,6 +193,7 @@ class Phase:
             "com": com,
             "left_foot": left,
             "right_foot": right,
+            **dict(zip(WRENCHES, halves, strict=True)),
         }
         return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
 
@@ -200,25 +216,33 @@ class Phase:
     def _reads_motion(self) -> bool:
         return self.goal.reads_motion or any(part.reads_motion for part in self.parts)
 
+    @property
+    def _reads_wrenches(self) -> bool:
+        return any(part.reads_wrenches for part in self.parts)
+
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], PlannedInstant, InstantPoint]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
         at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
         return [x, margin, phase], self.plan(at, phase, ops), at
 
-    def _sample(self, ops: Nonsmooth, motion: bool, traces: Mapping[str, Trace]) -> ca.Function:
+    def _sample(self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]) -> ca.Function:
         """One sample with analytic derivatives: (x, margin, phase) to torques and what else is read."""
         inputs, plan, at = self._symbolic_plan(ops)
-        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()})
+        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()}, plan.wrench)
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
         planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
         torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
         outputs = [planned, plan.reach, torque, power, loads.zmp]
+        outputs += [loads.wrenches[side] for side in BOTH_FEET] if wrenches else []
         outputs += self._motion(plan) if motion else []
         outputs += [trace(at, inputs[2]) for trace in traces.values()]
         return ca.Function("sample", inputs, economical(outputs))
 
     def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
-        """One sample: angles that move with their derivatives, hip, planned angles, reach, com with both feet, and traces."""
+        """One sample: angles that move with their derivatives, hip, planned angles, reach, and what follows.
+
+        That is the centre of mass with both feet and the planned wrench one below the other, and traces.
+        """
         inputs, plan, at = self._symbolic_plan(ops)
         planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
         tree = tree_from(self.robot, self.robot.feet["left"].link)
@@ -227,7 +251,7 @@ class Phase:
         soles = [
             plan.ankles[side] - SX([0, 0, self.robot.feet[foot].ankle_height_m]) for side, foot in BOTH_FEET.items()
         ]
-        world = ca.vertcat(com, *soles)
+        world = ca.vertcat(com, *soles, plan.wrench)
         seen = [trace(at, inputs[2]) for trace in traces.values()]
         return ca.Function("kinematics", inputs, [*self._motion(plan), plan.hip, planned, plan.reach, world, *seen])
 
@@ -237,16 +261,27 @@ class Phase:
 
     @cached_property
     def _dynamics(self) -> ca.Function:
-        """One sample: torques, those of the moving joints, and ZMP, from angles and derivatives, hip, and com with feet."""
+        """One sample: torques, those of the moving joints, and ZMP, from the inputs of ``_loaded``."""
+        inputs, loads = self._loaded()
+        torque, moving = (ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.joints, self.moving))
+        return ca.Function("dynamics", inputs, economical([torque, moving, loads.zmp]))
+
+    @cached_property
+    def _ground(self) -> ca.Function:
+        """One sample: wrenches (6,) on both soles, from the inputs of ``_loaded``."""
+        inputs, loads = self._loaded()
+        return ca.Function("ground", inputs, economical([loads.wrenches[side] for side in BOTH_FEET]))
+
+    def _loaded(self) -> tuple[list[SX], Loads]:
+        """Loads of one sample as functions of angles, both derivatives, hip, and what ``_kinematics`` gives of the world."""
         plan = self._symbolic_plan(Exact())[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
-        hip, world = SX.sym("hip", 3), SX.sym("world", 9)
-        _, left, right = ca.vertsplit(world, 3)
+        hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
+        _, left, right, *wrench = ca.vertsplit(world, 3)
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
-        loads = self.loads({**plan.joints, **moved}, hip, {"L": left[:2], "R": right[:2]})
-        torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
-        moving = ca.vertcat(*(loads.torques[name] for name in self.moving))
-        return ca.Function("dynamics", [*parts, hip, world], economical([torque, moving, loads.zmp]))
+        feet = {"L": left[:2], "R": right[:2]}
+        loads = self.loads({**plan.joints, **moved}, hip, feet, ca.vertcat(*wrench) if wrench else SX(0, 1))
+        return [*parts, hip, world], loads
 
     def _mapped(self, function: ca.Function, at: Point) -> list[Any]:
         """A function of (x, margin, phase) at all samples, one column each."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -33,6 +33,8 @@ class Samples:
         zmp: (2, N + 1) in the world [m].
         motion: angles of the joints that move and both derivatives, (m, N + 1) each; empty if nobody reads them.
         traces: what parts asked to see, by name.
+        wrenches: (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty if nobody reads
+            them.
     """
 
     joints: tuple[str, ...]
@@ -46,6 +48,7 @@ class Samples:
     zmp: MX
     motion: tuple[MX, ...]
     traces: Mapping[str, MX]
+    wrenches: Mapping[str, MX] = field(default_factory=dict)
 
     @property
     def q(self) -> MX:

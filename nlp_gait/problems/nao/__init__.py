@@ -8,11 +8,12 @@ Options that the problems share:
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
     step_length_m          from foot to foot
     torso_share            how the torso's mass is shared between the legs in double support, see
-                           ``double_support.torso_shares``
+                           ``double_support.torso_shares``; free plans the ground's wrench on the second foot instead
+    load_degree            of that wrench's polynomials over double support
     trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or more coefficients on
                            top of them
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
-                           cubics, 4 with splines, which would else bend between the samples
+                           cubics, 4 with splines and with planned loads, which would else bend between the samples
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
     motors                 what of the real motors is taken into account, separated by commas, see ``motors``; nothing by
                            default

@@ -124,8 +124,8 @@ def arm_limits(
     return AngleLimits("arm_angle", robot, tuple(swing), angles)
 
 
-def grid_for(trajectory: str, intervals: int, samples_per_interval: int) -> Grid:
-    """Samples of a phase: as many in an interval as are asked for, or for 0 as many as suit the trajectory."""
+def grid_for(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:
+    """Samples of a phase: as many in an interval as are asked for, or for 0 as many as suit the trajectory and the loads."""
     if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
-        samples_per_interval = SAMPLES if trajectory == "cubic" else SPLINE_SAMPLES
+        samples_per_interval = SPLINE_SAMPLES if planned_loads or trajectory != "cubic" else SAMPLES
     return Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")

@@ -15,6 +15,7 @@ import numpy as np
 from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.curves import grid_for
 from nlp_gait.problems.nao.cycle_motion import (
     TIMES,
     cycle_variables,
@@ -29,10 +30,10 @@ from nlp_gait.problems.nao.cycle_rows import (
     single_margins,
     start_at_speed,
 )
-from nlp_gait.problems.nao.double_support import TorsoShare, double_support_loads
-from nlp_gait.problems.nao.problem import paper_parts, with_robot
+from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
-from nlp_gait.robots import Robot
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -41,7 +42,7 @@ OBJECTIVES = {
 }
 
 
-@maker({"samples_per_interval": 1})
+@maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
 def nao_cycle(
     *,
     robot: str = "nao-v5",
@@ -49,7 +50,9 @@ def nao_cycle(
     intervals: int = 10,
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "lever",
-    samples_per_interval: int = 1,
+    samples_per_interval: int = 0,
+    motors: str = "",
+    load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one; for the other options see ``problems.nao``.
 
@@ -60,11 +63,15 @@ def nao_cycle(
         intervals: of each phase.
         rotational_inertia: False takes every link as a point mass.
         torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
-            farther one.
-        samples_per_interval: above 1 for a denser grid.
+            farther one; free plans the load of the foot that has landed.
+        samples_per_interval: above 1 for a denser grid; 0 for what suits the loads: 4 where they are planned, else 1.
+        motors: what of the real motors is taken into account; the mean square of a continuous torque is that of each phase.
+        load_degree: of the planned wrench over double support.
     """
-    grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
-    cycle = walking_cycle(nao(robot, rotational_inertia), torso_share, grid, at_given_speed=objective == "power")
+    grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    real, at_given_speed = Motors.parsed(motors, nao(robot, rotational_inertia)), objective == "power"
+    sharing = load_sharing(real.model, torso_share, load_degree)
+    cycle = walking_cycle(real, sharing, grid, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -79,25 +86,29 @@ def nao_cycle(
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),
-        start=start if cycle.at_given_speed else None,
+        start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
+        long_derivatives=bool(sharing.variables),
     )
-    return with_robot(problem, robot, repeats=True)
+    return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
 
-def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
+def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
     """Both phases of the cycle.
 
     Args:
-        model: robot as ``nao`` makes it.
-        torso_share: in double support, see ``double_support.torso_shares``.
+        motors: of a robot as ``nao`` makes it.
+        sharing: of load in double support, see ``double_support.load_sharing``.
         grid: of each phase.
         at_given_speed: the step length follows from the speed.
     """
-    variables, means = cycle_variables(model), mean_margins(model)
+    model = motors.model
+    *motion, step = cycle_variables(model)
+    variables, means = (*motion, *sharing.variables, step), mean_margins(model)
+    double = sharing.planned(double_support_planner(model))
     halves = {
-        "ssp": (single_support_planner(model), single_support_loads(model), single_margins(model)),
-        "dsp": (double_support_planner(model), double_support_loads(model, torso_share), double_margins(model)),
+        "ssp": (single_support_planner(model), single_support_loads(model), single_margins(model), ()),
+        "dsp": (double, sharing.loads, double_margins(model), sharing.parts),
     }
     phases = {
         name: Phase(
@@ -109,8 +120,9 @@ def walking_cycle(model: Robot, torso_share: TorsoShare, grid: Grid, *, at_given
             plan=plan,
             loads=loads,
             grid=grid,
-            parts=paper_parts(model, margins, means[name]),
+            parts=(*paper_parts(model, margins, means[name]), *motors.parts, *more),
+            goal=goal_of("power", motors),
         )
-        for name, (plan, loads, margins) in halves.items()
+        for name, (plan, loads, margins, more) in halves.items()
     }
     return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=at_given_speed)

@@ -64,6 +64,9 @@ class WalkingCycle:
             if parameter.name in BALANCE
         ]
         shared = [parameter for parameter in own["ssp"] if parameter.name not in BALANCE]
+        shared += [
+            parameter for parameter in own["dsp"] if parameter not in own["ssp"] and parameter.name not in BALANCE
+        ]
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
         limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT, *jump))
         return (*self._speed_parameters(), *balance, *limit, *shared)

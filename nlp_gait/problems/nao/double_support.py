@@ -6,13 +6,14 @@ torso, which depends on where the hip is between the feet.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 from casadi import DM, MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Variable, maker
-from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
+from nlp_gait.problems.biped.foot_loads import FootLimits, PlannedWrench, Start, planned_loads
+from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins, Part
 from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
@@ -30,7 +31,7 @@ from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import combined_zmp, ground_load, zmp_of_wrench
+from nlp_gait.symbolic.balance import below, combined_zmp, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -45,12 +46,18 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
 }
 DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
 
-TorsoShare = Literal["printed", "lever"]
+Division = Literal["printed", "lever"]
+TorsoShare = Literal["printed", "lever", "free"]
+LOAD_DEGREE = 4
 Point2: TypeAlias = tuple[float, float]
 Side = TypeVar("Side", float, MX)
 
 
-@maker({"trajectory": "cubic", "objective": "power", "samples_per_interval": 1}, {"motors": ""})
+@maker(
+    {"trajectory": "cubic", "objective": "power", "samples_per_interval": 1},
+    {"motors": ""},
+    {"load_degree": LOAD_DEGREE},
+)
 def nao_dsp(
     *,
     robot: str = "nao-v5",
@@ -63,29 +70,32 @@ def nao_dsp(
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
+    load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Double support of NAO; for the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    model = nao(robot, rotational_inertia)
+    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    model = real.model
     soles = soles_of(model, step_length_m)
     box = support_box(model, soles)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING))
-    real = Motors.parsed(motors, model)
+    sharing = load_sharing(model, torso_share, load_degree)
     richer = (arm_limits(model, splines, ARM_SWING, double_support_duration),)
     phase = Phase(
         robot=model,
         joints=JOINTS,
         planned=PLANNED_JOINTS,
-        variables=(*hip_variables(model), DURATION, *splines.variables),
+        variables=(*hip_variables(model), DURATION, *splines.variables, *sharing.variables),
         duration=DURATION.name,
-        plan=_planner(model, soles, splines),
-        loads=double_support_loads(model, torso_share),
-        grid=grid_for(trajectory, intervals, samples_per_interval),
+        plan=sharing.planned(_planner(model, soles, splines)),
+        loads=sharing.loads,
+        grid=grid_for(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free"),
         derivatives=derivatives,
         parts=(
             *paper_parts(model, double_support_margins(box), double_support_mean_margins(box)),
             *(richer if splines.count else ()),
             *real.parts,
+            *sharing.parts,
         ),
         goal=goal_of(objective, real),
     )
@@ -94,7 +104,8 @@ def nao_dsp(
         "NAO, double support: least mean power",
         phase,
         robot,
-        start=splines.start_of(phase.names),
+        start=sharing.start_of(phase.names, splines.start_of(phase.names)),
+        long_derivatives=bool(sharing.variables),
     )
 
 
@@ -169,7 +180,7 @@ def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Pla
     return plan
 
 
-def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) -> dict[str, SX]:
+def torso_shares(hip_y: SX, rule: Division, feet_y: Point2 = (0.05, -0.05)) -> dict[str, SX]:
     """Share of the torso's mass that each leg carries, from the hip's distances to the feet; both add up to 1.
 
     With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
@@ -189,24 +200,61 @@ def torso_shares(hip_y: SX, rule: TorsoShare, feet_y: Point2 = (0.05, -0.05)) ->
     return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
 
 
-def double_support_loads(robot: Robot, rule: TorsoShare, upright: Collection[str] | None = None) -> Loader:
+class Sharing(NamedTuple):
+    """What sharing the load in double support adds to a problem.
+
+    Attributes:
+        variables: of the planned wrench.
+        planned: adds that wrench to a motion.
+        loads: torques and ZMP.
+        parts: that limit it.
+        start_of: start points of variables by name, from those of the others.
+    """
+
+    variables: tuple[Variable, ...]
+    planned: Callable[[Planner], Planner]
+    loads: Loader
+    parts: tuple[Part, ...]
+    start_of: Callable[[Sequence[str], Start | None], Start | None]
+
+
+def load_sharing(robot: Robot, rule: TorsoShare, degree: int, upright: Collection[str] | None = None) -> Sharing:
+    """By a rule of the paper, or planned freely.
+
+    Args:
+        robot: with links welded that never move.
+        rule: see ``torso_shares``; ``"free"`` plans the wrench on the right foot.
+        degree: of that wrench over the phase.
+        upright: as for single support.
+    """
+    if rule != "free":
+        return Sharing((), lambda plan: plan, double_support_loads(robot, rule, upright), (), lambda _, start: start)
+    weight = robot.mass_kg * GRAVITY
+    wrench = PlannedWrench(robot=robot, weight=weight, degree=degree)
+    loads = planned_loads(robot, GRAVITY, upright_links(robot) if upright is None else upright)
+    return Sharing(wrench.variables, wrench.planned, loads, (FootLimits(wrench),), wrench.start_of)
+
+
+def double_support_loads(robot: Robot, rule: Division, upright: Collection[str] | None = None) -> Loader:
     """Torques of each half from its own foot, and the combined ZMP of both feet; ``upright`` as for single support."""
     halves = {side: tree_from(robot, robot.feet[foot].link, _joints_on(side)) for side, foot in BOTH_FEET.items()}
     weight, upright = robot.mass_kg * GRAVITY, upright_links(robot) if upright is None else upright
     feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
 
-    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:
+    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
         shares = torso_shares(hip[1], rule, feet_y)
         torques: dict[str, SX] = {}
-        zmps, ground_loads = [], []
+        zmps, ground_loads, wrenches = [], [], {}
         for side, tree in halves.items():
             half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
-            offset = zmp_of_wrench(wrench, robot.feet[BOTH_FEET[side]].ankle_height_m, weight)
+            height = robot.feet[BOTH_FEET[side]].ankle_height_m
+            offset = zmp_of_wrench(wrench, height, weight)
+            wrenches[side] = below(wrench, height)
             torques |= half
             zmps.append(feet[side] + offset)
             ground_loads.append(ground_load(wrench, weight))
-        return Loads(torques, combined_zmp(zmps, ground_loads))
+        return Loads(torques, combined_zmp(zmps, ground_loads), wrenches)
 
     return loads
 

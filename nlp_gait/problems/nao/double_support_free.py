@@ -25,12 +25,13 @@ from nlp_gait.problems.nao.curves import (
 from nlp_gait.problems.nao.double_support import (
     ARM_SWING,
     DURATION,
+    LOAD_DEGREE,
     TorsoShare,
     double_support_duration,
     double_support_hip,
-    double_support_loads,
     double_support_margins,
     double_support_mean_margins,
+    load_sharing,
     soles_of,
     standing_ankles,
     support_box,
@@ -45,7 +46,7 @@ LEAN = ("torso_roll", "torso_pitch")
 FLAT = 1e-6
 
 
-@maker()
+@maker({"load_degree": LOAD_DEGREE})
 def nao_dsp_free(
     *,
     robot: str = "nao-v5",
@@ -55,6 +56,7 @@ def nao_dsp_free(
     torso_share: TorsoShare = "printed",
     step_length_m: float = 0.06,
     samples_per_interval: int = SPLINE_SAMPLES,
+    load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Double support of NAO with a torso that leans; for the options see ``problems.nao``.
 
@@ -68,6 +70,7 @@ def nao_dsp_free(
     model = nao(robot, rotational_inertia)
     check_yaw_pitches(model)
     soles = soles_of(model, step_length_m)
+    sharing = load_sharing(model, torso_share, load_degree, upright=())
     box, ankles = support_box(model, soles), standing_ankles(model, soles)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING) | dict.fromkeys(LEAN, "rad"))
 
@@ -92,10 +95,10 @@ def nao_dsp_free(
         robot=model,
         joints=JOINTS,
         planned=PLANNED_JOINTS,
-        variables=(*hip_variables(model), DURATION, *splines.variables),
+        variables=(*hip_variables(model), DURATION, *splines.variables, *sharing.variables),
         duration=DURATION.name,
-        plan=plan,
-        loads=double_support_loads(model, torso_share, upright=()),
+        plan=sharing.planned(plan),
+        loads=sharing.loads,
         grid=Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval"),
         parts=(
             *paper_parts(model, double_support_margins(box), double_support_mean_margins(box)),
@@ -104,6 +107,7 @@ def nao_dsp_free(
                 "other_angle", model, (YAW_PITCHES["L"],), lambda at, s: closure(model, pose(at, s), ankles)[0]
             ),
             FlatSoles(lambda at, s: closure(model, pose(at, s), ankles)[1]),
+            *sharing.parts,
         ),
     )
     return phase_problem(
@@ -111,7 +115,7 @@ def nao_dsp_free(
         "NAO, double support with a leaning torso: least mean power",
         phase,
         robot,
-        start=splines.start_of(phase.names),
+        start=sharing.start_of(phase.names, splines.start_of(phase.names)),
         searchable=False,
     )
 

@@ -123,7 +123,7 @@ class FreeMotion:
             motion = Motion(*(v[order * rows + row] for order in range(3)))
             joints |= dict.fromkeys(YAW_PITCHES if curve == YAW_PITCH else (curve,), motion)
         body = self.body({name: motion.position for name, motion in joints.items()})
-        loads = self.loads(joints, body.torso, {"L": SX(DM(self.support[:2]))})
+        loads = self.loads(joints, body.torso, {"L": SX(DM(self.support[:2]))}, SX(0, 1))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         left = body.corners[1, 1::2]
         return ca.Function("instant", [v], economical([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))

@@ -7,14 +7,16 @@ An option lists what is taken into account, in addition to the paper or in place
     free-braking    braking draws nothing, in place of as much as driving: the positive part of torque times rate
     regeneration    braking gives back what it takes, in place of drawing it: torque times rate with its sign
     heat            heat constant of each motor from its data sheet, in place of one K for all
+    rotor           inertia of every rotor at its joint: torques and what follows from them, and the engine's joints alike
 
-Both hip yaw-pitch joints have one motor. No source gives a limit of acceleration, so there is none here.
+Both hip yaw-pitch joints have one motor, whose rotor counts half at each. No source gives a limit of acceleration, so there is
+none here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -32,7 +34,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-FEATURES = ("limits", "ankle", "free-braking", "regeneration", "heat")
+FEATURES = ("limits", "ankle", "free-braking", "regeneration", "heat", "rotor")
 
 SHARED = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
 # Ankle pitch, least and greatest roll of the left ankle [rad]; straight lines between. The right ankle mirrors it.
@@ -63,11 +65,11 @@ class Motors:
 
     Attributes:
         features: see above.
-        robot: whose motors they are.
+        robot: whose motors they are, without the inertia of their rotors.
 
     Raises:
         UnknownNameError: no such feature.
-        InputError: features that exclude each other; a joint of the robot without data of its motor.
+        InputError: features that exclude each other; a joint of the robot without data of its motor, or of its rotor.
     """
 
     features: tuple[str, ...]
@@ -81,12 +83,26 @@ class Motors:
         if {"free-braking", "regeneration"} <= set(self.features):
             raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
         if self.features:
-            self._ratings  # noqa: B018  a robot without data is refused now
+            self._ratings, self.model  # noqa: B018  a robot without data is refused now
 
     @classmethod
     def parsed(cls, text: str, robot: Robot) -> Motors:
         """Features from an option's text, separated by commas; none if it is empty."""
         return cls(features=tuple(part.strip() for part in text.split(",") if part.strip()), robot=robot)
+
+    @cached_property
+    def model(self) -> Robot:
+        """The robot as the dynamics take it: with the inertia of its rotors, if asked for."""
+        if "rotor" not in self.features:
+            return self.robot
+        found = {}
+        for joint, rating in zip(JOINTS, self._ratings, strict=True):
+            if rating.reflected_inertia_kgm2 is None:
+                raise InputError(
+                    f"robot {self.robot.name!r}: the motor of joint {joint!r} has no rotor_inertia_gcm2, which motors=rotor needs"
+                )
+            found[joint] = rating.reflected_inertia_kgm2 / (len(SHARED) if joint in SHARED else 1)
+        return replace(self.robot, armatures_kgm2=found)
 
     @property
     def parts(self) -> tuple[Part, ...]:

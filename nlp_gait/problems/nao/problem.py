@@ -51,6 +51,7 @@ def phase_problem(
     *,
     start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
     searchable: bool = True,
+    long_derivatives: bool = False,
 ) -> GaitProblem:
     """Problem of one phase.
 
@@ -61,6 +62,7 @@ def phase_problem(
         robot: name or file of the robot, with all its joints.
         start: start point; None for one within the bounds.
         searchable: False for a problem that only gradient methods can solve.
+        long_derivatives: True where one solve pays for compiling its derivatives.
     """
 
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
@@ -78,20 +80,23 @@ def phase_problem(
         start=start,
         durations=(phase.duration,),
         searchable=searchable,
+        long_derivatives=long_derivatives,
     )
-    return with_robot(problem, robot)
+    return with_robot(problem, robot, phase.robot.armatures_kgm2)
 
 
-def with_robot(problem: GaitProblem, robot: str, *, repeats: bool = False) -> GaitProblem:
+def with_robot(
+    problem: GaitProblem, robot: str, armatures_kgm2: Mapping[str, float], *, repeats: bool = False
+) -> GaitProblem:
     """The problem with what drawing and playing its gaits need of a robot.
 
     Args:
         problem: without.
         robot: name or file, with all its joints.
+        armatures_kgm2: by joint, the inertia of rotors that the gait was planned with: it is played with the same.
         repeats: a gait is one step, whose mirror image is the next one.
     """
     full = load_robot(robot)
-    playback = Playback(
-        robot=nao(robot, rotational_inertia=True), gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats
-    )
+    played = replace(nao(robot, rotational_inertia=True), armatures_kgm2=armatures_kgm2)
+    playback = Playback(robot=played, gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats)
     return replace(problem, robot=full, skeleton=skeleton(full), playback=playback)

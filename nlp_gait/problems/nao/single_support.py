@@ -26,7 +26,7 @@ from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import zmp_of_wrench
+from nlp_gait.symbolic.balance import below, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, plus, stack
@@ -65,10 +65,10 @@ def nao_ssp(
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    model = nao(robot, rotational_inertia)
+    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    model = real.model
     stance, foot = stance_of(model, step_length_m), model.feet["left"]
     splines = Splines(trajectory=trajectory, units=UNITS)
-    real = Motors.parsed(motors, model)
 
     def path(at: InstantPoint, s: SX) -> SX:
         return _swing(at, stance, splines.motions(at, single_support_duration(at), s), 0.0, s).position
@@ -172,11 +172,11 @@ def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -
     foot = robot.feet["left"]
     tree, upright = tree_from(robot, foot.link), upright_links(robot) if upright is None else upright
 
-    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX]) -> Loads:
+    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
         q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
         torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
-        return Loads(torques, feet["L"] + offset)
+        return Loads(torques, feet["L"] + offset, {"L": below(wrench, foot.ankle_height_m), "R": SX(6, 1)})
 
     return loads
 

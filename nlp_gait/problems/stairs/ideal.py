@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from math import inf
@@ -17,6 +18,7 @@ from nlp_gait.problems.stairs.formulas.gait import Stair, StairPlan
 from nlp_gait.problems.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.problems.stairs.formulas.posture import posture
 from nlp_gait.problems.stairs.ideal_model import AXES, IdealModel
+from nlp_gait.problems.stairs.playback import Performance, playback, standing
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
 from nlp_gait.problems.stairs.stair import (
@@ -51,6 +53,7 @@ PLAN = {
 }
 HIP_BEHIND = 0.08  # the hip starts so far behind the middle of the rear tread [m]
 REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stretched leg
+FINE_INTERVALS = 1000  # of a gait that is played
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
@@ -113,6 +116,31 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
             columns=COLUMNS,
         )
 
+    def performance(at: NumericPoint) -> Performance:
+        values = layout.values(at.x.full().ravel())
+        step = float(at["step_time_s"]) / intervals
+        per_interval = math.ceil(FINE_INTERVALS / intervals)
+        since = np.tile(np.arange(per_interval) * step / per_interval, intervals)
+        # The last instant ends the last interval.
+        which = np.append(np.repeat(np.arange(intervals), per_interval), intervals - 1)
+        since = np.append(since, step)[:, None]
+        q, qd, qdd = (values[name].T[which] for name in ("angle", "rate", "acceleration"))
+
+        def borne(name: str) -> Array:
+            force = np.zeros((intervals, 2))
+            force[: values[name].shape[1]] = values[name].T
+            return force[which]
+
+        return standing(
+            which * step + since[:, 0],
+            q + qd * since + qdd * since**2 / 2,
+            qd + qdd * since,
+            qdd,
+            borne("toe_force"),
+            borne("sole_force"),
+            toe_off * step,
+        )
+
     return GaitProblem(
         name="stairs-ideal",
         title="Stairs, full trajectory optimisation: least effort",
@@ -123,6 +151,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         grid=Grid(intervals=intervals),
         motion=motion,
         skeleton=skeleton,
+        playback=playback(performance, repeats=True),
         start=start,
         starts=3,
         searchable=False,

@@ -29,6 +29,7 @@ from nlp_gait.problems.stairs.formulas.gait import PHASES
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.problems.stairs.plan_samples import PlannedStep, PlanSamples
+from nlp_gait.problems.stairs.playback import Performance, playback, standing, whole_force
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
 from nlp_gait.problems.stairs.stair import (
@@ -68,6 +69,8 @@ SCATTER = 0.1
 # Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
 # square of the intervals in a phase is kept in reserve [m]; a millimetre on the usual grid.
 SAMPLING_RESERVE = 0.1
+
+FINE_INTERVALS = 250  # of each phase of a gait that is played
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
@@ -121,6 +124,16 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
         return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=COLUMNS)
 
+    def performance(at: NumericPoint) -> Performance:
+        fine = PlannedStep(per_phase=FINE_INTERVALS).samples(at, Exact())
+        t, q, qd, qdd, stance = (
+            np.array(ca.evalf(part)).T for part in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
+        )
+        new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
+        t, q, qd, qdd, stance = (part[new] for part in (t, q, qd, qdd, stance))
+        toe = whole_force(q, qd, qdd) - stance
+        return standing(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
+
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
@@ -133,6 +146,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         grid=Grid(intervals=intervals, refined_by="intervals"),
         motion=motion,
         skeleton=skeleton,
+        playback=playback(performance),
     )
 
 

@@ -27,6 +27,7 @@ from nlp_gait.problem import (
 from nlp_gait.problems.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
+from nlp_gait.problems.stairs.playback import Performance, driven, playback
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.skeleton import skeleton
 from nlp_gait.problems.stairs.stair import COLUMNS, STAIR_PARAMETERS, rows, within
@@ -144,6 +145,11 @@ def stairs_track(
             },
         )
 
+    def performance(at: NumericPoint) -> Performance:
+        arrays = motion(at).arrays
+        state = np.hstack([arrays["q"], arrays["qd"]])
+        return driven(arrays["t"], state, arrays["tau"], arrays["zmp"], float(at["t2_s"]))
+
     return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
@@ -156,6 +162,7 @@ def stairs_track(
         long_derivatives=True,
         motion=motion,
         skeleton=skeleton,
+        playback=playback(performance),
     )
 
 

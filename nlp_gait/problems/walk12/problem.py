@@ -25,6 +25,7 @@ from nlp_gait.problem import (
 )
 from nlp_gait.problems.walk12.locomotion import locomotion
 from nlp_gait.problems.walk12.model import Zmp, legs, reaches, zero_moment_point
+from nlp_gait.problems.walk12.playback import playback
 from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
 from nlp_gait.problems.walk12.skeleton import skeleton
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -99,6 +100,7 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
         grid=Grid(intervals=intervals, refined_by="intervals"),
         motion=motion,
         skeleton=skeleton(robot),
+        playback=playback(robot, zmp),
         hessian="limited-memory",  # from 640 random starts all converge; of those with the exact one, 5 fail
     )
 

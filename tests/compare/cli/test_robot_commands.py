@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.compare.cli.calls import nlp_gait, one_sentence, process
 
@@ -53,6 +54,8 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
         (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
         (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
         (["simulate", "GAIT", "--viewer", "--video", "walk.gif"], ["exclude each other"]),
+        (["simulate", "GAIT", "--beside", "GAIT"], ["name the film with --video"]),
+        (["simulate", "GAIT", "--video", "walk.gif", "--size", "huge"], ["WIDTHxHEIGHT", "'huge'"]),
     ],
 )
 def test_bad_input_is_one_sentence(gait, arguments, words):
@@ -80,8 +83,12 @@ def test_a_film_is_made_without_a_display(gait, tmp_path):
     pytest.importorskip("mujoco")
     film = tmp_path / "film.gif"
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
-    done = process("simulate", gait, "--video", film, "--fps", "4")
+    options = ["--video", film, "--beside", gait, "--fps", "2", "--speed", "0.5", "--size", "480x270"]
+    done = process("simulate", gait, *options)
     if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
         pytest.skip("no off-screen graphics here")
     assert done.returncode == 0, done.stderr
-    assert "stays up" in done.stdout and film.stat().st_size > 20_000
+    assert done.stdout.count("stays up") == 2 and f"wrote {film}" in done.stdout.replace("\n", "")
+    with Image.open(film) as image:
+        assert image.size == (480, 270) and image.info["duration"] == 500
+        assert image.n_frames == 6  # 1.5 s with the settling, at half the speed, two a second

@@ -70,6 +70,29 @@ def test_the_command_walks(tmp_path: Path) -> None:
     assert gait["walk"]["steps_done"] == 2 and not gait["walk"]["measurements"]["fallen"]
     assert gait["walk"]["walked_m"] == pytest.approx(gait["walk"]["planned_m"], rel=0.3)
     assert (tmp_path / "nao-cycle-cost.png").exists() and (tmp_path / "nao-cycle.svg").exists()
+    page = (tmp_path / "nao-cycle-walk.md").read_text()
+    assert "Energy of 2 steps in the physics engine" in page and "1 gait was played, none fell" in page
+    error = gait["walk"]["engine_J_per_planned_m"] / gait["walk"]["model_J_per_m"] - 1.0
+    assert f"{100 * error:+.2f} %" in page
+
+
+def test_the_engine_plays_ten_steps_unless_it_is_told_otherwise(
+    gaits: list[Gait], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    from compare.questions.walk import study as question
+
+    played: list[int] = []
+
+    def fake(spec: ProblemSpec, gait: Gait, steps: int, *_: object) -> Gait:
+        played.append(steps)
+        return gait
+
+    monkeypatch.setattr(question, "optimal_gaits", lambda *_, **__: list(gaits[:1]))
+    monkeypatch.setattr(question, "played", fake)
+    for options in (["--engine"], ["--engine", "--steps", "3"]):
+        assert CliRunner().invoke(app, ["walk", "--intervals", "2", "--out", str(tmp_path), *options]).exit_code == 0
+    assert played == [10, 3]
 
 
 def test_an_interrupted_walk_keeps_what_was_found(

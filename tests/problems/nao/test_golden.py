@@ -154,7 +154,7 @@ def test_options_that_make_no_problem_are_refused(name: str, options: dict[str, 
 
 
 def test_an_unknown_torso_share_is_refused() -> None:
-    with pytest.raises(InputError, match="torso_share must be one of printed, lever, got 'half'"):
+    with pytest.raises(InputError, match="torso_share must be one of printed, lever, free, got 'half'"):
         load("nao-dsp", torso_share="half")
 
 

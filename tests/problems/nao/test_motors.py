@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,6 +128,41 @@ def test_an_index_keeps_the_papers_power() -> None:
 def test_nonsense_is_refused(features: str, error: type[Exception], said: str) -> None:
     with pytest.raises(error, match=said):
         load("nao-ssp", motors=features)
+
+
+def test_both_are_played_with_the_rotors_that_the_gait_was_planned_with() -> None:
+    for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
+        plain, heavy = load(name).playback, load(name, motors="rotor").playback
+        assert plain is not None and not plain.robot.armatures_kgm2
+        assert heavy is not None and heavy.robot.armatures_kgm2["LKneePitch"] == pytest.approx(4.2e-7 * 130.85**2)
+        assert heavy.robot.armatures_kgm2["RAnkleRoll"] == pytest.approx(4.2e-7 * 201.3**2)
+        assert heavy.robot.armatures_kgm2["LHipYawPitch"] == pytest.approx(4.2e-7 * 201.3**2 / 2)  # one motor for two
+
+
+def test_a_robot_whose_rotors_are_unknown_is_refused(tmp_path: Path) -> None:
+    data = json.loads((resources.files("nlp_gait.robots") / "data" / "nao-v5.json").read_text())
+    del data["joints"]["LKneePitch"]["motor"]["rotor_inertia_gcm2"]
+    path = tmp_path / "unknown.json"
+    path.write_text(json.dumps(data))
+    load("nao-ssp", robot=str(path), motors="limits")
+    with pytest.raises(InputError, match="'LKneePitch' has no rotor_inertia_gcm2"):
+        load("nao-ssp", robot=str(path), motors="rotor")
+
+
+@pytest.mark.slow
+def test_a_cycle_pays_for_its_rotors_and_real_motors() -> None:
+    """Energy of the cycle from its time histories: with free braking and rotors, phase by phase."""
+    problem = load("nao-cycle", motors="rotor,free-braking")
+    x = (problem.lower + problem.upper) / 2
+    x[problem.names.index("single_support_time_s")] = 0.4  # accelerations large enough for rotors to matter
+    signals = problem.signals(x)
+    torque, rate, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
+    power = (np.maximum(torque * rate, 0.0) + 0.025 * torque**2).sum(axis=1)
+    single = evaluated(problem, x).indexes["ssp_power_W"]
+    assert single == pytest.approx(float(mean(power[:11])), rel=1e-9)
+    assert t[10] == pytest.approx(0.4)
+    light = evaluated(load("nao-cycle", motors="free-braking"), x).indexes["ssp_power_W"]
+    assert abs(single / light - 1.0) > 0.01
 
 
 def test_another_objective_has_no_power_to_change() -> None:

@@ -124,11 +124,18 @@ class Motion:
         foot = self.right_foot(self.t)
         if foot[:, 2].max() < LIFTED and np.ptp(foot[:, :2], axis=0).max() < LIFTED:
             return {"dsp": (0.0, end)}
-        landed = np.linalg.norm(foot - foot[-1], axis=1) < STILL
-        first = int(np.flatnonzero(~landed)[-1]) + 1
-        if end - self.t[first] < LEAST_SHARE * end:
+        landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1))
+        if end - landing < LEAST_SHARE * end:
             return {"ssp": (0.0, end)}
-        return {"ssp": (0.0, float(self.t[first])), "dsp": (float(self.t[first]), end)}
+        return {"ssp": (0.0, landing), "dsp": (landing, end)}
+
+    def _landing(self, distance: Array) -> float:
+        """When a foot lands, from its distance to where it ends (T,) [m]: a swing that ends at rest comes in as a parabola."""
+        last = int(np.flatnonzero(distance >= STILL)[-1])
+        before = max(last - 2, 0)
+        near, far = np.sqrt(distance[[last, before]])
+        late = 0.0 if far <= near else near * (self.t[last] - self.t[before]) / (far - near)
+        return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
 
 
 def motion_of(angles: JointAngles, robot: Robot) -> Motion:

@@ -14,7 +14,7 @@ from casadi import DM, MX, SX
 from nlp_gait.problem import Array, Constraint, NumericPoint, Parameter, Point, Signals, Variable
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.parts import Contribution, Part, rows
-from nlp_gait.problems.biped.phase import COLUMNS, Phase
+from nlp_gait.problems.biped.phase import BOTH_FEET, COLUMNS, WRENCHES, Phase
 from nlp_gait.problems.biped.samples import LEAST_DURATION, Samples
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.free_joints import KNEES
@@ -59,8 +59,8 @@ class RecordedPhase(Phase):
         Traces: ``hip`` (3, N + 1) and ``hip_rate``, ``heights`` (4, N + 1) of the right sole's corners, ``ground`` (2, N + 1),
         the right sole's place [m, m/s].
         """
-        q, qd, qdd = self._angles(at)
-        torque, zmp, hip, hip_rate, ankle, corners, _ = self._instant.map(self.grid.parts + 1)(q, qd, qdd)
+        q, qd, qdd = (MX(part) for part in self._angles(at))
+        torque, zmp, hip, hip_rate, ankle, corners, *_ = self._instant.map(self.grid.parts + 1)(q, qd, qdd)
         rows_of = [JOINTS.index(name) for name in self.moving]
         planned = [JOINTS.index(name) for name in PLANNED_JOINTS]
         return Samples(
@@ -87,7 +87,7 @@ class RecordedPhase(Phase):
         """Time histories at a point of numbers; a sole that is as good as on the ground is on it."""
         q, qd, qdd = self._angles(at)
         n = self.grid.parts + 1
-        torque, zmp, hip, _, ankle, _, com = (
+        torque, zmp, hip, _, ankle, _, com, *wrenches = (
             np.asarray(DM(part).full().T) for part in self._instant.map(n)(q, qd, qdd)
         )
         support, right = np.array(self.recorded.support), self.robot.feet["right"]
@@ -103,6 +103,7 @@ class RecordedPhase(Phase):
             "com": com,
             "left_foot": left_foot,
             "right_foot": right_foot,
+            **dict(zip(WRENCHES, (half for wrench in wrenches for half in np.hsplit(wrench, 2)), strict=True)),
         }
         return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS)
 
@@ -112,20 +113,21 @@ class RecordedPhase(Phase):
         times = np.linspace(0.0, recorded.duration_s, n)
         speed = recorded.duration_s / ca.fmax(at[self.duration], LEAST_DURATION)
         q, qd, qdd = (DM(recorded.spline(times, order).T) for order in range(3))
-        return MX(q), qd * speed, qdd * speed**2
+        return q, qd * speed, qdd * speed**2
 
     @cached_property
     def _instant(self) -> ca.Function:
-        """One sample: from angles and derivatives (22,) to torques, ZMP, hip with its rate, right ankle, its sole, com."""
+        """One sample: from angles and derivatives (22,) to what ``samples`` and ``signals`` read, in the order of the outputs."""
         q, qd, qdd = (SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd"))
         torso, ankle, corners, _ = self.recorded.places(q)
         motions = {name: trajectories.Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(JOINTS)}
-        loads = self.loads(motions, torso, {"L": SX(DM(self.recorded.support[:2])), "R": ankle[:2]})
+        loads = self.loads(motions, torso, {"L": SX(DM(self.recorded.support[:2])), "R": ankle[:2]}, SX(0, 1))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         tree = tree_from(self.robot, self.robot.feet["left"].link)
         angles = dict(zip(JOINTS, ca.vertsplit(q), strict=True))
         com = centre_of_mass(tree, forward_kinematics(tree, angles, SX(DM(self.recorded.support))))
         outputs = [torque, loads.zmp, torso, ca.jtimes(torso, q, qd), ankle, ca.vec(corners), com]
+        outputs += [loads.wrenches[side] for side in BOTH_FEET]
         return ca.Function("instant", [q, qd, qdd], economical(outputs))
 
 

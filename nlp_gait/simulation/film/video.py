@@ -51,13 +51,13 @@ def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> Non
 def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
     from PIL import Image
 
-    images = [
+    images = (
         Image.fromarray(frame).quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         for frame in frames
-    ]
+    )
     duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
-    images[0].save(
-        path, format="GIF", save_all=True, append_images=images[1:], duration=duration_ms, loop=0, optimize=True
+    next(images).save(
+        path, format="GIF", save_all=True, append_images=images, duration=duration_ms, loop=0, optimize=True
     )
 
 

@@ -1,0 +1,84 @@
+"""What balance feedback buys where the world or the robot is not as planned, and what hangs on its settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from benchmarks.engine.agreement import STEPS
+from benchmarks.engine.gaits import optimal_cycles
+from benchmarks.engine.markdown import cells, header
+from benchmarks.engine.sensitivity import SPEED
+from nlp_gait.simulation.conditions import Conditions, Push
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.feedback import Feedback
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.robustness import DIRECTIONS
+from nlp_gait.simulation.walking import Walk, measure_walk
+
+SLOPE = math.radians(3.0)
+IMPULSE = 1.0  # [N s]
+CONDITIONS: Mapping[str, Conditions] = {
+    "as planned": Conditions(),
+    **{
+        f"floor rises 3 degrees {way}": Conditions(slope_rad=(x * SLOPE, y * SLOPE))
+        for way, (x, y) in DIRECTIONS.items()
+    },
+    "friction 0.4": Conditions(friction=0.4),
+    "mass +5 %": Conditions(mass_factor=1.05),
+    "servo stiffness -30 %": Conditions(stiffness_factor=0.7),
+    "servo stiffness +30 %": Conditions(stiffness_factor=1.3),
+    **{
+        f"push of {IMPULSE:g} N s {way}": Conditions(push=Push(impulse_Ns=(x * IMPULSE, y * IMPULSE)))
+        for way, (x, y) in DIRECTIONS.items()
+    },
+}
+DEFAULT = Feedback()
+VARIANTS: Mapping[str, Feedback | None] = {
+    "open loop": None,
+    "default": DEFAULT,
+    "another seed": replace(DEFAULT, seed=1),
+    "ideal sensors": replace(DEFAULT.with_noise(0.0), delay_s=0.0),
+    "twice the noise": DEFAULT.with_noise(2.0),
+    "delay 20 ms": replace(DEFAULT, delay_s=0.02),
+    "half the springs and dampers": DEFAULT.with_strength(0.5),
+    "twice the springs and dampers": DEFAULT.with_strength(2.0),
+    "no growth": replace(DEFAULT, growth_per_s=0.0),
+    "growth without limit": replace(DEFAULT, growth_limit=1e3),
+}
+FEW_STEPS = 4
+HARD = ("as planned", "floor rises 3 degrees backward", "servo stiffness -30 %", f"push of {IMPULSE:g} N s left")
+
+
+def walked(steps: int, conditions: Conditions, feedback: Feedback | None) -> Walk:
+    """So many steps of the cheapest cycle at ``SPEED``."""
+    plan, drive = plan_of(optimal_cycles((SPEED,))[SPEED], steps), Drive(feedback=feedback)
+    return measure_walk(plan, play(plan, conditions, drive), drive, steps)
+
+
+def told(walk: Walk) -> tuple[str, str, str]:
+    """Steps done, energy, and the share of the way."""
+    energy, way = walk.engine_J_per_planned_m, walk.walked_m
+    return (
+        f"{walk.steps_done} of {walk.steps}",
+        "-" if energy is None else f"{energy:.1f}",
+        "-" if way is None else f"{way / walk.planned_m:.3f}",
+    )
+
+
+def disturbed() -> Iterator[str]:
+    """Ten steps of the cheapest cycle at 0.05 m/s, in open loop and with balance feedback: J per planned metre."""
+    columns = ("steps", "J/m", "way")
+    yield header("condition", *(f"open loop: {columns[0]}", *columns[1:]), *(f"feedback: {columns[0]}", *columns[1:]))
+    for label, conditions in CONDITIONS.items():
+        yield cells(label, *(text for own in (None, DEFAULT) for text in told(walked(STEPS, conditions, own))))
+
+
+def settings() -> Iterator[str]:
+    """Four steps with other settings of the feedback: J per planned metre, largest tilt."""
+    yield header("feedback", *HARD)
+    for label, feedback in VARIANTS.items():
+        walks = [walked(FEW_STEPS, CONDITIONS[name], feedback) for name in HARD]
+        yield cells(label, *(f"{told(walk)[1]}, {walk.measurements.largest_tilt_deg:.1f} deg" for walk in walks))

@@ -1,0 +1,212 @@
+"""Balance feedback: a virtual spring that pulls the torso to where it was planned, felt by sensors with noise and delay."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array
+from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.plan import SIDES, Plan
+
+STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
+NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feedback:
+    """A spring and a damper between the torso and its planned place over the feet, and between both attitudes.
+
+    Force and moment reach the ground through the legs that are planned to stand, each with its planned share of the load, and
+    are added to the set-points as torque / stiffness. Across the ground it is a controller of the divergent component of
+    motion x + v / w of a pendulum of height h with w^2 = g / h: with gain k a spring of m w^2 k and a damper of m w k, which
+    are 480 N/m and 78 N s/m for NAO's 5.3 kg, h = 0.26 m and k = 2.4.
+
+    Attributes:
+        spring_N_per_m: towards the planned place.
+        damper_Ns_per_m: towards the planned velocity.
+        tilt_spring_Nm_per_rad: towards the planned attitude.
+        tilt_damper_Nms_per_rad: against turning.
+        growth_per_s: share of force and moment by which they grow each second for as long as they last.
+        growth_limit: of what has grown, along each axis: of the force as a share of the weight, of the moment as that share of
+            the weight at the height of the torso; 0.05 holds the robot on a slope of 3 degrees, and a push adds no more.
+        period_s: between two measurements, each of which acts until the next.
+        delay_s: from a measurement to the servos: one more cycle of the controller.
+        position_noise_m: standard deviation of the measured place of the torso over the feet.
+        velocity_noise_m_s: of its velocity.
+        tilt_noise_rad: of its attitude about each axis.
+        rate_noise_rad_s: of its rates.
+        seed: of the noise; the same seed, the same walk.
+
+    Source:
+        Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
+        controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral. Noise: joint sensors that round to 0.1 degrees
+        (data sheet), three in a row, over 0.3 m of leg and over 30 ms; the gyrometer's 10 mrad/s and the growth are
+        assumptions. `python -m benchmarks.engine feedback` shows what hangs on all of them.
+    """
+
+    spring_N_per_m: float = 500.0
+    damper_Ns_per_m: float = 50.0
+    tilt_spring_Nm_per_rad: float = 30.0
+    tilt_damper_Nms_per_rad: float = 2.0
+    growth_per_s: float = 2.0
+    growth_limit: float = 0.05
+    period_s: float = 0.01
+    delay_s: float = 0.01
+    position_noise_m: float = 2.5e-4
+    velocity_noise_m_s: float = 0.012
+    tilt_noise_rad: float = 1e-3
+    rate_noise_rad_s: float = 0.01
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Finite numbers, none below zero, a period above it."""
+        for name in self.__slots__:
+            value = getattr(self, name)
+            least = "> 0" if name == "period_s" else ">= 0"
+            if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and least == ">= 0"))):
+                raise InputError(f"{name} of a feedback must be {least}, got {value!r}")
+
+    def with_strength(self, factor: float) -> Feedback:
+        """The same with so many times the springs and dampers."""
+        return replace(self, **{name: factor * getattr(self, name) for name in STRENGTHS})
+
+    def with_noise(self, factor: float) -> Feedback:
+        """The same with so many times the noise."""
+        return replace(self, **{name: factor * getattr(self, name) for name in NOISES})
+
+
+# By name; none is the default of every drive.
+FEEDBACKS = {"none": None, "torso-spring": Feedback()}
+
+
+class Measured(NamedTuple):
+    """What the sensors say of the torso at one instant.
+
+    Attributes:
+        step: of the engine.
+        place: (3,) of its origin over the feet, each foot counted with its planned share of the load [m].
+        velocity: (3,) [m/s].
+        attitude: (3, 3) turn from its axes to those of the floor.
+        tilt_error: (3,) of the attitude, about the axes of the floor [rad].
+        rate: (3,) about the axes of the floor [rad/s].
+    """
+
+    step: int
+    place: Array
+    velocity: Array
+    attitude: Array
+    tilt_error: Array
+    rate: Array
+
+
+class Balance:
+    """The feedback at work in one simulation.
+
+    Args:
+        feedback: its settings.
+        plan: what it holds on to.
+        stiffness: (J,) of the servos as their driver assumes it [Nm/rad].
+        model: of the engine.
+    """
+
+    def __init__(self, feedback: Feedback, plan: Plan, stiffness: Array, model: Any) -> None:
+        self._feedback, self._plan, self._stiffness, self._model = feedback, plan, stiffness, model
+        self._engine = mujoco()
+        self._posture = self._engine.MjData(model)  # planned angles under an upright torso at the origin
+        joints = [model.joint(name) for name in plan.joints]
+        self._angles = [joint.qposadr[0] for joint in joints]
+        self._rates = [joint.dofadr[0] for joint in joints]
+        self._torso = model.body(plan.robot.root).id
+        self._soles = [model.site(side).id for side in SIDES]
+        step_s = model.opt.timestep
+        self._every, self._late = max(1, round(feedback.period_s / step_s)), round(feedback.delay_s / step_s)
+        self._noise = np.random.default_rng(feedback.seed)
+        self._waiting: deque[Measured] = deque()
+        self._steps = 0
+        self._shift = np.zeros(len(joints))
+        self._lasting = np.zeros(6)  # force [N] and moment [Nm] that have grown
+        weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
+        self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
+
+    def shift(self, data: Any) -> Array:
+        """What is added to the set-points (J,) in this step of the engine [rad]; to be called once in each."""
+        if self._steps % self._every == 0:
+            self._waiting.append(self._measured(data))
+        if self._waiting and self._waiting[0].step + self._late <= self._steps:
+            self._shift = self._torques(self._waiting.popleft()) / self._stiffness
+        self._steps += 1
+        return self._shift
+
+    def _time(self, step: int) -> Array:
+        return np.array([step * self._model.opt.timestep])
+
+    def _measured(self, data: Any) -> Measured:
+        settings, noise = self._feedback, self._noise.standard_normal((4, 3))
+        turning = np.zeros(6)  # rates, then velocity, along the floor's axes
+        body = self._engine.mjtObj.mjOBJ_XBODY
+        self._engine.mj_objectVelocity(self._model, data, body, self._torso, turning, 0)
+        share = load_shares(self._plan, self._time(self._steps))[0]
+        return Measured(
+            step=self._steps,
+            place=data.xpos[self._torso] - share @ data.site_xpos[self._soles] + settings.position_noise_m * noise[0],
+            velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
+            attitude=data.xmat[self._torso].reshape(3, 3).copy(),
+            tilt_error=settings.tilt_noise_rad * noise[2],
+            rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
+        )
+
+    def _torques(self, seen: Measured) -> Array:
+        """(J,) of the joints that give the springs' force and moment [Nm]."""
+        settings, plan, at = self._feedback, self._plan, self._time(seen.step)
+        share = load_shares(plan, at)[0]
+        planned, soles = self._planned_posture(at, int(share[1] > share[0]))
+        feet = np.stack([plan.at(f"{side}_foot", at)[0] for side in SIDES])
+        place = plan.at("hip", at)[0] - share @ feet
+        force = settings.spring_N_per_m * (place - seen.place)
+        force += settings.damper_Ns_per_m * (plan.rate("hip", at)[0] - seen.velocity)
+        moment = settings.tilt_spring_Nm_per_rad * (rotation_vector(planned @ seen.attitude.T) - seen.tilt_error)
+        moment -= settings.tilt_damper_Nms_per_rad * seen.rate
+        wrench = np.concatenate([force, moment])
+        grown = self._lasting + settings.growth_per_s * settings.period_s * wrench
+        self._lasting = np.clip(grown, -self._most, self._most)
+        wrench += self._lasting
+        force, moment = planned.T @ wrench[:3], planned.T @ wrench[3:]  # in the torso's planned axes
+        torques = np.zeros(len(self._rates))
+        moving, turning = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
+        for part, sole, foot in zip(share, self._soles, soles, strict=True):
+            if part > 0.0:  # with this foot held, the torso moves against the foot's motion under a held torso
+                self._engine.mj_jacSite(self._model, self._posture, moving, turning, sole)
+                at_foot = moment - np.cross(foot, force)
+                torques -= part * (moving[:, self._rates].T @ force + turning[:, self._rates].T @ at_foot)
+        return torques
+
+    def _planned_posture(self, at: Array, standing: int) -> tuple[Array, Array]:
+        """Planned attitude (3, 3) of the torso, by the flat sole that stands, and soles (2, 3) in the torso's axes [m]."""
+        posture = self._posture
+        posture.qpos[:] = self._model.qpos0
+        posture.qpos[self._angles] = self._plan.at("q", at)[0]
+        self._engine.mj_kinematics(self._model, posture)
+        self._engine.mj_comPos(self._model, posture)
+        attitude = posture.site_xmat[self._soles[standing]].reshape(3, 3).T
+        return attitude, posture.site_xpos[self._soles] - posture.xpos[self._torso]
+
+
+def load_shares(plan: Plan, times: Array) -> Array:
+    """Planned shares of the load of the left and the right foot (T, 2); two standing feet share it as the ZMP divides the way."""
+    left, right = (plan.at(f"{side}_foot", times)[:, :2] for side in SIDES)
+    on_left, on_right = (plan.stands(side, times) for side in SIDES)
+    apart = left - right
+    between = ((plan.at("zmp", times) - right) * apart).sum(axis=1) / (apart**2).sum(axis=1)
+    share = np.where(on_right == 0.0, 1.0, np.where(on_left == 0.0, 0.0, np.clip(between, 0.0, 1.0)))
+    return np.stack([share, 1.0 - share], axis=1)
+
+
+def rotation_vector(turn: Array) -> Array:
+    """(3,) axis times angle of a small rotation matrix (3, 3), to first order [rad]."""
+    return np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0

@@ -1,0 +1,1 @@
+"""The simulated robot as films, and in MuJoCo's own window."""

@@ -1,0 +1,195 @@
+"""The simulated robot seen from several sides, drawn off the screen."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.errors import OutputError
+from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.film.recording import Recording
+from nlp_gait.simulation.film.video import Frame
+
+# By name: azimuth and elevation of the camera [degrees], and the height that it sees in heights of the robot.
+CAMERAS = {
+    "side": (90.0, -9.0, 1.4),
+    "front": (180.0, -9.0, 1.4),
+    "back": (0.0, -9.0, 1.4),
+    "above": (90.0, -90.0, 0.6),
+}
+NARROWEST = 0.75  # width over height of a view below which the camera steps back
+ARROW_HEIGHT = 0.45  # of the robot, for a force on the floor as large as its weight
+FORCE, MEASURED, PLANNED = (0.0, 0.62, 0.45, 0.9), (0.05, 0.05, 0.05, 1.0), (0.8, 0.47, 0.65, 1.0)
+DOT, ARROW_RADIUS = 0.012, 0.008  # of the robot's height
+DOTS_ABOVE = 0.05  # of the robot's height: over the soles
+FLAT = 0.0002  # [m]
+TRAIL = 25  # earlier centres of pressure that are shown
+MOST_GEOMETRIES = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """Part of a picture [pixels]; the origin is its upper left corner.
+
+    Attributes:
+        name: side, front, back or above.
+        left: edge.
+        top: edge.
+        width: positive.
+        height: positive.
+    """
+
+    name: str
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+def stairs(model: Any) -> Any:
+    """Which geometries of the engine's model are boxes that stand on the floor."""
+    return (model.geom_bodyid == 0) & (model.geom_type == mujoco().mjtGeom.mjGEOM_BOX)
+
+
+class Stage:
+    """Draws pictures of one recording; to be closed."""
+
+    def __init__(self, recording: Recording, views: Sequence[View], width: int, height: int) -> None:
+        """Get a drawing surface.
+
+        Raises:
+            OutputError: this machine has no way to draw off the screen.
+        """
+        self._engine = engine = mujoco(pictures=True)
+        self._recording, self._views, self._size = recording, views, (width, height)
+        model = recording.model
+        self._data = engine.MjData(model)
+        self._pose(0)
+        moving = model.geom_bodyid > 0
+        self._height = float((self._data.geom_xpos[moving, 2] + model.geom_rbound[moving]).max())
+        self._weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._surface: Any = None
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the failure itself says enough
+                self._surface = engine.GLContext(width, height)
+                self._surface.make_current()
+                self._context = engine.MjrContext(model, engine.mjtFontScale.mjFONTSCALE_100)
+        except Exception as error:  # whatever the graphics driver raises
+            self.close()
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise OutputError(
+                f"pictures cannot be drawn off the screen ({reason}); "
+                "set MUJOCO_GL=egl or MUJOCO_GL=osmesa, if installed"
+            ) from error
+        engine.mjr_setBuffer(engine.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self._scene = engine.MjvScene(model, maxgeom=MOST_GEOMETRIES)
+        self._whole, self._soles = engine.MjvOption(), engine.MjvOption()
+        self._soles.geomgroup[1:] = 0
+
+    def picture(self, k: int) -> Frame:
+        """All views at one instant, (height, width, 3)."""
+        engine, (width, height) = self._engine, self._size
+        self._pose(k)
+        self._surface.make_current()
+        for view in self._views:
+            above = view.name == "above"
+            engine.mjv_updateScene(
+                self._recording.model,
+                self._data,
+                self._soles if above else self._whole,
+                None,
+                self._camera(view, k),
+                engine.mjtCatBit.mjCAT_ALL,
+                self._scene,
+            )
+            self._scene.flags[engine.mjtRndFlag.mjRND_SHADOW] = not above
+            (self._add_dots if above else self._add_force)(k)
+            # The engine's origin is the lower left corner.
+            area = engine.MjrRect(view.left, height - view.top - view.height, view.width, view.height)
+            engine.mjr_render(area, self._scene, self._context)
+        pixels = np.empty((height, width, 3), dtype=np.uint8)
+        engine.mjr_readPixels(pixels, None, engine.MjrRect(0, 0, width, height), self._context)
+        return pixels[::-1]
+
+    def close(self) -> None:
+        """Give the drawing surface back."""
+        if self._surface is not None:
+            self._surface.free()
+            self._surface = None
+
+    def _pose(self, k: int) -> None:
+        self._data.qpos[:] = self._recording.states[k]
+        self._engine.mj_kinematics(self._recording.model, self._data)
+        self._engine.mj_comPos(self._recording.model, self._data)
+        self._engine.mj_camlight(self._recording.model, self._data)
+
+    def _camera(self, view: View, k: int) -> Any:
+        """A camera that goes with the robot, not with its sway."""
+        camera = self._engine.MjvCamera()
+        camera.azimuth, camera.elevation, seen = CAMERAS[view.name]
+        path = self._recording.path
+        above, climbed = view.name == "above", max(0.0, path[k, 2] - path[0, 2])
+        x, y = self._recording.stand[k] if above else path[k, :2]
+        camera.lookat[:] = (x, y, climbed + (0.0 if above else 0.45 * self._height))
+        opening = math.tan(math.radians(float(self._recording.model.vis.global_.fovy)) / 2)
+        step_back = max(1.0, NARROWEST * view.height / view.width)
+        camera.distance = step_back * seen * self._height / (2 * opening)
+        return camera
+
+    def _add_force(self, k: int) -> None:
+        """The floor's force as an arrow from the centre of pressure."""
+        centre, load = self._recording.pressure[k], float(self._recording.load[k])
+        if not np.isfinite(centre).all() or load <= 0.0:
+            return
+        foot = np.array([*centre, self._ground(*centre) + 0.001])
+        tip = foot + (0.0, 0.0, ARROW_HEIGHT * self._height * load / self._weight)
+        geometry = self._new(self._engine.mjtGeom.mjGEOM_ARROW, FORCE)
+        if geometry is not None:
+            width = ARROW_RADIUS * self._height
+            self._engine.mjv_connector(geometry, self._engine.mjtGeom.mjGEOM_ARROW, width, foot, tip)
+
+    def _add_dots(self, k: int) -> None:
+        """Centre of pressure with its path, and the planned zero-moment point."""
+        self._add_dot(self._recording.planned[k], 1.5, PLANNED, -0.001)
+        begin = max(0, k - TRAIL)
+        for i, centre in enumerate(self._recording.pressure[begin : k + 1], begin):
+            share = 1.0 if i == k else 0.35
+            self._add_dot(centre, share, MEASURED, 0.001 if i == k else 0.0)
+
+    def _add_dot(self, centre: Any, share: float, colour: Sequence[float], over: float) -> None:
+        if np.isfinite(centre).all():
+            place = np.array([*centre, self._ground(*centre) + DOTS_ABOVE * self._height + over])
+            size = np.array([share * DOT * self._height, FLAT, 0.0])
+            self._new(self._engine.mjtGeom.mjGEOM_CYLINDER, colour, size, place)
+
+    def _ground(self, x: float, y: float) -> float:
+        """Height of the floor, or of the highest box that stands on it, under a point [m]."""
+        model = self._recording.model
+        boxes = stairs(model)
+        middles, halves = model.geom_pos[boxes], model.geom_size[boxes]
+        under = (np.abs(middles[:, :2] - (x, y)) <= halves[:, :2]).all(axis=1)
+        return float(max((middles[:, 2] + halves[:, 2])[under], default=0.0))
+
+    def _new(self, kind: Any, colour: Sequence[float], size: Any = None, place: Any = None) -> Any:
+        """A further geometry in the scene; None if it is full."""
+        scene = self._scene
+        if scene.ngeom >= scene.maxgeom:
+            return None
+        geometry = scene.geoms[scene.ngeom]
+        scene.ngeom += 1
+        self._engine.mjv_initGeom(
+            geometry,
+            kind,
+            np.zeros(3) if size is None else size,
+            np.zeros(3) if place is None else place,
+            np.eye(3).ravel(),
+            np.array(colour, dtype=np.float32),
+        )
+        return geometry

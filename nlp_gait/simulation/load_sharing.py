@@ -1,0 +1,253 @@
+"""Load shared anew in every double support of a given motion: the cheapest wrenches on both feet, by one convex QP each.
+
+The motion stays; so do torques in single support. Between two instants of the controller wrenches are linear in time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from scipy import sparse
+
+from nlp_gait.errors import InputError, MissingExtraError
+from nlp_gait.problem import Array, Signals
+from nlp_gait.problems.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
+from nlp_gait.problems.biped.phase import BOTH_FEET
+from nlp_gait.robots import Robot
+from nlp_gait.simulation.plan import SIDES, STANDING, Plan
+from nlp_gait.symbolic.balance import sole_limits
+from nlp_gait.symbolic.trajectories import Motion
+
+MOVED = ("q", "qd", "qdd")
+WRENCH = 6  # its components
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sharing:
+    """What sharing may do.
+
+    Attributes:
+        friction: coefficient of both soles on the ground.
+        load_rate_1_s: fastest change of a foot's load, in weights a second, from zero where it lands and to zero where it
+            lifts; infinite for a load that may jump.
+        period_s: between instants at which a wrench is chosen; NAO's own controller works in cycles of 10 ms.
+    """
+
+    friction: float = FRICTION_COEFFICIENT
+    load_rate_1_s: float = math.inf
+    period_s: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Positive numbers."""
+        for name in ("friction", "load_rate_1_s", "period_s"):
+            value = getattr(self, name)
+            if not value > 0.0:  # NaN fails too
+                raise InputError(f"{name} of a sharing of load must be > 0, got {value!r}")
+
+
+class Support(NamedTuple):
+    """Samples of one double support, the last one included, and the sides that land before and lift after it, if any do."""
+
+    first: int
+    last: int
+    landed: str | None
+    lifting: str | None
+
+
+class Instants(NamedTuple):
+    """Loads of n samples that are linear in the wrench w (6,) on the right sole: torque - gain w, left - carried w.
+
+    Attributes:
+        torque: (n, J) without it [Nm].
+        gain: (n, J, 6).
+        left: (n, 6) wrench on the left sole without it [N, Nm].
+        carried: (n, 6, 6).
+    """
+
+    torque: Array
+    gain: Array
+    left: Array
+    carried: Array
+
+
+def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
+    """The same motion with the torques of double support that need the least power, |torque rate| + K torque^2.
+
+    Args:
+        plan: of a gait with double support.
+        sharing: its settings.
+
+    Raises:
+        MissingExtraError: Clarabel is not installed.
+        InputError: there is no double support, or no division that soles, friction and rate allow, with its time.
+    """
+    sharing, arrays = sharing or Sharing(), {name: array.copy() for name, array in plan.signals.arrays.items()}
+    supports = list(double_supports(plan.signals))
+    if not supports:
+        raise InputError("this gait has no double support in which load could be shared")
+    for support in supports:
+        samples = slice(support.first, support.last + 1)
+        instants = instants_of(plan, samples)
+        right = _cheapest(plan, support, instants, sharing)
+        arrays["tau"][samples] = instants.torque - np.einsum("njk,nk->nj", instants.gain, right)
+        left = instants.left - np.einsum("njk,nk->nj", instants.carried, right)
+        for side, wrench in zip(SIDES, (left, right), strict=True):
+            arrays[f"{side}_force"][samples], arrays[f"{side}_moment"][samples] = wrench[:, :3], wrench[:, 3:]
+    return replace(plan, signals=replace(plan.signals, arrays=arrays))
+
+
+def double_supports(signals: Signals) -> Iterator[Support]:
+    """Where both soles stand still; the sample at which a foot lands still belongs to what was before."""
+    moves = {side: np.abs(np.diff(signals.arrays[f"{side}_foot"], axis=0)).max(axis=1) > STANDING for side in SIDES}
+    still = ~np.any(list(moves.values()), axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    for start, end in edges.reshape(-1, 2).tolist():
+        landed = next((side for side in SIDES if start > 0 and moves[side][start - 1]), None)
+        lifting = next((side for side in SIDES if end < len(still) and moves[side][end]), None)
+        if end - start > 1:
+            yield Support(start + (landed is not None), end, landed, lifting)
+
+
+def instants_of(plan: Plan, samples: slice) -> Instants:
+    """Loads of some of a plan's samples."""
+    arrays, joints = plan.signals.arrays, plan.joints
+    symbols = [SX.sym(name, len(joints)) for name in MOVED]
+    wrench = SX.sym("wrench", WRENCH)
+    motions = {name: Motion(*(part[i] for part in symbols)) for i, name in enumerate(joints)}
+    loader = planned_loads(plan.robot, plan.gravity, upright=())
+    # Where feet and hip are matters to the ZMP alone, which is the same for every division.
+    loads = loader(motions, SX(3, 1), {side: SX(2, 1) for side in BOTH_FEET}, wrench)
+    torque, left = ca.vertcat(*(loads.torques[name] for name in joints)), loads.wrenches["L"]
+    parts = [part for value in (torque, left) for part in (value, -ca.jacobian(value, wrench))]
+    function = ca.Function("loads", symbols, ca.substitute(parts, [wrench], [SX.zeros(WRENCH)]))
+    values = [arrays[name][samples] for name in MOVED]
+    n = len(values[0])
+    torques, gains, lefts, carried = (np.array(part) for part in function.map(n)(*(value.T for value in values)))
+    return Instants(
+        torques.T,
+        gains.reshape(len(joints), n, WRENCH).transpose(1, 0, 2),
+        lefts.T,
+        carried.reshape(WRENCH, n, WRENCH).transpose(1, 0, 2),
+    )
+
+
+def bearing_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
+    """Matrices (16, 6) by side: what they make of the wrench on a sole must not be negative."""
+    wrench, found = SX.sym("wrench", WRENCH), {}
+    for side in SIDES:
+        foot = robot.feet[side]
+        limits = sole_limits(wrench, (-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m), SX(friction))
+        found[side] = np.array(ca.evalf(ca.jacobian(ca.vertcat(*limits), wrench)))
+    return found
+
+
+def _cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing) -> Array:
+    """Wrenches (n, 6) on the right sole."""
+    samples = slice(support.first, support.last + 1)
+    t, rate = plan.signals.arrays["t"][samples], plan.signals.arrays["qd"][samples]
+    n, knots = len(t), max(2, math.ceil((t[-1] - t[0]) / sharing.period_s) + 1)
+    # Wrench of sample i = blend[i] @ knots: hat functions.
+    place = (t - t[0]) / (t[-1] - t[0]) * (knots - 1)
+    before = np.minimum(place.astype(int), knots - 2)
+    share = place - before
+    row = np.arange(n)
+    entries = (np.r_[1 - share, share], (np.r_[row, row], np.r_[before, before + 1]))
+    wrenches = sparse.kron(sparse.csr_matrix(entries, (n, knots)), sparse.identity(WRENCH), format="csr")
+    weights = np.gradient(t) / (t[-1] - t[0])
+    driven = np.flatnonzero(np.abs(instants.gain).max(axis=(0, 2)) > 0.0)  # joints between both feet
+    gain = sparse.block_diag(list(instants.gain[:, driven]), format="csr") @ wrenches
+    torque, speed = instants.torque[:, driven].ravel(), sparse.diags(rate[:, driven].ravel())
+    weight = np.repeat(weights, len(driven))
+    # min weight.(s + K tau^2) over knots and s >= |rate tau|, tau = torque - gain knots
+    heat = 2.0 * plan.heat_loss * sparse.diags(weight)
+    quadratic = sparse.block_diag([gain.T @ heat @ gain, sparse.csc_matrix((len(weight), len(weight)))], format="csc")
+    linear = np.concatenate([-(gain.T @ (heat @ torque)), weight])
+    bound, power = sparse.identity(len(weight)), speed @ torque
+    limits = [
+        (sparse.hstack([-(speed @ gain), -bound]), -power),
+        (sparse.hstack([speed @ gain, -bound]), power),
+        *_bearing(plan, instants, sharing, wrenches, len(weight)),
+        *_ramps(plan, support, instants, sharing, t, knots, place, len(weight)),
+    ]
+    matrix = sparse.vstack([left for left, _ in limits], format="csc")
+    right = np.concatenate([limit for _, limit in limits])
+    solution = _solved(quadratic, linear, matrix, right)
+    if solution is None:
+        raise InputError(
+            f"no division of the load keeps both soles flat between {t[0]:.3f} and {t[-1]:.3f} s with a friction of "
+            f"{sharing.friction:g} and a load rate of {sharing.load_rate_1_s:g} weights a second; allow more of either, or "
+            "plan with torso_share=free"
+        )
+    return np.asarray((wrenches @ solution[: knots * WRENCH]).reshape(n, WRENCH))
+
+
+Limit = tuple[Any, Array]  # rows of a sparse matrix, and what they may be at most
+
+
+def _bearing(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any, powers: int) -> Iterator[Limit]:
+    """What both soles bear, at every sample."""
+    rows = bearing_rows(plan.robot, sharing.friction)
+    n = len(instants.left)
+    left = sparse.block_diag(list(rows["left"] @ instants.carried), format="csr") @ wrenches
+    right = sparse.kron(sparse.identity(n), rows["right"], format="csr") @ wrenches
+    for matrix, most in ((left, (instants.left @ rows["left"].T).ravel()), (-right, np.zeros(n * len(rows["right"])))):
+        yield sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))]), most
+
+
+def _ramps(
+    plan: Plan,
+    support: Support,
+    instants: Instants,
+    sharing: Sharing,
+    t: Array,
+    knots: int,
+    place: Array,
+    powers: int,
+) -> Iterator[Limit]:
+    """How fast the load of each foot changes from knot to knot, and after landing and before lifting from zero on."""
+    if not math.isfinite(sharing.load_rate_1_s):
+        return
+    most = sharing.load_rate_1_s * plan.robot.mass_kg * plan.gravity * (t[-1] - t[0]) / (knots - 1)
+    pick = sparse.csr_matrix(
+        (np.ones(knots), (np.arange(knots), WRENCH * np.arange(knots) + 2)), (knots, WRENCH * knots)
+    )
+    total = np.interp(np.arange(knots), place, instants.left[:, 2])  # both feet's: the left one's without the right one
+    steps = sparse.diags([-np.ones(knots - 1), np.ones(knots - 1)], [0, 1], (knots - 1, knots))
+    loads = {"right": (pick, np.zeros(knots)), "left": (-pick, total)}  # matrix @ knots + what is left
+    for matrix, rest in loads.values():
+        change, own = steps @ matrix, steps @ rest
+        for sign in (1.0, -1.0):
+            yield _wide(sign * change, powers), most - sign * own
+    for side, knot in ((support.landed, 0), (support.lifting, knots - 1)):
+        if side is not None:
+            matrix, rest = loads[side]
+            yield _wide(matrix[knot], powers), np.array([most - rest[knot]])
+
+
+def _wide(matrix: Any, powers: int) -> Any:
+    return sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))])
+
+
+def _solved(quadratic: Any, linear: Array, matrix: Any, most: Array) -> Array | None:
+    """Minimum of x'Qx/2 + c'x with matrix x <= most; None if there is no such x.
+
+    Raises:
+        MissingExtraError: Clarabel is not installed.
+    """
+    try:
+        import clarabel
+    except ImportError as error:
+        raise MissingExtraError(
+            f"sharing load anew needs Clarabel ({error}); install it with pip install 'nlp-gait[qp]'"
+        ) from error
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.NonnegativeConeT(len(most))]
+    found = clarabel.DefaultSolver(sparse.triu(quadratic, format="csc"), linear, matrix, most, cones, settings).solve()
+    return np.array(found.x) if str(found.status) in ("Solved", "AlmostSolved") else None

@@ -1,0 +1,154 @@
+"""Gaits of a study played in the engine: each once, anew when something has changed, and read without the engine."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.study import engine, task
+from compare.study.engine import kept_plays, play_records
+from compare.study.record import RunRecord
+from compare.study.study import RECORDS
+from nlp_gait.errors import InputError
+from nlp_gait.files import write_json
+from nlp_gait.simulation.drive import DRIVES, Drive
+from tests.compare.records import record
+
+pytestmark = pytest.mark.slow  # gaits are played
+
+X = {
+    "hip_height_m": 0.31,
+    "hip_vz_start_m_s": -0.0008,
+    "hip_vz_end_m_s": -0.0055,
+    "hip_vx_start_m_s": 0.052,
+    "hip_vx_end_m_s": 0.001,
+    "hip_vy_start_m_s": -0.0367,
+    "hip_vy_end_m_s": -0.0424,
+    "double_support_time_s": 0.4,
+}
+
+
+def dsp(algorithm: str, power_W: float, time_s: float = 0.4) -> RunRecord:
+    made = record(algorithm, 0, [(10, power_W)], problem="nao-dsp")
+    return replace(made, x=X | {"double_support_time_s": time_s})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of two solvers with a gait each."""
+    pytest.importorskip("mujoco")
+    path = tmp_path_factory.mktemp("study")
+    (path / RECORDS / "nao-dsp").mkdir(parents=True)
+    for made in (dsp("pso", 3.0), dsp("ga", 4.0, 0.35)):
+        write_json(path / RECORDS / "nao-dsp" / f"{made.algorithm}-0000.json", made.to_json())
+    return path
+
+
+@pytest.fixture(scope="module")
+def report(folder: Path) -> dict[str, object]:
+    done = CliRunner().invoke(app, ["report", str(folder), "--engine", "--json"])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)["engine"]["nao-dsp"]
+
+
+def refuse(*_: object, **__: object) -> None:
+    raise AssertionError("played again")
+
+
+def test_the_command_plays_each_solvers_best_gait(report: dict[str, object], folder: Path) -> None:
+    gaits = report["gaits"]
+    assert isinstance(gaits, list)
+    assert [gait["algorithm"] for gait in gaits] == ["pso", "ga"]
+    for gait in gaits:
+        assert gait["unit"] == "W" and gait["fell_at_s"] is None and gait["steps"] is None
+        assert gait["engine"] == pytest.approx(gait["model"], rel=0.2)
+    agreement = report["agreement"]
+    assert isinstance(agreement, dict) and agreement["gaits"] == 2 and agreement["spearman"] is None
+    page = (folder / "report.md").read_text()
+    assert "In the physics engine" in page and f"{gaits[0]['engine']:#.4g} W" in page
+    assert "have not been played" not in page
+
+
+def test_a_later_report_shows_it_without_the_engine(
+    report: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    (folder / "report.md").unlink()
+    done = CliRunner().invoke(app, ["report", str(folder)])
+    assert done.exit_code == 0 and "In the physics engine" in (folder / "report.md").read_text()
+    refused = CliRunner().invoke(app, ["report", str(folder), "--engine"])
+    assert refused.exit_code == 1 and "pip install 'nlp-gait[sim]'" in refused.stderr
+
+
+def test_what_is_kept_is_not_played_again(
+    report: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "play", refuse)
+    gaits = report["gaits"]
+    assert isinstance(gaits, list)
+    assert [p.engine for p in play_records(folder, [dsp("pso", 3.0)], Drive())] == [gaits[0]["engine"]]
+    with pytest.raises(AssertionError, match="played again"):
+        play_records(folder, [dsp("pso", 3.0)], DRIVES["held"])
+    with pytest.raises(AssertionError, match="played again"):
+        play_records(folder, [dsp("pso", 3.0, 0.5)], Drive())
+
+
+def test_a_gait_that_has_changed_has_no_playback_to_show(report: dict[str, object], folder: Path) -> None:
+    assert len(kept_plays(folder, [dsp("pso", 3.0), dsp("ga", 4.0, 0.35)])) == 2
+    assert kept_plays(folder, [dsp("pso", 3.0, 0.5), dsp("aco", 3.0)]) == []
+
+
+def test_problems_that_cannot_be_played_are_left_out_or_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(engine, "_result", lambda _: None)
+    assert play_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
+    (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
+    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
+    refused = CliRunner().invoke(app, ["report", str(tmp_path), "--engine"])
+    assert refused.exit_code == 1 and "no gait of nao-dsp can be played" in refused.stderr
+
+
+def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "engine" / "nao-dsp" / "pso-0000.json"
+    path.parent.mkdir(parents=True)
+    path.write_text('{"schema": 1, "played": {}}')
+    with pytest.raises(InputError, match="delete it to have the gait played anew"):
+        kept_plays(tmp_path, [dsp("pso", 3.0)])
+
+
+def test_a_report_without_playbacks_says_how_to_get_them(tmp_path: Path) -> None:
+    (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
+    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
+    done = CliRunner().invoke(app, ["report", str(tmp_path)])
+    assert done.exit_code == 0
+    assert "`nlp-gait report DIR --engine`" in (tmp_path / "report.md").read_text()
+    refused = CliRunner().invoke(app, ["report", str(tmp_path), "--drive", "held"])
+    assert refused.exit_code == 1 and "give --engine as well" in refused.stderr
+
+
+def test_compare_says_that_the_engine_is_missing_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path / "study")])
+    assert refused.exit_code == 1 and "pip install 'nlp-gait[sim]'" in refused.stderr
+    assert not (tmp_path / "study").exists()
+
+
+def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    loaded = task._load
+    monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), playback=None))
+    refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
+    assert refused.exit_code == 1 and "no gait of nao-dsp can be played; leave out --engine" in refused.stderr
+    assert not (tmp_path / "study.json").exists()

@@ -1,0 +1,149 @@
+"""Films of the simulated robot: what is recorded, laid out, captioned and drawn."""
+
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nlp_gait.errors import InputError
+
+pytest.importorskip("mujoco")
+
+from nlp_gait.simulation.drive import Drive  # noqa: E402
+from nlp_gait.simulation.film.caption import Captions, Strip  # noqa: E402
+from nlp_gait.simulation.film.film import picture_size  # noqa: E402
+from nlp_gait.simulation.film.recording import recorded  # noqa: E402
+from nlp_gait.simulation.film.stage import View  # noqa: E402
+from nlp_gait.simulation.measurements import measure  # noqa: E402
+from nlp_gait.simulation.mjcf import free_model  # noqa: E402
+from nlp_gait.simulation.plan import plan_of  # noqa: E402
+from nlp_gait.simulation.playback import play  # noqa: E402
+
+ROOT = Path(__file__).parents[2]
+# Two gaits beside each other, drawn in a process of its own: the graphics driver is chosen when the engine is imported.
+DRAW = """
+import sys
+import numpy as np
+import nlp_gait
+from functools import partial
+from nlp_gait.problem import Result
+from nlp_gait.simulation.engine import mujoco
+mujoco(pictures=True)
+from nlp_gait.simulation.film.film import pictures
+from nlp_gait.simulation.film.recording import recorded
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.playback import play
+
+problem = nlp_gait.load("nao-dsp")
+shots = []
+for time_s in (0.4, 0.6):
+    x = problem.check_x((0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, time_s))
+    plan = plan_of(Result(problem=problem, x=x))
+    shots.append(recorded("dsp", plan, partial(play, plan), 0.8))
+np.savez(sys.argv[1], one=list(pictures(shots[:1], (480, 360))), two=list(pictures(shots, (640, 360), "slow")))
+"""
+
+
+@pytest.fixture(scope="module")
+def recording(gait):
+    plan = plan_of(gait("dsp optimum"))
+    return plan, recorded("a title", plan, partial(play, plan), 0.25)
+
+
+@pytest.mark.slow
+def test_a_recording_has_a_state_and_numbers_at_every_picture(recording):
+    plan, record = recording
+    np.testing.assert_allclose(record.t, 0.25 * np.arange(len(record.t)), atol=1e-9)
+    assert len(record.t) == round((plan.duration_s + 1.0) / 0.25)  # a second of settling
+    assert record.states.shape == (len(record.t), record.model.nq)
+    np.testing.assert_allclose(record.states[0, :3], plan.at("hip", np.zeros(1))[0])
+    during = record.t < plan.duration_s
+    mean_W = measure(plan, record.trace, Drive()).measured.total_W
+    assert record.power[during].mean() == pytest.approx(mean_W, rel=0.1)  # a few samples of what that averages
+    planned_m_s = float(np.ptp(plan.signals.arrays["hip"][:, 0])) / plan.duration_s
+    assert record.speed[during].mean() == pytest.approx(planned_m_s, rel=0.2)
+    weight_N = record.model.body_mass.sum() * plan.gravity
+    np.testing.assert_allclose(record.load[1:], weight_N, rtol=0.1)  # at first nothing has touched down
+    assert np.linalg.norm(record.pressure - record.planned, axis=1)[during].max() < 0.03
+
+
+@pytest.mark.slow
+def test_captions_say_time_speed_and_power_and_a_fall(recording):
+    _, record = recording
+    view, strip = View(name="side", left=0, top=0, width=300, height=200), Strip(left=0, top=200, width=300, height=50)
+
+    def drawn(k, fell_at_s=None):
+        object.__setattr__(record.trace, "fell_at_s", fell_at_s)
+        picture = Image.new("RGB", (300, 250), "white")
+        Captions(record, (view,), strip, 14, float(record.power.max()), float(record.t[-1])).draw(picture, k, "")
+        return np.asarray(picture).astype(int)
+
+    early, late, fallen = drawn(1), drawn(4), drawn(4, fell_at_s=0.5)
+    assert (early[:30] != 255).any(), "the title"
+    assert (early[:30] == late[:30]).all() and (early[200:] != late[200:]).any()
+    red = (fallen[200:, :, 0] > 150) & (fallen[200:, :, 1] < 80)
+    assert red.sum() > 20 and not ((late[200:, :, 0] > 150) & (late[200:, :, 1] < 80)).any()
+
+
+@pytest.mark.slow
+def test_a_recording_stands_still_on_a_fall(gait):
+    plan = plan_of(gait("ssp falling"))
+    record = recorded("a fall", plan, partial(play, plan), 0.25)
+    fell_at_s = record.trace.fell_at_s
+    assert fell_at_s is not None
+    assert (record.t == fell_at_s).sum() == 4  # a second
+    assert record.t[-5] == pytest.approx(fell_at_s, abs=0.25) and record.t[-5] < fell_at_s
+    assert len(record.states) == len(record.t) and (record.states[-1] == record.states[-5]).all()
+
+
+def test_legs_have_a_colour_for_each_side(gait):
+    from xml.etree import ElementTree as Xml
+
+    plan = plan_of(gait("dsp optimum"))
+    root = Xml.fromstring(free_model(plan.robot, plan.shapes("rectangle"), Drive(), plan.gravity))
+    colours = {body.get("name"): {geom.get("rgba") for geom in body.findall("geom")} for body in root.iter("body")}
+    left, right = colours["l_ankle"], colours["r_ankle"]
+    assert colours["LThigh"] == left != right == colours["RTibia"]
+    assert colours["torso"] == colours["LBicep"] and not colours["torso"] & (left | right)
+
+
+@pytest.mark.slow
+def test_pictures_show_both_legs_pressure_and_captions_of_one_gait_or_two(tmp_path):
+    file = tmp_path / "pictures.npz"
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", DRAW, file],
+        env=environment | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
+        pytest.skip("no off-screen graphics here")
+    assert done.returncode == 0, done.stderr
+    with np.load(file) as found:
+        one, two = found["one"].astype(int), found["two"].astype(int)
+    assert one.shape[1:] == (360, 480, 3) and two.shape[1:] == (360, 640, 3)
+    assert len(one) == 2 and len(two) == 2
+    for area in (one[0], two[0][:, :318], two[0][:, 322:]):
+        blue = (area[:, :, 2] > area[:, :, 0] + 90).sum()
+        orange = (area[:, :, 0] > area[:, :, 2] + 90).sum()
+        assert blue > 500 and orange > 500
+    assert (one[0] != one[1]).any()
+    text = one[0][318:, :70]
+    assert (text < 100).any() and (text == 255).any()
+
+
+@pytest.mark.parametrize("text", ["", "1280", "100x100", "1280x", "9999x9999", "-640x480", "640x480x3"])
+def test_a_size_that_is_none_is_refused(text):
+    with pytest.raises(InputError, match="size of a film is WIDTHxHEIGHT in pixels from 320x240 to 3840x2160"):
+        picture_size(text)
+
+
+def test_a_size_is_read():
+    assert picture_size("1280x720") == (1280, 720) and picture_size(" 640X360 ") == (640, 360)

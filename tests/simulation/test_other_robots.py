@@ -1,0 +1,150 @@
+"""Robots without a NAO's data in the engine's terms: same torques, same pressure, what touches what."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as Xml
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array, GaitProblem, Result
+from nlp_gait.problems.stairs.formulas.loads import MOVING
+from nlp_gait.problems.stairs.playback import whole_force
+from nlp_gait.problems.walk12.locomotion import locomotion
+from nlp_gait.problems.walk12.robot import point_mass_biped
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import plan_model
+from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.shapes import Prism
+
+pytest.importorskip("mujoco")
+
+from tests.simulation.inverse_dynamics_oracle import standing_on  # noqa: E402
+
+# Both are double precision; what remains is rounding, of torques of 100 Nm.
+AGREEMENT_NM = 1e-9
+# A tenth each of the foot's mass is the sole's and the ankle's, and spheres have inertia: measured 1.0 mm.
+POINT_MASSES_M = 0.0015
+# Goswami et al. (2008), Table III, lambda = 0.15 and 1.
+WALKS = ((0.130, 0.109, 0.014, 0.020), (0.055, 0.120, 0.026, 0.010))
+# Optimum of stairs-plan for case 2, to four digits.
+CLIMB = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
+
+
+def result_of(problem: GaitProblem, x: tuple[float, ...] | Array) -> Result:
+    return Result(problem=problem, x=problem.check_x(x))
+
+
+@pytest.fixture(scope="module")
+def climb() -> Result:
+    return result_of(nlp_gait.load("stairs-plan"), CLIMB)
+
+
+@pytest.fixture(scope="module")
+def ideal() -> Result:
+    """Its start: a motion with forces below toe and sole."""
+    problem = nlp_gait.load("stairs-ideal")
+    return result_of(problem, problem.start_point(np.random.default_rng(1)))
+
+
+def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> None:
+    own = climb.problem.signals(climb.x)
+    plan = plan_of(climb)
+    rear = np.zeros((len(plan.signals.arrays["t"]), 3))
+    t = own.arrays["t"]
+    new = np.diff(t, prepend=-1.0) > 0.0
+    whole = whole_force(*(own.arrays[f"link_{name}"][new][:, : len(MOVING)] for name in ("q", "qd", "qdd")))
+    force = whole - own.arrays["stance_force"][new]
+    # The engine at the problem's own samples, which are among the dense ones.
+    at = np.searchsorted(plan.signals.arrays["t"], t[new] - 1e-9)
+    np.testing.assert_allclose(plan.signals.arrays["t"][at], t[new], atol=1e-9)
+    rear[at] = np.column_stack([force[:, 0], np.zeros(len(force)), force[:, 1]])
+    torques, _ = standing_on(plan.robot, plan.gravity, "left", plan.signals, {"right toe": rear})
+    compared = [i for i, name in enumerate(plan.joints) if name != "LToe"]  # it lies still in the model
+    planned = plan.signals.arrays["tau"][at][:, compared]
+    assert np.abs(planned).max() > 50.0 and np.abs(rear).max() > 20.0
+    np.testing.assert_allclose(torques[at][:, compared], planned, atol=AGREEMENT_NM)
+    # These are the model's own torques, joint for joint but for the sense of the stance leg's lower two.
+    model = own.arrays["tau"][new]
+    columns = [list(own.joints).index(name) for name in ("hip'", "knee'", "ankle'", "hip", "knee", "ankle", "toe")]
+    senses = np.array([1, -1, -1, 1, 1, 1, 1])
+    np.testing.assert_allclose(planned, senses * model[:, columns], atol=AGREEMENT_NM)
+
+
+def test_the_ideal_step_is_played_through_its_own_instants(ideal: Result) -> None:
+    own, plan = ideal.problem.signals(ideal.x), plan_of(ideal)
+    per_interval = (len(plan.signals.arrays["t"]) - 1) // (len(own.arrays["t"]) - 1)
+    played = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}
+    np.testing.assert_allclose(played["t"], own.arrays["t"], atol=1e-12)
+    knee, joint = plan.joints.index("RKnee"), own.joints.index("knee")
+    np.testing.assert_allclose(played["q"][:-1, knee], own.arrays["q"][:-1, joint], atol=1e-12)
+    np.testing.assert_allclose(played["tau"][:-1, knee], own.arrays["tau"][:-1, joint], atol=AGREEMENT_NM)
+
+
+@pytest.mark.parametrize("x", WALKS)
+def test_small_spheres_need_the_point_masses_pressure_and_the_engines_torques(x: tuple[float, ...]) -> None:
+    plan = plan_of(result_of(nlp_gait.load("walk12"), x))
+    torques, wrench = standing_on(plan.robot, plan.gravity, "left", plan.signals)
+    assert np.abs(torques).max() > 0.1
+    np.testing.assert_allclose(torques, plan.signals.arrays["tau"], atol=AGREEMENT_NM)
+    pressure = np.column_stack([-wrench[:, 4], wrench[:, 3]]) / wrench[:, 2:3]
+    model = locomotion(point_mass_biped(), np.array(x), steps=1, intervals=1000, zmp="moment-free").arrays["zmp_foot"]
+    assert np.ptp(model, axis=0).min() > 0.02
+    assert np.abs(pressure - model).max() < POINT_MASSES_M
+
+
+def test_the_stairs_are_two_boxes_and_the_root_stays_in_the_plane(climb: Result) -> None:
+    root = Xml.fromstring(plan_model(plan_of(climb), Drive()))
+    boxes = [geometry for geometry in root.findall("./worldbody/geom") if geometry.get("type") == "box"]
+    tops = [float(box.get("pos").split()[2]) + float(box.get("size").split()[2]) for box in boxes]  # type: ignore[union-attr]
+    rise = 0.508 / 2 * 0.70
+    np.testing.assert_allclose(tops, [rise, 2 * rise])
+    torso = root.find("./worldbody/body")
+    assert torso is not None and not root.findall(".//freejoint")
+    assert [joint.get("type") for joint in torso.findall("joint")] == ["slide", "slide", "hinge"]
+
+
+def test_feet_begin_on_their_treads_and_toes_are_part_of_them(climb: Result) -> None:
+    plan = plan_of(climb)
+    start = {side: plan.at(f"{side}_foot", np.zeros(1))[0] for side in ("left", "right")}
+    for foot in start.values():
+        assert foot[2] == pytest.approx(float(plan.level(foot[:1])[0]), abs=1e-9)
+    assert start["left"][2] > start["right"][2] == pytest.approx(0.0, abs=1e-9)
+    shapes = plan.shapes("rectangle")
+    assert all(isinstance(shapes[f"{side} {part}"][-1], Prism) for side in start for part in ("sole", "toe"))
+    assert not [shape for shape in shapes["left shank"] if getattr(shape, "solid", True)]  # its end lies on the ground
+
+
+def test_steps_that_repeat_lead_on_up_with_the_legs_exchanged(ideal: Result) -> None:
+    one, three = plan_of(ideal), plan_of(ideal, 3)
+    n = len(one.signals.arrays["t"]) - 1
+    left, right = (three.signals.arrays[f"{side}_foot"] for side in ("left", "right"))
+    rise = ideal.problem.value("rise_run_ratio") * ideal.problem.value("stair_length_m") / 2
+    np.testing.assert_allclose(left[n + 1 : 2 * n + 1, 2], one.signals.arrays["right_foot"][1:, 2] + rise, atol=1e-12)
+    assert np.ptp(right[n + 1 : 2 * n + 1], axis=0).max() < 1e-9
+    assert len(three.ground) == 4 and len(one.ground) == 2
+
+
+def test_a_circle_turns_the_torso_by_the_same_angle_each_step() -> None:
+    problem = nlp_gait.load("walk12").with_values(turn_rad=0.1)
+    plan = plan_of(result_of(problem, WALKS[0]), 3)
+    middles = plan.attitude(np.array([0.5, 1.5, 2.5]))
+    np.testing.assert_allclose(2 * np.arctan2(middles[:, 3], middles[:, 0]), [0.0, 0.1, 0.2], atol=1e-12)
+    np.testing.assert_allclose(plan.torso_axis(np.array([0.5, 2.5])), [[0, 0, 1], [0, 0, 1]], atol=1e-12)
+
+
+def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
+    problem = nlp_gait.load("stairs-track")
+    plan = plan_of(result_of(problem, (60.0, 60.0, 1.4)))
+    lean = 2 * np.arctan2(*plan.signals.arrays["attitude"][:3, [2, 0]].T)
+    rate = np.diff(lean) / np.diff(plan.signals.arrays["t"][:3])
+    assert plan.spin_at_start[1] == pytest.approx(1.5 * rate[0] - 0.5 * rate[1], rel=1e-3)
+    assert abs(plan.spin_at_start[1]) > 1e-3
+    np.testing.assert_allclose(plan.torso_axis(np.zeros(1))[0], [np.sin(lean[0]), 0.0, np.cos(lean[0])], atol=1e-12)
+
+
+def test_a_step_that_does_not_end_as_it_began_is_not_repeated(climb: Result) -> None:
+    with pytest.raises(InputError, match="'stairs-plan' is no cycle that can be repeated"):
+        plan_of(climb, 2)
