@@ -157,32 +157,37 @@ def proof(instance: Instance, best: Array, limit_s: float) -> float | None:
 
 
 def strictly_feasible(instance: Instance, x: Array) -> Array:
-    """The best point near x that keeps a slack to every row, by linear programs of shrinking size.
+    """The nearest point that keeps a slack to every row, by linear programs that move as little as they can.
 
-    IPOPT may leave a row violated by some 1e-8; what is shipped as best known has a violation of exactly zero everywhere.
+    IPOPT may leave a row violated by some 1e-8; what is shipped as best known has a violation of exactly zero everywhere. To go
+    downhill as well would be wrong where the objective is the largest of several: its gradient is that of one of them.
     """
     from scipy.optimize import linprog
 
     width = instance.upper - instance.lower
-    x = np.clip(x, instance.lower, instance.upper)
-    found: list[tuple[float, Array]] = []
-    for radius in (1e-4, 1e-5, 1e-5, 1e-6, 1e-6, 1e-7, 1e-7, 1e-8, 1e-8):
-        G = instance.rows(x[None])[0]
-        if G.max() <= -SLACK / 2:
-            found.append((float(instance(x[None])[0][0]), x))
-        J = instance.jacobian(x) * width
-        near = np.abs(J).sum(axis=1) * radius + G > -SLACK
-        low, high = (instance.lower - x) / width / radius, (instance.upper - x) / width / radius
-        step = linprog(
-            instance.gradient(x) * width,
-            A_ub=J[near],
-            b_ub=-(G[near] + SLACK) / radius,
-            bounds=list(zip(np.maximum(low, -1.0), np.minimum(high, 1.0), strict=True)),
-        )
-        if step.x is not None:
-            x = np.clip(x + radius * width * step.x, instance.lower, instance.upper)
-    if instance.rows(x[None]).max() <= -SLACK / 2:
-        found.append((float(instance(x[None])[0][0]), x))
+    first = np.clip(x, instance.lower, instance.upper)
+    n, found = len(width), list[tuple[float, Array]]()
+    for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
+        x = first
+        for _ in range(4):
+            G = instance.rows(x[None])[0]
+            if G.max() <= -SLACK / 2:
+                found.append((float(instance(x[None])[0][0]), x))
+                break
+            J = instance.jacobian(x) * width
+            near = np.abs(J).sum(axis=1) * radius + G > -SLACK
+            low, high = (instance.lower - x) / width / radius, (instance.upper - x) / width / radius
+            bounds = [*zip(np.maximum(low, -1.0), np.minimum(high, 1.0), strict=True), (0.0, 1.0)]
+            least = np.hstack([np.vstack([np.eye(n), -np.eye(n)]), -np.ones((2 * n, 1))])  # |step| <= its largest part
+            step = linprog(
+                np.eye(n + 1)[-1],
+                A_ub=np.vstack([np.hstack([J[near], np.zeros((int(near.sum()), 1))]), least]),
+                b_ub=np.concatenate([-(G[near] + SLACK) / radius, np.zeros(2 * n)]),
+                bounds=bounds,
+            )
+            if step.x is None:
+                break
+            x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
     if not found:
         raise NothingFound("no strictly feasible point near the end of IPOPT")
     return min(found, key=lambda item: item[0])[1]

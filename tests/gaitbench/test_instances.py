@@ -150,11 +150,6 @@ def test_the_one_equation_of_splines_is_a_band() -> None:
     np.testing.assert_allclose(G.sum(axis=1), -2 * 1e-2, rtol=1e-9)  # of the scale, a centimetre
 
 
-def evaluated_elsewhere(instance: gaitbench.Instance, X: Array) -> tuple[Array, Array]:
-    """Crosses the border of a process."""
-    return instance(X)
-
-
 def test_threads_and_processes_find_the_same_values() -> None:
     instance = gaitbench.load("ssp-v5")
     X = points(instance, 400)
@@ -163,7 +158,7 @@ def test_threads_and_processes_find_the_same_values() -> None:
         for found in threads.map(instance, [X] * 32):
             np.testing.assert_array_equal(found, expected)
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as processes:
-        np.testing.assert_array_equal(processes.submit(evaluated_elsewhere, instance, X).result(), expected)
+        np.testing.assert_array_equal(processes.submit(instance, X).result(), expected)
 
 
 @pytest.mark.parametrize("unit_cube", [False, True])
