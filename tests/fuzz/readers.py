@@ -218,7 +218,11 @@ def same_robot(raw: Mapping[str, Any], robot: Robot) -> None:
     for name, joint in raw.get("joints", {}).items():
         for key, value in joint.items():
             if key == "motor":
-                same(value, value and asdict(robot.joints[name].motor), f"{name}.motor")  # type: ignore[call-overload]
+                motor = value and asdict(robot.joints[name].motor)  # type: ignore[call-overload]
+                given = motor and {
+                    part: number for part, number in motor.items() if number is not None or part in value
+                }
+                same(value, given, f"{name}.motor")
             elif key != "axis":
                 same(value, getattr(robot.joints[name], key), f"{name}.{key}")
     for side, foot in raw.get("feet", {}).items():
