@@ -31,7 +31,8 @@ HOW_TO_GET_ONE = (
 WATCHED = (
     "/bin/sh",
     "-c",
-    'exec 3<&0 </dev/null; "$@" 3<&- & program=$!; { read -r _ <&3; kill -KILL 0; } >/dev/null 2>&1 & wait "$program"',
+    'exec 3<&0 </dev/null; "$@" 3<&- & program=$!; { read -r _ <&3; kill -KILL 0; } >/dev/null 2>&1 & watch=$!; '
+    'wait "$program"; status=$?; { kill "$watch"; wait "$watch"; } 2>/dev/null; exit "$status"',
     "sh",
 )
 
