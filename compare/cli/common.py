@@ -106,7 +106,10 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         for i in group:
             need = min(needs[i], room)
             justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"
-            table.add_column(header[i], justify=justify, overflow="fold", min_width=need)
+            flexible = any(len(row[i]) > LONGEST_CELL for row in rows)
+            table.add_column(
+                header[i], justify=justify, overflow="fold", min_width=need, width=None if flexible else need
+            )
         for row in rows:
             table.add_row(*(row[i] for i in group))
         stdout.print(table)
