@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from metaheuristics.array import Array
+from metaheuristics.array import Array, real_array
 from metaheuristics.constraint_handling import FEASIBILITY, mark_failed
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import BatchObjective
@@ -105,7 +105,7 @@ def _checked_answer(answer: object, count: int) -> tuple[Array, Array]:
     if not isinstance(answer, tuple) or len(answer) != 2:
         raise SearchError(f"{wanted}; it returned {type(answer).__name__}: return a tuple of two arrays")
     try:
-        f, violation = np.asarray(answer[0], dtype=np.float64), np.asarray(answer[1], dtype=np.float64)
+        f, violation = real_array(answer[0]), real_array(answer[1])
     except (TypeError, ValueError) as error:
         raise SearchError(f"{wanted}; it returned something other than real numbers: {error}") from error
     if f.shape != (count,) or violation.shape != (count,):

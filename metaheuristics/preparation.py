@@ -8,7 +8,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metaheuristics.array import Array
+from metaheuristics.array import Array, real_array
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, Bounded, Start
 
@@ -44,7 +44,10 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
         SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
     """
     names = tuple(objective.names)
-    lower, upper = np.array(objective.lower, dtype=np.float64), np.array(objective.upper, dtype=np.float64)
+    try:
+        lower, upper = np.array(real_array(objective.lower)), np.array(real_array(objective.upper))
+    except (TypeError, ValueError) as error:
+        raise SearchError(f"bounds must be numbers: {error}") from error
     if not names or lower.shape != (len(names),) or upper.shape != (len(names),):
         raise SearchError(
             f"bounds must have shape (n,) with one name per variable and n >= 1; got {len(names)} names, "
@@ -107,7 +110,7 @@ def checked_points(asked: object, lower: Array, upper: Array) -> Array:
         SearchError: another shape, no point, NaN, or a point outside the bounds.
     """
     try:
-        points = np.asarray(asked, dtype=np.float64)
+        points = real_array(asked)
     except (TypeError, ValueError) as error:
         raise SearchError(f"ask must return points (P, {len(lower)}); it returned no numbers: {error}") from error
     if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
@@ -168,7 +171,10 @@ def starting_points(
     draws = np.random.default_rng(seed).random((population, len(lower)))
     points = np.clip(lower + draws * (upper - lower), lower, upper)
     if given is not None:
-        rows = np.array(given, dtype=np.float64)
+        try:
+            rows = np.array(real_array(given))
+        except (TypeError, ValueError) as error:
+            raise SearchError(f"initial must be numbers: {error}") from error
         if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
             raise SearchError(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Result, sampled
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.skeleton import Skeleton
 
 
+@one_at_a_time
 def skeleton_of(result: Result, frames_per_s: float) -> Skeleton:
     """Skeleton of a gait at about the given number of samples a second.
 

@@ -263,7 +263,7 @@ def check_task(task: Task) -> None:
     if task.start:
         if task.is_search:
             raise InputError(f"{task.title!r} takes no start point; NLP solvers do")
-        problem.check_x(task.start)
+        problem.check_within(task.start)
 
 
 def plain_problem(problem: GaitProblem) -> dict[str, Any]:

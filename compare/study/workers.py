@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
@@ -21,6 +23,7 @@ T = TypeVar("T")
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
 CONNECT_TIMEOUT = "10s"
+PARENT_CHECKED_EVERY_S = 0.5
 
 Job = tuple[Task, RunRecord | None]
 """A task, and the run that it polishes if it does."""
@@ -83,7 +86,9 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
     """Number and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are."""
     from joblib import Parallel, delayed  # costs 0.1 s to import
 
-    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
+    # Dask's workers belong to its scheduler.
+    begin = {} if workers < 0 else {"initializer": end_with, "initargs": (os.getpid(),)}
+    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
     with children_ignore_interrupts():
         folder = os.getcwd() if workers > 0 else None  # another machine has other folders
         results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
@@ -94,6 +99,17 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # joblib tells of the calls that end with whoever stops asking
             results.close()
+
+
+def end_with(parent: int) -> None:
+    """Let this worker process end within a second of its parent, however that ends: nobody would read its results."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECKED_EVERY_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
 
 
 def _numbered(number: int, call: Callable[[], T], folder: str | None) -> tuple[int, T]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from metaheuristics.array import Array
+from metaheuristics.array import Array, real_array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Start
@@ -86,7 +86,7 @@ class FunctionSearch:
 
         def f(x: Any) -> Any:
             try:
-                points = np.asarray(x, dtype=np.float64)
+                points = real_array(x)
             except (TypeError, ValueError) as error:
                 raise SearchError(f"f was called with something other than numbers: {error}") from error
             if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:

@@ -12,6 +12,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -54,6 +55,7 @@ class ExactModel:
     row_scales: Array
     index_names: tuple[str, ...]
 
+    @one_at_a_time
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Values at x (n,) and parameter values p (k,)."""
         cost, violation, g, lower, upper, indexes = (

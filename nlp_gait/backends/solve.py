@@ -35,7 +35,8 @@ def solve(
         problem: with its current parameter values; a name is loaded with its defaults.
         starts: number of start points, from ``problem.start_point``.
         seed: of the start points.
-        x0: first start point (n,), in order or by name; the remaining ``starts - 1`` are random.
+        x0: first start point (n,) within the bounds, in order or by name; a fixed variable takes the value at which it is
+            fixed. The remaining ``starts - 1`` are random.
         fix: variables held at a value.
         solver: with its settings; None for IPOPT with its defaults.
         progress: called after each start.
@@ -74,7 +75,7 @@ def _start_points(
     rng = np.random.default_rng(seed)
     points = [problem.start_point(rng) for _ in range(starts)]
     if x0 is not None:
-        points[0] = np.clip(problem.check_x(x0), problem.lower, problem.upper)
+        points[0] = problem.check_within(x0)
     return points
 
 

@@ -11,14 +11,16 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Literal, TypeVar
+from functools import cached_property, lru_cache
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.locking import CASADI, one_at_a_time
+from nlp_gait.problem.numbers import is_number, real_numbers
 from nlp_gait.problem.playback import Playback
 from nlp_gait.problem.signals import Array, Signals
 from nlp_gait.problem.skeleton import Skeleton
@@ -28,6 +30,8 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 T = TypeVar("T")
 # Changes what a problem assembles.
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
+# A point lies on a bound that it misses by this share of the variable's default range.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +62,24 @@ class Grid:
         return self.intervals * self.samples_per_interval
 
 
+class Origin(NamedTuple):
+    """How a problem is made again, in this process or in another one.
+
+    Attributes:
+        make: with keyword options.
+        options: all of them.
+    """
+
+    make: Callable[..., GaitProblem]
+    options: Mapping[str, Any]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GaitProblem:
     """A gait problem with the current values of its parameters.
 
     Copies made by ``with_values`` share everything that was built from the mathematics; ``derived`` is how to change the
-    mathematics.
+    mathematics. A problem may be used by several threads. It is pickled as its maker's name, options and values.
 
     Attributes:
         name: for example ``"nao-ssp"``.
@@ -84,6 +100,8 @@ class GaitProblem:
         playback: what a physics engine needs to play the motion, or None.
         hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
         long_derivatives: True where one solve by a gradient method pays for compiling its derivatives.
+        amplifies_rounding: True where a rounding error may decide a jump, so that another sine gives another gait: its compiled
+            code then rounds as the virtual machine does, on every lane count, and is slower.
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
         searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
@@ -107,12 +125,14 @@ class GaitProblem:
     playback: Playback | None = None
     hessian: Literal["exact", "limited-memory"] = "exact"
     long_derivatives: bool = False
+    amplifies_rounding: bool = False
     starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
     loaded_as: str = ""
     # No argument, so that every copy but those of ``with_values`` begins with nothing built.
     _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _origin: Origin | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse names that stand twice."""
@@ -190,6 +210,7 @@ class GaitProblem:
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
         changed = replace(self, values=merged)
         object.__setattr__(changed, "_built", self._built)  # the mathematics is the same
+        object.__setattr__(changed, "_origin", self._origin)
         changed._check_pairs()
         return changed
 
@@ -268,6 +289,7 @@ class GaitProblem:
             loaded_as="" if name else self.loaded_as,
         )
 
+    @one_at_a_time
     def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
         """Time histories at x (n,) and the current parameter values.
 
@@ -278,6 +300,7 @@ class GaitProblem:
             raise InputError(f"problem {self.name!r} has no time histories")
         return self.motion(self.at(x))
 
+    @one_at_a_time
     def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
         """The point x (n,) with the current parameter values, in numbers."""
         return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
@@ -287,6 +310,7 @@ class GaitProblem:
         """Current values by name."""
         return dict(zip((q.name for q in self.parameters), self.p.tolist(), strict=True))
 
+    @one_at_a_time
     def start_point(self, rng: np.random.Generator) -> Array:
         """(n,) start point for a gradient method, within the bounds."""
         if self.start is not None:
@@ -310,10 +334,7 @@ class GaitProblem:
                     f"unknown: {', '.join(map(str, extra)) or 'none'}"
                 )
             x = [x[name] for name in self.names]
-        try:
-            array = np.asarray(x, dtype=float)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"x must be {len(self.names)} numbers, got {x!r}") from error
+        array = real_numbers(f"x of {self.name}", x)
         if array.shape != (len(self.names),):
             raise InputError(
                 f"x of {self.name} must have {len(self.names)} values ({', '.join(self.names)}), got shape {array.shape}"
@@ -323,20 +344,70 @@ class GaitProblem:
                 raise InputError(f"x of {self.name}: {name} must be finite, got {value}")
         return array
 
+    def check_within(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
+        """(n,) values of ``check_x``, put onto the bounds that they miss by rounding, and at which a variable is fixed.
+
+        Raises:
+            InputError: as ``check_x``, or a value outside the bounds.
+        """
+        array = self.check_x(x)
+        beyond = np.maximum(self.lower - array, array - self.upper)
+        outside = np.flatnonzero((beyond > ROUNDING * self.scale) & (self.lower < self.upper))
+        if outside.size:
+            i = outside[0]
+            raise InputError(
+                f"x0 of {self.name}: {self.names[i]} is {array[i]:g}, outside its bounds [{self.lower[i]:g}, "
+                f"{self.upper[i]:g}] {self.variables[i].unit}; begin within them, or widen them"
+            )
+        return np.clip(array, self.lower, self.upper)
+
     def by_name(self, x: Array) -> dict[str, float]:
         """Values of x by variable name."""
         return dict(zip(self.names, (float(v) for v in x), strict=True))
 
+    @one_at_a_time
     def symbols(self) -> Point:
         """Fresh symbols for x and p."""
         parameters = [q.name for q in self.parameters]
         return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
 
+    def made_by(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
+        """The same problem, which ``make`` with these options makes again elsewhere: it can be pickled if ``make`` can."""
+        made = replace(self)
+        object.__setattr__(made, "_built", self._built)
+        object.__setattr__(made, "_origin", Origin(make, dict(options)))
+        return made
+
+    def __copy__(self) -> GaitProblem:
+        """Itself: nothing of it can be changed."""
+        return self
+
+    def __deepcopy__(self, memo: object) -> GaitProblem:
+        """Itself: nothing of it can be changed."""
+        return self
+
+    def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
+        """For pickle.
+
+        Raises:
+            InputError: no maker that other processes could find makes exactly this problem.
+        """
+        origin = self._origin
+        if origin is None or "<locals>" in getattr(origin.make, "__qualname__", ""):
+            raise InputError(
+                f"problem {self.name!r} cannot be pickled: it is not what a maker makes from options, or its maker is no "
+                "function at the top of a module; make it in the other process, or give it a maker there"
+            )
+        return remade, (origin.make, origin.options, dict(self.values), repr(self.robot))
+
     def built(self, key: str, build: Callable[[], T]) -> T:
         """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
         if key not in self._built:
-            self._built[key] = build()
-        return self._built[key]
+            with CASADI:
+                if key not in self._built:  # another thread may have built it meanwhile
+                    self._built[key] = build()
+        found: T = self._built[key]
+        return found
 
     def _parameter(self, name: str) -> Parameter:
         for parameter in self.parameters:
@@ -355,12 +426,26 @@ class GaitProblem:
                 )
 
 
-def is_number(value: object) -> bool:
-    """Whether a value is a finite number; True and False are not."""
-    try:
-        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:  # a whole number beyond every float
-        return False
+def remade(
+    make: Callable[..., GaitProblem], options: Mapping[str, Any], values: Mapping[str, float], robot: str
+) -> GaitProblem:
+    """A problem that was pickled; copies of one problem share what is built, here too.
+
+    Raises:
+        InputError: the robot's file holds another robot than it did.
+    """
+    return _remade(make, tuple(sorted(options.items())), robot).with_values(**values)
+
+
+@one_at_a_time
+@lru_cache(maxsize=16)
+def _remade(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any], ...], robot: str) -> GaitProblem:
+    problem = make(**dict(options))
+    if repr(problem.robot) != robot:
+        raise InputError(
+            f"problem {problem.name!r}: its robot is another one than when it was pickled: its file has changed"
+        )
+    return problem
 
 
 def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -6,13 +6,17 @@ import functools
 import importlib
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 from nlp_gait.errors import InputError, kind_name, unknown
 from nlp_gait.problem.checks import check_mathematics
-from nlp_gait.problem.gait_problem import GaitProblem, is_number
-from nlp_gait.references import guarded, installed, is_own, load_object, name_code, reference
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.problem.numbers import is_number
+from nlp_gait.references import guarded, installed, is_own, load_object, name_code, reference, source_sha256
 
 # Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
@@ -46,8 +50,10 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
     """
 
     def decorate(make: Maker) -> Maker:
+        @one_at_a_time
         @functools.wraps(make)
         def made(**options: Any) -> GaitProblem:
+            options = {name: _plain(value) for name, value in options.items()}
             check(made, options)
             call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
             problem = make(**call)
@@ -62,9 +68,10 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
                     recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
             if refined_by is None or refined_by not in call:  # a maker without that option refines its problem itself
-                return replace(problem, options=recorded)
+                return replace(problem, options=recorded).made_by(made, call)
             own = getattr(grid, refined_by)
-            return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
+            finer = replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
+            return finer.made_by(made, call)
 
         made.options_checked = True  # type: ignore[attr-defined]
         return made
@@ -116,14 +123,36 @@ def own_maker(name: str) -> Maker:
     else:
         raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(own).__name__}")
 
+    again = OwnCode(name, source_sha256(name, "problem"))
+
+    @one_at_a_time
     @functools.wraps(make)
     def made(**options: Any) -> GaitProblem:
         check(make, options)
         problem = guarded(name, path, lambda: make(**options))
         guarded(name, path, lambda: check_mathematics(problem))
-        return replace(problem, loaded_as=name)
+        return replace(problem, loaded_as=name).made_by(again, options)
 
     return made
+
+
+@dataclass(frozen=True)
+class OwnCode:
+    """Makes a problem of one's own again, where it was pickled to.
+
+    Attributes:
+        name: see ``problem_maker``.
+        source: hash of its source.
+    """
+
+    name: str
+    source: str
+
+    def __call__(self, **options: Any) -> GaitProblem:
+        """The problem; InputError if its source is another one than it was."""
+        if source_sha256(self.name, "problem") != self.source:
+            raise InputError(f"{self.name!r} has changed since the problem was pickled; load it again")
+        return load(self.name, **options)
 
 
 def check_options(name: str, options: Mapping[str, Any]) -> None:
@@ -139,7 +168,8 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
     known, allowed = inspect.signature(make).parameters, _choices(make)
-    for option, value in options.items():
+    for option, given in options.items():
+        value = _plain(given)
         if option not in known:
             raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
         expected = type(known[option].default)
@@ -150,6 +180,11 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
+
+
+def _plain(value: Any) -> Any:
+    """A number or a text of NumPy as Python's own."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @functools.cache

@@ -70,12 +70,15 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
     for item in listed.split(","):
         key, equals, value = item.partition("=")
         try:
-            changes[key.strip()] = float(value)
+            number = float(value)
         except ValueError:
             raise InputError(
                 f"robot {text!r}: after {MARK} it needs NAME=NUMBER, separated by commas, got {item!r}; for example "
                 f"nao-v5{MARK}mass=1.05,thigh_m=0.001"
             ) from None
+        if key.strip() in changes:
+            raise InputError(f"robot {text!r}: {key.strip()} stands twice after {MARK}; give it once")
+        changes[key.strip()] = number
     return name, changes
 
 

@@ -17,6 +17,7 @@ from scipy import sparse
 
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.problem import Array, Signals
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problems.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
 from nlp_gait.problems.biped.phase import BOTH_FEET
 from nlp_gait.robots import Robot
@@ -114,6 +115,7 @@ def double_supports(signals: Signals) -> Iterator[Support]:
             yield Support(start + (landed is not None), end, landed, lifting)
 
 
+@one_at_a_time
 def instants_of(plan: Plan, samples: slice) -> Instants:
     """Loads of some of a plan's samples."""
     arrays, joints = plan.signals.arrays, plan.joints
@@ -137,6 +139,7 @@ def instants_of(plan: Plan, samples: slice) -> Instants:
     )
 
 
+@one_at_a_time
 def bearing_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
     """Matrices (16, 6) by side: what they make of the wrench on a sole must not be negative."""
     wrench, found = SX.sym("wrench", WRENCH), {}

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, Signals, finely_sampled
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.playback import Tread
 from nlp_gait.problem.steps import walk
 from nlp_gait.robots import Robot
@@ -137,6 +138,7 @@ class Plan:
         return link_shapes(self.full_robot, sole, welded=welded)
 
 
+@one_at_a_time
 def plan_of(result: Result, steps: int | None = None) -> Plan:
     """Plan of a solved problem.
 

@@ -153,6 +153,8 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
         ({"initial": np.zeros((11, 2))}, "R <= 10"),
         ({"initial": np.full((1, 2), 9.0)}, r"initial row 0, variable 0: 9\.0 is outside"),
         ({"initial": np.full((1, 2), np.nan)}, "outside the bounds"),
+        ({"initial": np.full((1, 2), 0.5j)}, "initial must be numbers"),
+        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial must be numbers"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
@@ -167,6 +169,9 @@ def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
         ((np.zeros((10, 1)), np.zeros(10)), r"got shapes \(10, 1\) and \(10,\)"),
         ((np.zeros(10), 0.0), r"\(\)"),
         ((np.zeros(10), ["a"] * 10), "real numbers"),
+        ((np.zeros(10), ["0.0"] * 10), "real numbers"),
+        ((np.zeros(10, dtype=complex), np.zeros(10)), "real numbers"),
+        ((np.ma.masked_array(np.zeros(10), mask=np.arange(10) == 3), np.zeros(10)), "real numbers"),
         ((np.zeros(10), np.full(10, -1e-9)), "violation must be >= 0.*row 0 has -1e-09"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from compare.judge import evaluate
 from compare.study.task import ProblemSpec, Task
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
 from nlp_gait.problem import load
 from nlp_gait.problem.registry import PROBLEMS, problem_maker
 from tests.evaluation import evaluated
@@ -117,3 +119,28 @@ def test_what_was_chosen_for_a_trajectory_is_recorded() -> None:
     assert load("nao-ssp", trajectory="quintic").options["samples_per_interval"] == 4
     assert load("nao-ssp", samples_per_interval=1).options == load("nao-ssp").options
     assert load("nao-ssp", samples_per_interval=4).options["samples_per_interval"] == 4
+
+
+def test_numbers_of_numpy_mean_what_they_are() -> None:
+    plain = load("nao-ssp", intervals=10, step_length_m=0.07)
+    made = load("nao-ssp", intervals=np.int64(10), step_length_m=np.float64(0.07), robot=np.str_("nao-v5"))
+    assert made.options == plain.options
+    assert {type(value) for value in made.options.values()} == {type(value) for value in plain.options.values()}
+    single = load("nao-ssp", step_length_m=np.float32(0.0625))
+    assert single.options["step_length_m"] == 0.0625 and type(single.options["step_length_m"]) is float
+    for number in (np.float32(0.025), np.float16(0.025), Fraction(1, 40)):
+        moved = plain.fix(swing_height_m=number).with_values(**{"hip_height_m.lower": np.float32(0.25)})
+        assert moved.values == {
+            "swing_height_m.lower": float(number),
+            "swing_height_m.upper": float(number),
+            "hip_height_m.lower": 0.25,
+        }
+        assert all(type(value) is float for value in moved.values.values())
+
+
+@pytest.mark.parametrize("value", [True, np.bool_(True), np.float32("nan"), np.array([0.02]), 0.02 + 0j, "0.02", None])
+def test_what_is_no_number_stays_refused(value: Any) -> None:
+    with pytest.raises(InputError, match="must be a finite number"):
+        load("nao-ssp").with_values(**{"swing_height_m.lower": value})
+    with pytest.raises(InputError, match="option intervals must be a whole number"):
+        load("nao-ssp", intervals=value)

@@ -20,6 +20,12 @@ def test_masses_and_inertias_scale() -> None:
     assert heavy.links["LThigh"].com_m == NAO.links["LThigh"].com_m
 
 
+def test_a_change_that_stands_twice_is_refused() -> None:
+    for twice in ("mass=2,mass=3", "mass=2, mass =2", "thigh_m=0.001,mass=2,thigh_m=0.002"):
+        with pytest.raises(InputError, match="(mass|thigh_m) stands twice"):
+            load_robot(f"nao-v5@{twice}")
+
+
 def test_both_legs_get_longer() -> None:
     tall = perturbed(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
     for side in "LR":

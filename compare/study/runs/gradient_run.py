@@ -28,13 +28,13 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     started = time.perf_counter()
     problem, solver = task.problem.load(), task.solver()
     if task.start:
-        x0 = np.clip(problem.check_x(task.start), problem.lower, problem.upper)
+        x0 = problem.check_within(task.start)
     elif start is None:
         x0 = problem.start_point(np.random.default_rng(task.run_seed))
     elif not start.x:
         raise InputError(f"{start.algorithm}, run {start.run}, has no point to polish: {start.status}")
     else:
-        x0 = np.clip(problem.check_x(start.x), problem.lower, problem.upper)
+        x0 = problem.check_within(start.x)
     outcome = solver.run(problem, x0)
     prepared_s = time.perf_counter() - started - outcome.time_s
     compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already

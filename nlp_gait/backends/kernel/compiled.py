@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
-from functools import cached_property
-from typing import Literal
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.numbers import real_numbers
 
 LOG = logging.getLogger("nlp_gait")
 # Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.
@@ -31,6 +32,9 @@ LEAST_THREAD_TIME_S = 3e-4
 class CompiledObjective:
     """Objective and total violation of many candidates at once.
 
+    Several threads and forked processes may call it, and it can be pickled if its problem can: it is compiled, or found in the
+    cache folder, where it arrives.
+
     Attributes:
         problem: with the parameter values that are used.
         names: (n,) variables.
@@ -41,8 +45,14 @@ class CompiledObjective:
         description: backend, compiler and lane count, in words.
     """
 
-    def __init__(self, problem: GaitProblem, evaluator: NativeKernel | InterpretedKernel, threads: int) -> None:
-        """Use ``compile_objective`` instead."""
+    def __init__(
+        self,
+        problem: GaitProblem,
+        evaluator: NativeKernel | InterpretedKernel,
+        threads: int,
+        again: Callable[..., CompiledObjective],
+    ) -> None:
+        """Use ``compile_objective`` instead; ``again`` makes this objective from its problem."""
         kernel = kernel_of(problem)
         self.problem = problem
         self.names = problem.names
@@ -58,6 +68,8 @@ class CompiledObjective:
         self._p = np.array(problem.p)
         self._threads = threads
         self._time_per_row_s = 0.0
+        self._again = again
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
         """Evaluate candidates.
@@ -85,6 +97,10 @@ class CompiledObjective:
         self._evaluate(X, f, violation, g)
         return g
 
+    def __reduce__(self) -> tuple[Callable[..., CompiledObjective], tuple[Any, ...]]:
+        """For pickle: the call that made it."""
+        return self._again, (self.problem,)
+
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
         rows = len(X)
         parts = min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S))
@@ -94,7 +110,8 @@ class CompiledObjective:
         else:
             cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
             pieces = [(X[cut], f[cut], violation[cut], None if g is None else g[cut]) for cut in cuts]
-            jobs = [self._pool.submit(self._part, *piece) for piece in pieces[1:]]
+            pool = self._threads_of_this_process()
+            jobs = [pool.submit(self._part, *piece) for piece in pieces[1:]]
             self._part(*pieces[0])
             wait(jobs)
             for job in jobs:
@@ -105,18 +122,19 @@ class CompiledObjective:
     def _part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
         self._evaluator(X, self._p, self._lower, self._upper, f, violation, g)
 
-    @cached_property
-    def _pool(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
+    def _threads_of_this_process(self) -> ThreadPoolExecutor:
+        """Helping threads; a forked process has none of its parent's, and starts its own."""
+        own = os.getpid()
+        if self._pool is None or self._pool[0] != own:
+            # Two threads at once may start two; the one that is not kept ends with its work.
+            self._pool = own, ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
+        return self._pool[1]
 
     def _checked(self, X: Array | Mapping[str, float]) -> Array:
         """X as contiguous, aligned doubles, copied only if it is not that already."""
         if isinstance(X, Mapping):
             return self.problem.check_x(X)[None]
-        try:
-            array = np.require(X, dtype=np.float64, requirements=("C", "A"))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"X of {self.problem.name} must be numbers, got {type(X).__name__}: {error}") from error
+        array = np.require(real_numbers(f"X of {self.problem.name}", X), requirements=("C", "A"))
         if array.ndim != 2 or array.shape[1] != len(self.names):
             raise InputError(
                 f"X of {self.problem.name} must have one candidate a row and {len(self.names)} columns "
@@ -154,25 +172,29 @@ def compile_objective(
     kernel = kernel_of(problem)
     count = native_lanes() if lanes is None else lanes
     evaluator: NativeKernel | InterpretedKernel
+    used = threads or _available_cores()
     try:
         compiler = find_compiler()
         evaluator = problem.built(
             f"native kernel {count} {compiler}",
-            lambda: _verified(NativeKernel(kernel, compiler, count), problem, kernel),
+            lambda: _verified(
+                NativeKernel(kernel, compiler, count, scalar_functions=problem.amplifies_rounding), problem, kernel
+            ),
         )
     except CompilerError as error:
         if require_compiler:
             raise
         LOG.warning("the objective is interpreted, many times slower: %s", error)
         evaluator = problem.built("interpreted kernel", lambda: InterpretedKernel(kernel))
-        threads = 1  # the virtual machine does not let go of Python's lock
-    return CompiledObjective(problem, evaluator, threads or _available_cores())
+        used = 1  # the virtual machine does not let go of Python's lock
+    again = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
+    return CompiledObjective(problem, evaluator, used, again)
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
     """The native kernel, if it computes what the virtual machine does at more than half of some random points.
 
-    Not at all of them: where rounding decides a jump, as in the quantised drive of a tracked step, both may be right.
+    Not at all of them: where rounding decides a jump, both may be right.
 
     Raises:
         CompilerError: it does not: the compiler is broken, or is not for this machine.

@@ -26,6 +26,16 @@ HOW_TO_GET_ONE = (
 )
 
 
+# Runs a program that ends with this process, however that ends: the end of the pipe on standard input, which nobody writes to,
+# is the end of whoever holds its other side.
+WATCHED = (
+    "/bin/sh",
+    "-c",
+    'exec 3<&0 </dev/null; "$@" 3<&- & program=$!; { read -r _ <&3; kill -KILL 0; } >/dev/null 2>&1 & wait "$program"',
+    "sh",
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Compiler:
     """A C++ compiler.
@@ -89,10 +99,11 @@ def _candidates(cxx: str, cc: str) -> list[tuple[str, ...]]:
 def _run(command: Sequence[str], time_limit_s: float) -> str:
     """Standard output of a program that ends with status 0 in time."""
     program = Path(command[0]).name
+    watched, held = os.pipe()
     try:
         process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
+            [*WATCHED, *command] if os.name == "posix" else command,
+            stdin=watched,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -100,7 +111,10 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
             start_new_session=True,  # so that the compiler's own children can be killed with it
         )
     except OSError as error:
+        os.close(held)
         raise CompilerError(f"{program} cannot be run: {error}") from error
+    finally:
+        os.close(watched)
     try:
         output, messages = process.communicate(timeout=time_limit_s)
     except subprocess.TimeoutExpired as error:
@@ -109,10 +123,14 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
+        os.close(held)
     if process.returncode != 0:
         lines = [line.strip() for line in messages.splitlines() if line.strip()]
         reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
-        raise CompilerError(f"{program} failed with exit status {process.returncode}: {reason}")
+        status = (
+            process.returncode if process.returncode <= 128 else 128 - process.returncode
+        )  # a signal, as sh says it
+        raise CompilerError(f"{program} failed with exit status {status}: {reason}")
     return output
 
 

@@ -46,7 +46,7 @@ class Enclosure:
         self._enclose = loaded.nlp_gait_enclose
         self._enclose.argtypes = [ctypes.c_int, _POINTER, _INTEGER, _INTEGER, _INTEGER, *[_POINTER] * 4]
         loaded.nlp_gait_enclosure_bytes.restype = _INTEGER
-        self._memory = np.empty(-(-int(loaded.nlp_gait_enclosure_bytes()) // 8))
+        self._memory_doubles = -(-int(loaded.nlp_gait_enclosure_bytes()) // 8)
         self._p = np.array(problem.p, dtype=float)
 
     def values(self, boxes: Array) -> tuple[Array, Array]:
@@ -75,7 +75,8 @@ class Enclosure:
         """Outputs (P, first, 2) and (P, second, 2) of one of the compiled functions."""
         boxes = np.require(boxes, dtype=np.float64, requirements=("C", "A"))
         outputs = np.empty((len(boxes), first, 2)), np.empty((len(boxes), second, 2))
-        pointers = (array.ctypes.data for array in (self._p, *outputs, self._memory))
+        memory = np.empty(self._memory_doubles)  # of this call alone: several threads may call
+        pointers = (array.ctypes.data for array in (self._p, *outputs, memory))
         if self._enclose(which, boxes.ctypes.data, len(boxes), first, second, *pointers):
             raise RuntimeError("the compiled enclosure reported a failure")
         return outputs

@@ -7,6 +7,7 @@ import numpy as np
 
 from nlp_gait.backends.kernel.kernel_source import Kernel
 from nlp_gait.problem import Array
+from nlp_gait.problem.locking import one_at_a_time
 
 # Candidates in one call of the virtual machine; more would only use more memory.
 BLOCK = 64
@@ -29,6 +30,7 @@ class InterpretedKernel:
         self._shape = n, m
         self.description = "interpreted by CasADi's virtual machine"
 
+    @one_at_a_time
     def __call__(
         self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
     ) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from nlp_gait.backends.exact import ExactModel, exact_model
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 
 SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
 
@@ -32,6 +33,7 @@ class Kernel:
     weights: Array
     model: ExactModel
 
+    @one_at_a_time
     def row_bounds(self, problem: GaitProblem) -> tuple[Array, Array]:
         """Lower and upper bounds (m,) of the rows for the problem's parameter values."""
         lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(problem.p))

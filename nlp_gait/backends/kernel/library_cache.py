@@ -131,8 +131,14 @@ def _warn_once(message: str) -> None:
 def _private_folder() -> Path:
     """Folder that only this process uses, made when it is needed and removed at the end."""
     folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    atexit.register(_removed_by, os.getpid(), folder)
     return folder
+
+
+def _removed_by(process: int, folder: Path) -> None:
+    """Remove a folder, unless this is a fork of the process whose it is."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _private_folder_made() -> list[Path]:

@@ -16,6 +16,7 @@ from nlp_gait.problem import Array
 # results are the virtual machine's bit for bit, but for what vector functions of libm round differently. Hidden symbols let
 # the compiler inline CasADi's helpers.
 BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
+SCALAR_FUNCTIONS = ("-DNO_VECTOR_LIBM",)
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 
 
@@ -28,13 +29,19 @@ class NativeKernel:
         library: file of the library.
     """
 
-    def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int) -> None:
+    def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
         """Build the library, or load it from the cache.
+
+        Args:
+            kernel: what is compiled.
+            compiler: that builds it.
+            lanes: 1, 2, 4 or 8.
+            scalar_functions: sines and the like one lane after the other: then no bit depends on the lane count.
 
         Raises:
             CompilerError: the compiler fails.
         """
-        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}")
+        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *SCALAR_FUNCTIONS[: int(scalar_functions)])
         loaded, self.library = load_library(kernel_source(kernel.function), compiler, flags, SYMBOLS)
         self._evaluate = loaded.nlp_gait_evaluate
         self._evaluate.argtypes = [_POINTER, _INTEGER, *[_POINTER] * 8]

@@ -17,6 +17,7 @@ from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kk
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.solution import Guess, Outcome
 
 # Tolerance at which IPOPT distinguishes bounds with a price from those without: at kinks of |power| both are small.
@@ -66,6 +67,7 @@ class Optimum:
         return self.functions.model.point(self.w)
 
     @property
+    @one_at_a_time
     def objective(self) -> float:
         """In the problem's own sense."""
         return self.problem.objective.sign * float(self.functions.values(self.w, self.parameters)[0])
@@ -81,18 +83,21 @@ class Optimum:
         return np.append(self.problem.p, self.width)
 
     @cached_property
+    @one_at_a_time
     def matrices(self) -> tuple[Array, Array]:
         """Hessian of L and Jacobian of all rows."""
         hessian, jacobian = self.functions.matrices(self.w, self.parameters, self.multipliers)
         return np.array(hessian), np.array(jacobian)
 
     @cached_property
+    @one_at_a_time
     def rows(self) -> tuple[Array, Array, Array]:
         """Values of all rows with their lower and upper bounds."""
         _, values, lower, upper = (column(part) for part in self.functions.values(self.w, self.parameters))
         return values, lower, upper
 
 
+@one_at_a_time
 def optimum(problem: GaitProblem, near: Outcome) -> Optimum:
     """The optimum near which a solver ended.
 

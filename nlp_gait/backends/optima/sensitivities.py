@@ -19,6 +19,7 @@ from nlp_gait.backends.optima.kkt import column, kkt_functions, kkt_step
 from nlp_gait.backends.optima.optimum import WEAK, Optimum
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
@@ -54,6 +55,7 @@ class _Change(NamedTuple):
     gradient: Array
 
 
+@one_at_a_time
 def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     """Derivatives with respect to every parameter of the problem, in their order and units.
 
@@ -66,6 +68,7 @@ def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     return _sensitivities(optimum, _Change(cost[0], *others))
 
 
+@one_at_a_time
 def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
     """Derivatives with respect to what the problem was built with, for example a robot's masses.
 

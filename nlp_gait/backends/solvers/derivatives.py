@@ -81,12 +81,12 @@ def compiled_functions(functions: Sequence[ca.Function], *, optimise: bool = Fal
     compiler, flags = find_compiler(), OPTIMISED_FLAGS if optimise else FLAGS
     sources = [_source(function) for function in functions]
 
-    def compiled(function: ca.Function, source: str) -> ca.Function:
-        _, library = load_library(source, compiler, flags, (function.name(),))
-        return ca.external(function.name(), str(library))
+    def library(function: ca.Function, source: str) -> str:
+        return str(load_library(source, compiler, flags, (function.name(),))[1])
 
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(compiled, functions, sources))
+        libraries = list(pool.map(library, functions, sources))
+    return [ca.external(function.name(), file) for function, file in zip(functions, libraries, strict=True)]
 
 
 def _source(function: ca.Function) -> str:

@@ -25,6 +25,7 @@ from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 
 LOG = logging.getLogger("nlp_gait")
@@ -166,6 +167,7 @@ class Ipopt(Solver):
         self._warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
         self.create_s = time.perf_counter() - started
 
+    @one_at_a_time
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
         start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
@@ -180,6 +182,7 @@ class Ipopt(Solver):
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
         return self._stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
 
+    @one_at_a_time
     def _stages(
         self,
         problem: GaitProblem,

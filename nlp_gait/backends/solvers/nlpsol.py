@@ -23,6 +23,7 @@ from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, Iter
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problem.solution import Evaluations, Outcome
 
 PROBE_TIME_LIMIT_S = 60.0
@@ -81,6 +82,7 @@ class CasadiSolver(Solver):
         """See ``Solver``."""
         return {"kind": self.name}
 
+    @one_at_a_time
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """See ``Solver``.
 

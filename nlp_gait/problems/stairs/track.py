@@ -159,6 +159,7 @@ def stairs_track(
         assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
         start=start,
         starts=1,
+        amplifies_rounding=True,
         long_derivatives=True,
         motion=motion,
         skeleton=skeleton,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,3 +217,48 @@ def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     for count in (1, 8, 21):
         f, violation = objective(misaligned[:count])
         assert (f == 0.0).all() and (violation == 0.0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lanes", LANES[1:])
+def test_the_tracked_step_is_the_same_on_every_lane_count(lanes: int) -> None:
+    """There a rounding error decides steps of the quantised controller: with vector functions 5 % of candidates differ."""
+    assert problem_named("stairs-track").amplifies_rounding
+    X = candidates(problem_named("stairs-track"), 240)
+    one, several = objective_of("stairs-track", 1), objective_of("stairs-track", lanes)
+    assert all(np.array_equal(a, b) for a, b in zip(one(X), several(X), strict=True))
+    assert np.array_equal(one.constraints(X), several.constraints(X), equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.zeros((1, 9), dtype=complex),
+        np.ma.masked_array(np.zeros((1, 9)), mask=np.eye(1, 9)),
+        np.full((1, 9), "0.1"),
+        np.ones((1, 9), dtype=bool),
+        np.full((1, 9), "2026-01-01", dtype="datetime64[D]"),
+        np.full((1, 9), None),
+        np.full((1, 9), "0.1", dtype=object),
+    ],
+    ids=["complex", "masked", "text", "true", "date", "none", "text object"],
+)
+def test_what_numpy_would_make_numbers_of_in_silence_is_refused(given: Any) -> None:
+    problem, objective = problem_named("nao-ssp"), objective_of("nao-ssp")
+    for refuse in (
+        lambda: objective(given),
+        lambda: objective.constraints(given),
+        lambda: problem.check_x(given[0]),
+        lambda: problem.signals(given[0]),
+        lambda: nlp_gait.solve(problem, x0=given[0]),
+    ):
+        with pytest.raises(InputError, match="of nao-ssp must be numbers, got"):
+            refuse()
+
+
+def test_numbers_of_every_kind_that_mean_one_are_taken() -> None:
+    objective, X = objective_of("nao-ssp"), candidates(problem_named("nao-ssp"), 4)
+    unmasked = np.ma.masked_array(X, mask=np.zeros(X.shape))
+    exact = [[Fraction(value) for value in row] for row in X.tolist()]
+    for given in (unmasked, exact, X.astype(np.longdouble), X.astype(object)):
+        assert np.array_equal(objective(given)[0], objective(X)[0])

@@ -164,10 +164,10 @@ def test_a_limit_changes_without_building_anything_anew() -> None:
 def test_start_points_come_from_the_bounds_and_x0_goes_first() -> None:
     seen: list[Outcome] = []
     solution = solve(
-        toy(corner).with_values(**{"x.upper": -1.0}), starts=5, seed=3, x0=[-1.5, 9.0], progress=seen.append
+        toy(corner).with_values(**{"x.upper": -1.0}), starts=5, seed=3, x0=[-1.5, 3.0], progress=seen.append
     )
     assert solution.starts == tuple(seen)
-    assert seen[0].x0.tolist() == [-1.5, 3.0]  # 9 is pushed to the bound
+    assert seen[0].x0.tolist() == [-1.5, 3.0]
     assert all(-2.0 <= start.x0[0] <= -1.0 for start in seen)
     assert len({start.x0[1] for start in seen}) == 5
 
@@ -208,3 +208,13 @@ def test_wrong_input_is_refused_before_any_work() -> None:
         InputError, match=r"variable 'x' cannot be fixed at 5\.0: its bounds are \[-2, 2\] m; widen them"
     ):
         solve(problem, fix={"x": 5.0})
+
+
+def test_a_start_outside_the_bounds_is_refused_and_one_on_them_but_for_rounding_is_taken() -> None:
+    problem = toy(corner)
+    for outside in ([1e6, 0.0], [2.001, 0.0], {"x": -3.0, "y": 0.0}):
+        with pytest.raises(InputError, match=r"x0 of toy: x is .*, outside its bounds \[-2, 2\] m"):
+            solve(problem, x0=outside)
+    assert solve(problem, x0=[2.0 + 1e-9, 0.0]).starts[0].x0.tolist() == [2.0, 0.0]
+    # A variable that is fixed is where it is fixed.
+    assert solve(problem, x0=[9.0, 0.0], fix={"x": 1.0}).starts[0].x0.tolist() == [1.0, 0.0]

@@ -1,0 +1,208 @@
+"""One process or several, one thread or several: the same numbers; `python benchmarks/together.py` is the large version."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from benchmarks import together
+from compare.judge import evaluate
+from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.problem import GaitProblem
+from tests.backends.toys import corner, toy
+from tests.faults.processes import ROOT
+
+EXAMPLE = ROOT / "examples" / "bring_your_own.py"
+
+
+@pytest.mark.slow
+def test_threads_and_forked_processes_find_what_one_thread_does() -> None:
+    # In a process of its own: forking the suite, with all its threads, is not what is tested.
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.together", "--problem", "walk12", "--solves", "4"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "8 threads x 4: 0 differ" in done.stdout and "4 forked processes x 4: 0 differ" in done.stdout
+
+
+def test_a_difference_would_be_found() -> None:
+    problem = toy(corner)
+    objective = nlp_gait.compile_objective(problem)
+    found = [nlp_gait.solve(problem, x0=x0).objective for x0 in ([0.0, 0.0], [1.0, 1.0])]
+    serial = [together.Found(True, "", value, (), objective([[0.0, 0.0]])[0].tolist(), b"") for value in found]  # type: ignore[arg-type]
+    with ThreadPoolExecutor(2) as pool:
+        assert together.different(pool, 2, lambda k: serial[k], serial) == 0
+        assert together.different(pool, 2, lambda k: serial[1 - k], serial) == (4 if found[0] != found[1] else 0)
+        assert together.different(pool, 2, lambda k: serial[k]._replace(objective=1.5), serial) == 4
+
+
+def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
+    problem = nlp_gait.load("walk12")
+    points = [problem.start_point(np.random.default_rng(k)) for k in range(8)]
+    builds: list[str] = []
+
+    def build() -> object:
+        builds.append("built")
+        return object()
+
+    together_at = threading.Barrier(8)
+
+    def solved(k: int) -> tuple[bool, float, bytes, float]:
+        together_at.wait()
+        problem.built("something", build)
+        solution = nlp_gait.solve(problem, x0=points[k])
+        history = problem.signals(solution.x)
+        judged = float(evaluate(problem, solution.x).objective["value"])
+        return solution.success, solution.objective, history.arrays["q"].tobytes(), judged
+
+    with ThreadPoolExecutor(8) as pool:
+        shared = list(pool.map(solved, range(8)))
+    assert builds == ["built"]
+    together_at = threading.Barrier(1)
+    assert shared == [solved(k) for k in range(8)]
+    assert all(success for success, *_ in shared)
+
+
+def test_threads_may_use_what_was_never_built_and_the_interpreted_objective(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_compiler() -> None:
+        raise CompilerError("none here")
+
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.find_compiler", no_compiler)
+
+    def values(_: int) -> list[float]:
+        problem = nlp_gait.load("walk12")
+        objective = nlp_gait.compile_objective(problem)
+        assert objective.backend == "interpreted"
+        points = np.random.default_rng(0).uniform(problem.lower, problem.upper, (70, len(problem.names)))
+        return [*objective(points)[0].tolist(), float(evaluate(problem, points[0]).objective["value"])]
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(values, range(4)))
+    assert all(row == found[0] for row in found)
+
+
+FORKED = """
+import multiprocessing, sys
+import numpy as np
+import nlp_gait
+
+problem = nlp_gait.load("nao-ssp")
+objective = nlp_gait.compile_objective(problem, threads=2)
+X = np.random.default_rng(0).uniform(objective.lower, objective.upper, (4000, len(objective.names)))
+
+def inherited(_):
+    return objective(X)[0].tolist()
+
+def sent(given):
+    return given(X)[0].tolist()
+
+if __name__ == "__main__":
+    for _ in range(3):
+        expected = objective(X)[0].tolist()  # the threads of the parent have worked
+    with multiprocessing.get_context(sys.argv[1]).Pool(2) as pool:
+        assert pool.map(sent, [objective] * 4) == [expected] * 4
+        if sys.argv[1] == "fork":
+            assert pool.map(inherited, range(4)) == [expected] * 4
+    print("equal")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()])
+def test_an_objective_that_was_used_goes_to_a_pool(method: str, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(FORKED)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, str(program), method], env=environment, capture_output=True, text=True, timeout=100
+    )
+    assert done.stdout == "equal\n", done.stderr
+
+
+def test_a_fork_waits_until_no_other_thread_is_inside_casadi() -> None:
+    program = """
+import os, threading, nlp_gait
+problem = nlp_gait.load("walk12")
+nlp_gait.solve(problem)
+busy = threading.Thread(target=lambda: nlp_gait.solve(problem, starts=30))
+busy.start()
+child = os.fork()
+if child == 0:
+    os._exit(0 if nlp_gait.solve(problem).success else 1)
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+busy.join()
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=100)
+    assert done.stdout == "0\n", done.stderr
+
+
+def same(first: GaitProblem, second: GaitProblem) -> bool:
+    """Whether two problems have one meaning, and one value at their start points."""
+    points = [problem.start_point(np.random.default_rng(0)) for problem in (first, second)]
+    values = [evaluate(problem, points[0]).violation for problem in (first, second)]
+    return (
+        (first.address, first.options, first.values) == (second.address, second.options, second.values)
+        and np.array_equal(*points)
+        and values[0] == values[1]
+    )
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: nlp_gait.load("walk12").with_values(**{"lambda": 0.15}),
+        lambda: nlp_gait.load("nao-ssp", robot="nao-v5@mass=1.05", intervals=10).fix(swing_height_m=0.024),
+        lambda: nlp_gait.load("nao-dsp").dense(2),
+        lambda: nlp_gait.load(f"{EXAMPLE}:two_link", intervals=10),
+    ],
+    ids=["values", "options", "dense", "own code"],
+)
+def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[], GaitProblem]) -> None:
+    problem = make()
+    text = pickle.dumps(problem)
+    assert len(text) < 20_000
+    again = pickle.loads(text)
+    assert same(again, problem)
+    assert pickle.loads(text).built("exact", lambda: None) is again.built("exact", lambda: None)  # built once
+    assert copy.deepcopy(problem) is copy.copy(problem) is problem
+
+
+def test_a_problem_without_a_maker_is_refused_by_name() -> None:
+    walk = nlp_gait.load("walk12")
+    for problem in (toy(corner), walk.derived(title="other mathematics under the same name")):
+        for given in (problem, nlp_gait.compile_objective(problem)):
+            with pytest.raises(
+                InputError, match=rf"problem '{problem.name}' cannot be pickled.*make it in the other process"
+            ):
+                pickle.dumps(given)
+
+
+def test_a_robot_or_code_that_changed_on_the_way_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.json"
+    path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
+    text = pickle.dumps(nlp_gait.load("nao-ssp", robot=str(path)))
+    path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v6"}')
+    with pytest.raises(InputError, match="its robot is another one"):
+        pickle.loads(text)
+    code = tmp_path / "own.py"
+    code.write_text(EXAMPLE.read_text())
+    text = pickle.dumps(nlp_gait.load(f"{code}:two_link", intervals=10))
+    code.write_text(EXAMPLE.read_text().replace("0.05", "0.06"))
+    with pytest.raises(InputError, match="has changed since the problem was pickled"):
+        pickle.loads(text)
