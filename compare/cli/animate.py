@@ -33,10 +33,10 @@ def animate(
     from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.film.video import check_video_path, write_video
 
+    loaded = load_result(result)
     target = output_file(result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:
         check_video_path(target)
-    loaded = load_result(result)
     skeleton = skeleton_of(loaded, frames_per_s / speed)
     if target.suffix.lower() == SHEET:
         contact_sheet(skeleton, target, poses)
