@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.errors import InputError, check_name, kind_name, unknown
 from nlp_gait.problem.gait_problem import GaitProblem, is_number
 
 # Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
@@ -123,4 +123,5 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
         UnknownNameError: no such problem or option.
         InputError: a value that the option does not allow.
     """
+    check_name("problem", name)
     return problem_maker(name)(**options)
