@@ -79,15 +79,11 @@ def checked_count(name: str, value: object, *, at_least: int = 1, at_most: int |
     Raises:
         InputError: it is something else.
     """
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, Integral)
-        or value < at_least
-        or (at_most is not None and value > at_most)
-    ):
+    whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if whole is None or whole < at_least or (at_most is not None and whole > at_most):
         limit = "" if at_most is None else f" and <= {at_most}"
         raise InputError(f"{name} must be a whole number >= {at_least}{limit}, got {shown(value)}")
-    return int(value)
+    return whole
 
 
 def shown(value: object) -> str:

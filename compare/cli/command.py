@@ -47,7 +47,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
         except (GaitError, SearchError) as error:
             fail(str(error))
         except KeyboardInterrupt as interrupt:
-            end_interrupted(str(interrupt) or "interrupted")
+            end_interrupted(str(interrupt) or "interrupted; files that were written are whole")
         except OSError as error:
             _say(error)
             raise typer.Exit(1) from None

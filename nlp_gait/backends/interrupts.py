@@ -50,6 +50,15 @@ def deferred_interrupts() -> Iterator[Callable[[], bool]]:
 
 
 @contextmanager
+def held_interrupts() -> Iterator[None]:
+    """Ctrl-C waits until the end of what is inside, which takes a moment; pressed again, it does not wait."""
+    with deferred_interrupts() as pressed:
+        yield
+        if pressed():
+            raise KeyboardInterrupt
+
+
+@contextmanager
 def remembered_interrupts() -> Iterator[Callable[[], None]]:
     """Ctrl-C is raised as usual, and once more by the function yielded, in case something inside swallowed it."""
     pressed = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -27,6 +28,7 @@ PROBLEMS = {
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
+GRID = ("intervals", "samples_per_interval")  # options whose product is as limited as each is
 
 Maker = Callable[..., GaitProblem]
 
@@ -97,6 +99,7 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
     known, allowed = inspect.signature(make).parameters, _choices(make)
+    counts = {name: options.get(name, known[name].default) for name in GRID if name in known}
     for option, value in options.items():
         if option not in known:
             raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
@@ -106,6 +109,9 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
+        if option in GRID and math.prod(max(1, counts[name]) for name in GRID if name in known) > LARGEST_COUNT:
+            product = " x ".join(f"{name} {counts[name]}" for name in GRID if name in known)
+            raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
 
