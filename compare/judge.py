@@ -79,7 +79,7 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
     dense_values, dense_rows = (None, ()) if dense is None else _at(dense, point)
     objective = problem.objective
     return Evaluation(
-        problem=problem.name,
+        problem=problem.address,
         options=dict(problem.options),
         parameters=dict(problem.values),
         x=problem.by_name(point),

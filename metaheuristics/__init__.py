@@ -6,6 +6,7 @@ Independent of any problem and of CasADi: an objective is anything that follows 
     result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
 """
 
+from metaheuristics.adapters.function import PlainFunction
 from metaheuristics.algorithms.ant_colony import AntColony
 from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
@@ -15,6 +16,7 @@ from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonL
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
+from metaheuristics.own import as_algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling
 from metaheuristics.result import History, Interrupted, Result
@@ -35,6 +37,7 @@ __all__ = [
     "History",
     "Interrupted",
     "ParticleSwarm",
+    "PlainFunction",
     "Polynomial",
     "Result",
     "Rule",
@@ -45,6 +48,7 @@ __all__ = [
     "Start",
     "StaticPenalty",
     "algorithm",
+    "as_algorithm",
     "check_limits",
     "handling",
     "minimize",

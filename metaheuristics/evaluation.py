@@ -27,17 +27,20 @@ class Evaluator:
         best_x: (n,) best point so far by the feasibility rules.
         best: Its violation and objective, which compare as the rules do.
         stagnation: Generations since the best last improved.
+        generations: So far.
     """
 
-    def __init__(self, objective: BatchObjective, observe: Observer | None) -> None:
+    def __init__(self, objective: BatchObjective, observe: Observer | None, thinned: bool = False) -> None:
         """Start the clock.
 
         Args:
             objective: What to evaluate.
             observe: Called after each generation; None for nothing.
+            thinned: Keep one entry of the history for each better point, and the last one.
         """
         self._objective = objective
         self._observe = observe
+        self._thinned = thinned
         self._started = perf_counter()
         self._history: list[tuple[int, float, float, float]] = []
         self.evaluations = 0
@@ -46,11 +49,7 @@ class Evaluator:
         self.best_x: Array = np.empty(0)
         self.best = (np.inf, np.inf)
         self.stagnation = 0
-
-    @property
-    def generations(self) -> int:
-        """Generations recorded so far."""
-        return len(self._history)
+        self.generations = 0
 
     @property
     def elapsed_s(self) -> float:
@@ -83,6 +82,9 @@ class Evaluator:
         self.stagnation += 1
         if found < self.best or not self._history:
             self.best, self.best_x, self.stagnation = found, X[leader].copy(), 0
+        self.generations += 1
+        if self._thinned and self.stagnation > 1:
+            self._history.pop()
         self._history.append((self.evaluations, self.best[1], self.best[0], self.elapsed_s))
         if self._observe is not None:
             self._observe(shown, f, violation)

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metaheuristics.adapters.function import Ended, FunctionSearch
 from metaheuristics.array import Array
-from metaheuristics.constraint_handling import ConstraintHandling, Deb
+from metaheuristics.constraint_handling import ConstraintHandling, Deb, Rule
+from metaheuristics.errors import SearchError
 from metaheuristics.evaluation import Evaluator, Observer
 from metaheuristics.interface import Algorithm, BatchObjective
-from metaheuristics.preparation import check_helpers, check_limits, checked_seed, entropy, prepared
+from metaheuristics.preparation import (
+    check_helpers,
+    check_limits,
+    checked_points,
+    checked_seed,
+    entropy,
+    prepared,
+)
 from metaheuristics.result import Interrupted, Result
 
 _DEB = Deb()
@@ -59,9 +70,17 @@ def minimize(
     check_helpers(handling, observe)
     sequence = checked_seed(seed)
     start = prepared(objective, algorithm.population, evaluations, sequence, initial)
-    evaluate = Evaluator(objective, observe)
     search = algorithm.start(start)
+    evaluate = Evaluator(objective, observe, thinned=isinstance(search, FunctionSearch))  # which calls point by point
     initial_violation: Array | None = None
+
+    def generation(X: Array) -> tuple[Array, Array, Array, Rule]:
+        """What fits of a generation: points, objectives, violations, and the rule that compares them."""
+        nonlocal initial_violation
+        X = X[: evaluations - evaluate.evaluations]
+        f, violation = evaluate(X)
+        initial_violation = violation if initial_violation is None else initial_violation
+        return X, f, violation, handling.rule(evaluate.evaluations / evaluations, initial_violation)
 
     def limits_reached() -> list[str]:
         violation, f = evaluate.best
@@ -94,14 +113,13 @@ def minimize(
         )
 
     try:
+        if isinstance(search, FunctionSearch):
+            return result(_called(search, generation, limits_reached))
         while True:
-            X = search.ask()[: evaluations - evaluate.evaluations]
-            f, violation = evaluate(X)
-            if initial_violation is None:
-                initial_violation = violation
+            X, f, violation, rule = generation(checked_points(search.ask(), start.lower, start.upper))
             reasons = limits_reached()
             if not reasons:
-                search.tell(X, f, violation, handling.rule(evaluate.evaluations / evaluations, initial_violation))
+                search.tell(X, f, violation, rule)
                 reasons = list(search.stop())
             if reasons:
                 return result(reasons)
@@ -109,3 +127,36 @@ def minimize(
         if not evaluate.generations:
             raise
         raise Interrupted(result(["interrupted"])) from interrupt
+
+
+def _called(
+    search: FunctionSearch,
+    generation: Callable[[Array], tuple[Array, Array, Array, Rule]],
+    limits_reached: Callable[[], list[str]],
+) -> list[str]:
+    """Let a function call the objective until it returns or a limit is reached; why it ended.
+
+    Raises:
+        SearchError: it returned without any evaluation.
+    """
+    reasons: list[str] = []
+    called = False
+
+    def evaluate(points: Array) -> tuple[Array, Array, Rule]:
+        nonlocal called
+        if reasons:  # it went on although it was ended
+            raise Ended
+        X, f, violation, rule = generation(points)
+        called = True
+        reasons.extend(limits_reached())
+        if reasons:
+            raise Ended
+        return f, violation, rule
+
+    try:
+        ended = search.run(evaluate)
+    except Ended:
+        return reasons
+    if not called:
+        raise SearchError("the function returned without any call of f")
+    return reasons or [ended]

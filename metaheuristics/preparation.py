@@ -91,7 +91,7 @@ def check_limits(
         raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {_shown(algorithm)}")
     if not _whole(evaluations) or evaluations < algorithm.population:
         raise SearchError(
-            f"evaluations must be a whole number >= the population of {algorithm.name!r}, {algorithm.population}, got "
+            f"evaluations must be a whole number >= the population of {called(algorithm)!r}, {algorithm.population}, got "
             f"{evaluations!r}: raise the budget or take a smaller population"
         )
     if target is not None and (not _number(target) or math.isnan(target)):
@@ -123,6 +123,33 @@ def _number(value: object) -> bool:
 def _shown(value: object) -> str:
     text = repr(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
+
+
+def called(algorithm: Algorithm) -> str:
+    """Name of an algorithm; one of a user's own may have none."""
+    return str(getattr(algorithm, "name", type(algorithm).__name__))
+
+
+def checked_points(asked: object, lower: Array, upper: Array) -> Array:
+    """Points that an algorithm asks for, (P, n).
+
+    Raises:
+        SearchError: another shape, no point, NaN, or a point outside the bounds.
+    """
+    try:
+        points = np.asarray(asked, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SearchError(f"ask must return points (P, {len(lower)}); it returned no numbers: {error}") from error
+    if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
+        raise SearchError(f"ask must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}")
+    outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
+    if outside.any():
+        row, column = np.argwhere(outside)[0].tolist()
+        raise SearchError(
+            f"ask returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
+            f"{lower[column]}..{upper[column]}: clip the points"
+        )
+    return points
 
 
 def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:

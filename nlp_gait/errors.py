@@ -25,6 +25,10 @@ class InputError(GaitError):
     """A value that is not allowed: wrong length, not finite, outside its bounds, bounds inverted."""
 
 
+class OwnCodeError(InputError):
+    """Code of one's own that cannot be found, was not named, or fails."""
+
+
 class CompilerError(GaitError):
     """The compiled backend was demanded and cannot be had."""
 

@@ -1,6 +1,5 @@
 """Settings of every test."""
 
-import os
 import signal
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from nlp_gait.problem import GaitProblem, registry
+from nlp_gait.robots.loading import is_robot_file
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -49,13 +49,16 @@ def built_once() -> Iterator[None]:
 
         @wraps(make)
         def shared(**options: Any) -> GaitProblem:
-            if os.sep in str(options.get("robot", "")):
+            if is_robot_file(str(options.get("robot", ""))):
                 return make(**options)
             registry.check(make, options)  # first, for what is not hashable
             return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))
 
         return shared
 
+    def maker_of(name: str) -> Callable[..., GaitProblem]:
+        return shared_maker(name) if name in registry.PROBLEMS else find(name)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(registry, "problem_maker", shared_maker)
+        patch.setattr(registry, "problem_maker", maker_of)
         yield

@@ -15,7 +15,9 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "nlp_gait.errors",
     "nlp_gait.files",
+    "nlp_gait.columns",
     "nlp_gait.decoding",
+    "nlp_gait.references",
     "nlp_gait.robots",
     "nlp_gait.symbolic",
     "nlp_gait.problem",

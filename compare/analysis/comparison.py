@@ -60,8 +60,14 @@ class SolverRuns:
         index = int(np.argmin(self.costs))
         return self.records[index] if math.isfinite(self.costs[index]) else None
 
+    def knows(self, axis: str) -> bool:
+        """Whether the cost of every run is known, in evaluations or seconds; of results from elsewhere it may not be."""
+        return all(bool(np.isfinite(getattr(curve, axis)).all()) for curve in self.curves)
+
     def expected_cost(self, target: float, axis: str = "evaluations") -> float:
-        """Expected running time to a relative gap, in equivalent evaluations or seconds."""
+        """Expected running time to a relative gap, in equivalent evaluations or seconds; NaN where costs are not known."""
+        if not self.knows(axis):
+            return math.nan
         reached = [c.reached(target, axis) for c in self.curves]
         return expected_running_time(reached, [c.total(axis) for c in self.curves])
 

@@ -8,6 +8,7 @@ from itertools import combinations
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
 from compare.study.record import RunRecord
+from compare.study.task import FUNCTION
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,4 +63,6 @@ def _paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float
 
 
 def _shares_start(record: RunRecord) -> bool:
+    if record.settings.get("kind") == FUNCTION:  # it is given no starting points
+        return False
     return "handling" in record.definition or "polishes" in record.definition

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.intervals import bootstrap_interval
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.units import with_unit
+from compare.analysis.units import seconds, with_unit
 
 ROUNDING = 1e-12  # a share below this is none
 HEADER = (
@@ -34,7 +35,7 @@ class SolverSummary:
     Attributes:
         algorithm: name of the solver.
         runs: how many.
-        claimed: how many claim success.
+        claimed: how many claim success; None for results from elsewhere that claim nothing.
         feasible: how many end feasible, by the judge, on the problem's own samples.
         dense_feasible: how many are feasible between the samples too; None without a dense grid.
         best_claim: best objective that a run claims to be feasible.
@@ -51,7 +52,7 @@ class SolverSummary:
 
     algorithm: str
     runs: int
-    claimed: int
+    claimed: int | None
     feasible: int
     dense_feasible: int | None
     best_claim: float | None
@@ -77,11 +78,12 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     costs, records, sign = solver.feasible, solver.records, comparison.objective.sign
     claims = [sign * r.objective for r in records if r.success and r.objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
+    unsaid = all("imported" in r.definition and r.objective is None for r in records)
     dense = [r.verdict.dense_feasible for r in records]
     return SolverSummary(
         algorithm=solver.name,
         runs=len(records),
-        claimed=sum(r.success for r in records),
+        claimed=None if unsaid else sum(r.success for r in records),
         feasible=len(costs),
         dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
         best_claim=sign * min(claims) if claims else None,
@@ -91,9 +93,9 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         median_interval=(interval[0], interval[1]) if interval else None,
         gap=comparison.gap(median(costs)) if costs else None,
         evaluations=median(c.total() for c in solver.curves),
-        time_s=median(r.time_s.solve for r in records),
-        build_s=max(r.time_s.build for r in records),
-        compile_s=max(r.time_s.compile for r in records),
+        time_s=_if_known(median, [r.time_s.solve for r in records]),
+        build_s=_if_known(max, [r.time_s.build for r in records]),
+        compile_s=_if_known(max, [r.time_s.compile for r in records]),
         expected_evaluations=tuple(solver.expected_cost(target) for target in TARGETS),
         expected_s=tuple(solver.expected_cost(target, "seconds") for target in TARGETS),
     )
@@ -105,13 +107,18 @@ def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
     return (
         summary.algorithm,
         str(summary.runs),
-        f"{summary.claimed}/{summary.runs}",
+        "-" if summary.claimed is None else f"{summary.claimed}/{summary.runs}",
         f"{summary.feasible}/{summary.runs}",
         *(with_unit(value, comparison.objective.unit) for value in values),
         percent(summary.gap),
         count(summary.evaluations),
-        f"{summary.time_s:.3f} s",
+        seconds(summary.time_s),
     )
+
+
+def _if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
+    """A statistic of numbers; NaN if one is not known."""
+    return math.nan if any(math.isnan(value) for value in values) else statistic(values)
 
 
 def percent(share: float | None) -> str:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 
 def with_unit(value: float | None, unit: str, digits: str = ".6f") -> str:
     """For example ``0.845868 W``; a dash for None."""
     if value is None:
         return "-"
     return f"{value:{digits}}" + ("" if unit == "1" else f" {unit}")
+
+
+def seconds(value: float, digits: str = ".3f") -> str:
+    """For example ``0.013 s``; a dash for NaN, a time that nobody knows."""
+    return "-" if math.isnan(value) else f"{value:{digits}} s"
 
 
 def heading(words: str, unit: str) -> str:

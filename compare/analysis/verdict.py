@@ -55,7 +55,10 @@ def _cost(comparison: Comparison) -> str:
     costs = [(s, s.expected_cost(target), s.expected_cost(target, "seconds")) for s in comparison.solvers]
     reached = sorted((item for item in costs if math.isfinite(item[1])), key=lambda item: item[1])
     never = [solver.name for solver, cost, _ in costs if not math.isfinite(cost)]
-    parts = [f"{solver.name} {count(cost)} evaluations or {seconds:.2g} s" for solver, cost, seconds in reached]
+    parts = [
+        f"{solver.name} {count(cost)} evaluations" + ("" if math.isnan(seconds) else f" or {seconds:.2g} s")
+        for solver, cost, seconds in reached
+    ]
     text = f"on {comparison.problem} {_listed(parts) or 'no solver'}"
     return text + (f", never by {_listed(never)}" if never else "")
 

@@ -1,8 +1,8 @@
 """Command line: ``nlp-gait COMMAND``.
 
-From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
-result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``.
+From the problems to the comparison: ``list | evaluate | solve | search | compare | import | report | sweep | reproduce |
+walk``. From a result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty |
+motors | motions | robust``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -20,6 +20,7 @@ from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.export import export
+from compare.cli.import_results import import_results
 from compare.cli.list import list_problems
 from compare.cli.questions.certainty import certainty
 from compare.cli.questions.motions import motions
@@ -36,8 +37,8 @@ from compare.cli.simulate import simulate
 from compare.cli.solve import solve
 
 PANELS = {
-    "Problems, optima and searches": (evaluate, solve, search),
-    "Comparison": (compare, report, reproduce),
+    "Problems, optima and searches": (list_problems, evaluate, solve, search),
+    "Comparison": (compare, import_results, report, reproduce),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
     "Show and share": (simulate, animate, export),
 }
@@ -66,10 +67,11 @@ def options_of_all(
     """Take what belongs to no command."""
 
 
-app.command("list", rich_help_panel=next(iter(PANELS)))(list_problems)
+# Commands whose names Python has taken.
+NAMES = {list_problems: "list", import_results: "import"}
 for panel, functions in PANELS.items():
     for function in functions:
-        app.command(function.__name__, rich_help_panel=panel)(function)
+        app.command(NAMES.get(function, function.__name__), rich_help_panel=panel)(function)
 
 
 def main() -> None:

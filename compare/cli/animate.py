@@ -10,14 +10,14 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
 from compare.cli.interrupts import interruptible
-from compare.cli.options import ResultFile
+from compare.cli.options import StoredGait
 
 SHEET = ".png"
 
 
 @command
 def animate(
-    result: ResultFile,
+    stored: StoredGait,
     out: Annotated[
         Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
     ] = None,
@@ -31,11 +31,10 @@ def animate(
     """
     from compare.drawing.animation import contact_sheet, frames
     from compare.drawing.skeletons import skeleton_of
-    from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
-    loaded = load_result(result)
-    target = output_file(result.with_suffix(".gif") if out is None else out)
+    loaded = stored.load()
+    target = output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:
         check_video_path(target)
     skeleton = skeleton_of(loaded, frames_per_s / speed)

@@ -20,7 +20,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import typer
 
-from compare.cli.common import end_interrupted, fail, say
+from compare.cli.common import end_interrupted, fail, say_error
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError
 
@@ -92,7 +92,7 @@ def _say(error: OSError) -> None:
     # What is left in the buffers is dropped, so that the interpreter does not fail on it at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
-        say(f"cannot write the output: {error.strerror}")
+        say_error(f"cannot write the output: {error.strerror}")
 
 
 def _open_outputs() -> None:
@@ -108,7 +108,7 @@ def _open_outputs() -> None:
         sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
     if sys.stdout is None:
         sys.stdout = sys.stderr  # for the interpreter's end
-        say("standard output is closed; send it to a file or to /dev/null")
+        say_error("standard output is closed; send it to a file or to /dev/null")
         sys.exit(1)
     codecs.register_error(PLAIN, _plain)
     for stream in (sys.stdout, sys.stderr):

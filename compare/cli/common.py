@@ -65,15 +65,20 @@ def end_interrupted(sentence: str) -> NoReturn:
 
 def fail(message: str, status: int = 1) -> NoReturn:
     """End with a status and one sentence."""
-    say(message)
+    say_error(message)
     raise typer.Exit(status)
 
 
-def say(message: str) -> None:
-    """One sentence on stderr."""
+def say_error(message: str) -> None:
+    """The sentence of an error on stderr."""
     said = " ".join(message.split())
     shown = said if len(said) <= LONGEST_SENTENCE else f"{said[:LONGEST_SENTENCE]} ..."
     stderr.print(f"nlp-gait: {shown}", soft_wrap=True)
+
+
+def say(sentence: str) -> None:
+    """A sentence on stderr, beside what a command prints."""
+    stderr.print(sentence, soft_wrap=True)
 
 
 def print_json(data: Any) -> None:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
-from compare.cli.options import RESULTS, AsJson, Jobs, ProblemOptions, SearchOptions, names_in
+from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, stderr, stdout
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
 from compare.cli.report import plain_plays, play_best, print_plays
-from compare.study.settings import SolverSpec, read_settings
+from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "engine", "as_json")
+OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
 
 @command
@@ -50,23 +50,28 @@ def compare(
     ] = RESULTS,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out, whatever it was.")] = False,
     jobs: Jobs = None,
+    code: Code = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
     engine: Annotated[
         bool, typer.Option("--engine", help="Then play every solver's best gait in MuJoCo (extra sim).")
     ] = False,
+    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
     """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
 
+    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way. More runs, solvers,
+    problems or a larger budget in the same folder continue it too; runs whose algorithm, problem or robot was edited are made
+    again. Problems and algorithms of your own take part as `FILE.py:NAME`.
     With `--engine` the report says how each solver's best gait fares in a physics engine, and whether that confirms the model.
-    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import write_report
+    from compare.study.imported import imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.study import Study, check_study, default_jobs, run_study
     from nlp_gait.simulation.drive import Drive
@@ -76,19 +81,20 @@ def compare(
         mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
+    name_all(code)
     if config is not None:
         settings = read_settings(config)
     elif resume:
         known = read_manifest(out).settings
         if known is None:
             raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
-        settings = known
+        settings = as_named(known, f"the study in {str(out)!r}")
     else:
         specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = _solvers(algorithms, starts, searches.polish)
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
-    check_study(study)
+    check_study(study)  # before the manifest names it
     if engine and not any(task.problem.load().playback for task in study.tasks):
         raise InputError(
             f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
@@ -101,13 +107,15 @@ def compare(
                 study,
                 progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
                 kept=lambda count: _advance_by(advance, count),
+                anew=say,
             )
         except Interrupted as interrupt:
             end_interrupted(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
+    records += imported_records(out, records)
     plays = play_best(out, records, Drive()) if engine else []
-    written = write_report(out, records, read_manifest(out))
+    written = write_report(out, records, read_manifest(out), as_csv=as_csv)
     data = {"problems": summaries_of(records), **plain_plays(plays)} if as_json else {}
 
     def tables() -> None:
@@ -115,6 +123,22 @@ def compare(
         print_plays(plays)
 
     print_result(as_json, data, written, tables)
+    end_if_none_left(records)
+
+
+def end_if_none_left(records: Sequence[RunRecord]) -> None:
+    """Say on stderr whose runs failed, and end with status 1 if a solver has no run left on some problem."""
+    from compare.analysis.failures import failures_of
+
+    nothing_left = []
+    for failure in failures_of(records):
+        if failure.failed == failure.runs:
+            nothing_left.append(failure.solver)
+        stderr.print(f"nlp-gait: {failure.in_words}", soft_wrap=True)
+    if nothing_left:
+        fail(
+            f"without any result: {', '.join(nothing_left)}; mend the reason, and delete the failed records to run them again"
+        )
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:
@@ -140,6 +164,7 @@ HOW_TO_READ = (
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
+    from compare.analysis.failures import failures_of
     from compare.analysis.table import HEADER, cells, summarise
 
     for comparison in compare_problems(records):
@@ -150,6 +175,10 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
             [HEADER[i] for i in order],
             [[row[i] for i in order] for row in rows],
         )
+        failures = failures_of([record for solver in comparison.solvers for record in solver.records])
+        if failures:
+            cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
+            print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
     stdout.print(HOW_TO_READ)
 
 

@@ -2,34 +2,74 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compare.analysis.units import with_unit
+from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
-from compare.cli.common import fail, output_file, print_json, print_rows, print_table, stdout
-from compare.cli.options import AsJson, NamedProblem, numbers_in
+from compare.cli.common import fail, output_file, print_json, print_result, print_rows, print_table, stdout
+from compare.cli.options import AnyProblem, AsJson, numbers_in
 from compare.judge import Evaluation
+from nlp_gait.files import csv_text, write_text
+
+if TYPE_CHECKING:
+    from compare.questions.recorded import JudgedGait
+    from nlp_gait.problems.nao.recorded.problem import Recorded
 
 SHOWN_VIOLATIONS = 10
 
 
 @command
 def evaluate(
-    x: Annotated[str, typer.Option("--x", help="Decision variables in order, separated by commas.")],
-    problem: NamedProblem,
+    x: Annotated[
+        str | None,
+        typer.Option(
+            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate a row."
+        ),
+    ] = None,
+    motion: Annotated[
+        Path | None,
+        typer.Option(help="Joint angles over time instead: a CSV with columns t and joints, or a Webots .motion."),
+    ] = None,
+    touch_down: Annotated[
+        float | None, typer.Option(help="Of a cycle in --motion: when the swing foot lands [s] (default: found).")
+    ] = None,
+    engine: Annotated[bool, typer.Option(help="Play a motion in the physics engine too (extra sim).")] = True,
+    *,
+    problem: AnyProblem,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
+    table: Annotated[Path | None, typer.Option("--csv", help="Write the judged points to this CSV file.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Evaluate one candidate by the exact functions, on the problem's samples and on a dense grid.
+    """Evaluate candidates by the exact functions, on the problem's samples and on a dense grid.
 
-    Example: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`
+    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`,
+    `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
     from compare.judge import evaluate as judge
+    from compare.study.imported import FINALS, read_points
 
+    if (x is None) == (motion is None):
+        fail("give a point with --x, or a motion with --motion")
+    if motion is not None:
+        _evaluate_motion(problem.recorded(motion, touch_down), engine, signals, as_json)
+        return
+    assert x is not None  # one of both is given; for the type checker
     loaded = problem.spec().load()
+    if x.endswith(".csv"):
+        if signals is not None:
+            fail("--signals takes one candidate; give it as numbers")
+        target = None if table is None else output_file(table)
+        judged = [judge(loaded, row) for row in read_points(Path(x), loaded, FINALS)[1]]
+        if target is not None:
+            _write(target, judged)
+        points = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
+        print_result(as_json, points, [] if target is None else [target], lambda: _print_many(judged))
+        return
     point = loaded.check_x(numbers_in(x))
     if signals is not None:
         if loaded.motion is None:
@@ -39,10 +79,93 @@ def evaluate(
         target = output_file(signals)
         write_npz(target, loaded.signals(point))
     evaluation = judge(loaded, point)
+    if table is not None:
+        _write(output_file(table), [evaluation])
     if as_json:
         print_json(evaluation.to_json())
     else:
         _print(evaluation)
+
+
+def _evaluate_motion(gait: Recorded, engine: bool, signals: Path | None, as_json: bool) -> None:
+    from compare.questions.recorded import judge_gait
+    from nlp_gait.export.tables import write_npz
+
+    target = None if signals is None else output_file(signals)
+    judged = judge_gait(gait, in_engine=engine)
+    if target is not None:
+        write_npz(target, gait.problem.signals(gait.x))
+    print_result(as_json, judged.to_json(), [] if target is None else [target], lambda: _print_gait(judged))
+
+
+def _print_gait(judged: JudgedGait) -> None:
+    """The gait beside the optimum, the limits that it breaks, and what the engine says."""
+    gait = judged.recorded
+    times = ", ".join(f"{name} {value:.4g} s" for name, value in zip(gait.problem.durations, gait.x, strict=False))
+    stdout.print(f"{gait.gait}: step {1000 * gait.step_m:.1f} mm, {times}", soft_wrap=True)
+    for remark in judged.remarks:
+        stdout.print(remark, soft_wrap=True)
+    print_table(
+        "Beside the optimum at the same step and time",
+        ("index", "this gait", "optimum"),
+        [(name, f"{value:.6f}", "-" if math.isnan(best) else f"{best:.6f}") for name, value, best in judged.rows()],
+    )
+    _print_violations(judged.evaluation)
+    if judged.engine is not None:
+        found = judged.engine
+        fate = "stays up" if found.fell_at_s is None else f"FALLS at {found.fell_at_s:.2f} s"
+        stdout.print(
+            f"In the engine the robot {fate}; largest tilt {found.largest_tilt_deg:.1f} degrees; power "
+            f"{found.measured.total_W:.3f} W measured, {found.predicted.total_W:.3f} W by the model; tracking error "
+            f"{found.tracking_rms_rad:.4f} rad RMS",
+            soft_wrap=True,
+        )
+
+
+def _print_many(judged: Sequence[Evaluation]) -> None:
+    """A row for each candidate; what is violated most names the reason."""
+    objective = judged[0].objective
+    print_table(
+        f"{judged[0].problem}: {len(judged)} candidates",
+        (
+            "row",
+            heading(objective["name"], objective["unit"]),
+            "violation",
+            "feasible",
+            "between samples",
+            "violated most",
+        ),
+        [
+            (
+                str(k),
+                f"{e.objective['value']:.6g}",
+                f"{e.violation:.3g}",
+                "yes" if e.feasible else "no",
+                "-" if e.dense is None else "no" if e.dense_violations else "yes",
+                next((row.name for row in (*e.violations, *e.dense_violations)), "-"),
+            )
+            for k, e in enumerate(judged, start=1)
+        ],
+    )
+
+
+def _write(path: Path, judged: Sequence[Evaluation]) -> None:
+    """One row a candidate: its variables, what the judge found, and the indexes."""
+    found = ("violation", "feasible", "feasible_between_samples")
+    name = judged[0].objective["name"]
+    indexes = [index for index in judged[0].indexes if index != name]
+    rows = [
+        [
+            *e.x.values(),
+            e.objective["value"],
+            e.violation,
+            e.feasible,
+            "" if e.dense is None else not e.dense_violations,
+            *(e.indexes[index] for index in indexes),
+        ]
+        for e in judged
+    ]
+    write_text(path, csv_text([[*judged[0].x, name, *found, *indexes], *rows]))
 
 
 def _print(evaluation: Evaluation) -> None:
@@ -52,6 +175,10 @@ def _print(evaluation: Evaluation) -> None:
     rows = [(name, f"{value:.6f}", with_unit(dense.get(name), "1")) for name, value in evaluation.indexes.items()]
     grid = f"{evaluation.dense_intervals} intervals" if evaluation.dense else "no dense grid"
     print_table("Indexes", ("index", "own samples", grid), rows)
+    _print_violations(evaluation)
+
+
+def _print_violations(evaluation: Evaluation) -> None:
     for title, violated in (("own samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
         if not violated:
             stdout.print(f"feasible on the {title}" if title == "own samples" or evaluation.dense else "")

@@ -9,13 +9,13 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
-from compare.cli.options import ResultFile
+from compare.cli.options import StoredGait
 from nlp_gait.export.setpoints import PERIOD_MS
 
 
 @command
 def export(
-    result: ResultFile,
+    stored: StoredGait,
     format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
     out: Annotated[
         Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
@@ -27,9 +27,8 @@ def export(
     Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
     """
     from nlp_gait.export.formats import FORMATS, write_as
-    from nlp_gait.problem.result import load_result
 
-    loaded = load_result(result)
-    target = output_file(out or result.with_name(result.stem + FORMATS.get(format_, "")))
+    loaded = stored.load()
+    target = output_file(out or stored.result.with_name(stored.result.stem + FORMATS.get(format_, "")))
     write_as(format_, target, loaded, period_ms)
     print_written(target)

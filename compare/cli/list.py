@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -15,23 +16,52 @@ from nlp_gait.problem import load, problem_names
 
 @command
 def list_problems(
-    problem: Annotated[
-        str | None, typer.Argument(metavar="[PROBLEM]", help="Show its variables, parameters and options.")
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME]",
+            help="Of a problem: show its variables, parameters and options; of an algorithm or solver: its settings.",
+        ),
     ] = None,
+    algorithms: Annotated[
+        bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """List problems, algorithms and robots; or the variables, parameters and options of one problem.
+    """List problems, algorithms and robots; or what one problem, algorithm or solver can be told.
 
-    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`
+    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`
     """
-    if problem is None:
+    from compare.study.task import solver_names
+
+    known = solver_names()
+    if algorithms or name in known:
+        _print_algorithms(known if name is None else [name], as_json)
+    elif name is None:
         _overview(as_json)
     else:
-        _details(problem, as_json)
+        _details(name, as_json)
+
+
+def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
+    from compare.study.description import description_of
+
+    found = [description_of(name) for name in names]
+    if as_json:
+        print_json({"algorithms": [asdict(one) for one in found]})
+        return
+    for one in found:
+        stdout.print(f"{one.name}: {one.title}")
+        if one.settings:
+            rows = [(setting.name, setting.default, setting.words) for setting in one.settings]
+            print_table(f"{one.name}: settings", ("name", "default", "what"), rows)
+        if one.source:
+            stdout.print(f"Source: {one.source}\n")
 
 
 def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
+    from nlp_gait.references import installed
     from nlp_gait.robots import robot_names
 
     problems = {name: load(name) for name in problem_names()}
@@ -39,12 +69,19 @@ def _overview(as_json: bool) -> None:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
-        print_json({"problems": described, "algorithms": list(solver_names()), "robots": list(robot_names())})
+        algorithms = [*solver_names(), *installed("algorithm")]
+        data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names())}
+        print_json({**data, "installed": {"problems": installed("problem"), "algorithms": installed("algorithm")}})
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(solver_names())}")
     stdout.print(f"robots: {', '.join(robot_names())}")
+    for kind, listed in (("problems", installed("problem")), ("algorithms", installed("algorithm"))):
+        if listed:
+            packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
+            stdout.print(f"{kind} of other installed packages: {packages}")
+    stdout.print("your own problem or algorithm stands wherever a name does: FILE.py:NAME or MODULE:NAME")
 
 
 def _details(name: str, as_json: bool) -> None:

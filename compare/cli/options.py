@@ -14,24 +14,52 @@ import typer
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import Handling, ProblemSpec, Stop
 from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.problem import Result
 from nlp_gait.problem.registry import problem_maker
+from nlp_gait.problem.result import load_result
+from nlp_gait.references import is_reference, name_code
 
 if TYPE_CHECKING:
+    from nlp_gait.problems.nao.recorded.problem import Recorded
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
 
 ResultFile = Annotated[
     Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
 ]
-ProblemName = Annotated[str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp; see `nlp-gait list`.")]
+ProblemName = Annotated[
+    str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp, see `nlp-gait list`; or your own, FILE.py:NAME.")
+]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
 Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
+Code = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--code",
+        metavar="FILE.py:NAME",
+        help="Code of your own that the file names: it runs only if you say so; repeatable.",
+    ),
+]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 # Where results go unless --out names a folder.
 RESULTS = Path("results")
 # Options of problems that have a flag of their own.
 FLAGS = ("robot", "intervals", "derivatives")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredGait:
+    """A gait in a file, and the code of one's own that it was made with."""
+
+    result: ResultFile
+    code: Code = None
+
+    def load(self) -> Result:
+        """The gait; raises as ``load_result``, and InputError for code that is no reference."""
+        name_all(self.code)
+        return load_result(self.result)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +123,44 @@ class NamedProblem(ProblemOptions):
     def spec(self) -> ProblemSpec:
         """The problem, checked; raises as ``spec_of``."""
         return self.spec_of(self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyProblem(ProblemOptions):
+    """A problem that need not be named where a motion shows which it is."""
+
+    name: Annotated[
+        str | None, typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion.")
+    ] = None
+
+    def spec(self) -> ProblemSpec:
+        """The problem, checked; raises as ``spec_of``."""
+        if self.name is None:
+            raise InputError("name the problem that --x is a point of, for example nao-ssp")
+        return self.spec_of(self.name)
+
+    def recorded(self, motion: Path, touch_down_s: float | None) -> Recorded:
+        """The gait in a file of joint angles, with changed limits.
+
+        Raises:
+            InputError: the file holds no gait, or an option has no meaning for one.
+        """
+        from nlp_gait.export.motions import read_gait
+        from nlp_gait.problems.nao.recorded.problem import recorded
+        from nlp_gait.robots import load_robot
+
+        for flag, given in (("--option", self.option), ("--fix", self.fix), ("--derivatives", self.derivatives)):
+            if given:
+                raise InputError(f"{flag} has no meaning for a motion that is given; leave it out")
+        robot = self.robot or "nao-v5"
+        gait = recorded(
+            read_gait(motion, load_robot(robot)),
+            robot=robot,
+            gait=self.name,
+            touch_down_s=touch_down_s,
+            **({} if self.intervals is None else {"intervals": self.intervals}),
+        )
+        return replace(gait, problem=gait.problem.with_values(**_numbers(self.values, "--set")))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,6 +325,15 @@ class SearchOptions:
             ),
             seed=self.seed,
         )
+
+
+def name_all(code: Sequence[str] | None) -> None:
+    """Note that the user named code of their own, which files of data may then use."""
+    for text in code or ():
+        if not is_reference(text):
+            raise InputError(f"--code takes FILE.py:NAME or MODULE:NAME, got {text!r}")
+        name_code(text, "problem")
+        name_code(text, "algorithm")
 
 
 def names_in(text: str) -> list[str]:

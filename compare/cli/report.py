@@ -12,7 +12,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
-from compare.cli.options import AsJson, DriveOptions
+from compare.cli.options import AsCsv, AsJson, Code, DriveOptions, name_all
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
@@ -41,16 +41,21 @@ def report(
         bool,
         typer.Option("--engine", help="Play every solver's best gait in MuJoCo (extra sim), those not played yet."),
     ] = False,
+    code: Code = None,
     servos: DriveOptions,
+    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a study's report anew from its records, without running a solver.
+    """Write a study's report anew from all records of its folder, without running a solver.
+
+    Solvers that a later call left out are there too; runs of an earlier definition stand under a name that says how it differs.
 
     With `--engine` the best gaits are played, and the report says whether the engine confirms the model; what it found is kept.
 
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
+    from compare.analysis.editions import told_apart
     from compare.analysis.statistics.run_length import Weighting
     from compare.report import rebuild_report
     from compare.study.study import read_records
@@ -61,8 +66,9 @@ def report(
         if weight is not None and not math.isfinite(weight):
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
-    plays = play_best(folder, read_records(folder), servos.chosen()) if engine else []
-    written = rebuild_report(folder, weighting)
+    name_all(code)
+    plays = play_best(folder, told_apart(read_records(folder)), servos.chosen()) if engine else []
+    written = rebuild_report(folder, weighting, as_csv=as_csv)
     print_result(as_json, plain_plays(plays), written, lambda: print_plays(plays))
 
 

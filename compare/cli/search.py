@@ -9,7 +9,7 @@ import typer
 
 from compare.analysis.units import with_unit
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, print_json, print_rows, progress_bar, stdout
+from compare.cli.common import end_interrupted, fail, print_json, print_rows, progress_bar, say, stdout
 from compare.cli.compare import print_summaries
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, SearchOptions
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 @command
 def search(
     *,
-    algorithm: Annotated[str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...")] = "pso",
+    algorithm: Annotated[
+        str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...; or your own, FILE.py:NAME.")
+    ] = "pso",
     searches: SearchOptions,
     problem: NamedProblem,
     out: Annotated[
@@ -48,6 +50,7 @@ def search(
             lambda: run_study(
                 Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
                 progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
+                anew=say,
             ),
             nothing="",
         )

@@ -22,7 +22,7 @@ from compare.cli.common import (
     progress_bar,
     stdout,
 )
-from compare.cli.options import AsJson, ConditionOptions, DriveOptions, FilmOptions, ResultFile
+from compare.cli.options import AsJson, ConditionOptions, DriveOptions, FilmOptions, StoredGait
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @command
 def simulate(
-    result: ResultFile,
+    stored: StoredGait,
     *,
     steps: Annotated[int | None, typer.Option(help="Play this many steps of a gait that repeats.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
@@ -87,7 +87,8 @@ def simulate(
     target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else writable_folder(out)
     drive, conditions = servos.chosen(), world.chosen()
-    gaits = [(path, load_result(path)) for path in (result, film.beside) if path is not None]
+    gaits = [(stored.result, stored.load())]
+    gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
     plans = [plan_of(gait, steps) for _, gait in gaits]
     if share_loads:
         plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]

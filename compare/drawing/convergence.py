@@ -39,7 +39,8 @@ def cost_figure(comparison: Comparison, draw: Draw, words: str, both: bool = Fal
         figure = new_figure(7.4, 2.8)
         for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
             for solver in comparison.solvers:
-                draw(axes, solver, look[solver.name], axis)
+                if solver.knows(axis):
+                    draw(axes, solver, look[solver.name], axis)
             axes.set_xlabel(AXES[axis])
             logarithmic(axes, both)
         figure.axes[0].set_ylabel(words)

@@ -23,7 +23,7 @@ def ecdf_figure(comparison: Comparison) -> Figure:
     """Share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
 
     def draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
-        last = max([c.total(axis) for s in comparison.solvers for c in s.curves] + [1e-3])
+        last = max([c.total(axis) for s in comparison.solvers if s.knows(axis) for c in s.curves] + [1e-3])
         costs = np.array([c.reached(target, axis) for c in solver.curves for target in ECDF_TARGETS])
         at, share = ecdf(costs)
         if at.size:

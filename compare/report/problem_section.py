@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
@@ -10,7 +11,7 @@ from compare.analysis.published import published_rows
 from compare.analysis.significance import compare_pairs
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
-from compare.analysis.units import heading
+from compare.analysis.units import heading, seconds
 from compare.drawing.convergence import SMALLEST_GAP, convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, text_table
@@ -85,9 +86,9 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
                 s.algorithm,
                 "-" if s.dense_feasible is None else f"{s.dense_feasible}/{s.runs}",
                 "-" if s.median_interval is None else f"{s.median_interval[0]:.6f} to {s.median_interval[1]:.6f}",
-                f"{s.build_s:.2f} s",
-                f"{s.compile_s:.2f} s",
-                f"{s.time_s:.3f} s",
+                seconds(s.build_s, ".2f"),
+                seconds(s.compile_s, ".2f"),
+                seconds(s.time_s),
             )
             for s in summaries
         ],
@@ -210,4 +211,4 @@ def _p(value: float) -> str:
 
 
 def _seconds(value: float) -> str:
-    return "-" if value == float("inf") else f"{value:.3g}"
+    return f"{value:.3g}" if math.isfinite(value) else "-"

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
+from compare.analysis.editions import told_apart
 from compare.analysis.engine import best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import verdict
 from compare.drawing.distributions import expected_costs, profile_figure
+from compare.report.csv_files import write_csv_files
 from compare.report.document import Document, Figure, Section
 from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
-from compare.report.problem_section import problem_section
+from compare.report.problem_section import file_stem, problem_section
 from compare.report.writing import write_document
 from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
@@ -21,25 +23,33 @@ from compare.study.record import RunRecord
 from compare.study.study import read_records
 
 
-def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING) -> list[Path]:
-    """Write the report of a folder of records anew; returns the paths of its files.
+def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
+    """Write the report of all records of a folder anew, those of earlier definitions too; returns the paths of its files.
 
     Raises:
         InputError: no records there, or a damaged one.
         OutputError: the files cannot be written.
     """
-    return write_report(folder, read_records(folder), read_manifest(folder), weighting)
+    return write_report(folder, told_apart(read_records(folder)), read_manifest(folder), weighting, as_csv=as_csv)
 
 
 def write_report(
-    folder: Path, records: Sequence[RunRecord], manifest: Manifest, weighting: Weighting = DEFAULT_WEIGHTING
+    folder: Path,
+    records: Sequence[RunRecord],
+    manifest: Manifest,
+    weighting: Weighting = DEFAULT_WEIGHTING,
+    *,
+    as_csv: bool = False,
 ) -> list[Path]:
-    """Write ``report.html``, ``report.md`` and the figures as PNG and SVG; returns the paths of all files.
+    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and CSV files if asked for; returns all paths.
 
     What the folder keeps of gaits that were played in the engine is part of it.
     """
     plays = kept_plays(folder, best_gaits(records))
-    return write_document(folder, document_of(records, manifest, weighting, plays))
+    written = write_document(folder, document_of(records, manifest, weighting, plays))
+    if as_csv:
+        written += write_csv_files(folder, records, {record.problem: file_stem(record.problem) for record in records})
+    return written
 
 
 def document_of(

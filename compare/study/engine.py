@@ -15,6 +15,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, writable_folder, write_json
 from nlp_gait.problem import Result
 from nlp_gait.problem.result import StoredProblem
+from nlp_gait.references import named_as
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.measurements import measure
@@ -148,7 +149,8 @@ def _played(folder: Path, record: RunRecord, result: Result, drive: Drive, versi
 def _result(record: RunRecord) -> Result | None:
     """A record's gait; None if its problem cannot be played."""
     stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
-    problem = ProblemSpec(name=stored.name, options=stored.options, values=stored.parameters).load()
+    name = named_as(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
+    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
     return None if problem.playback is None else Result(problem=problem, x=problem.check_x(record.x))
 
 

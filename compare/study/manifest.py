@@ -66,7 +66,7 @@ class Session:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """Settings of a study, None if a program made it, and the sessions that ran it."""
+    """Settings of the study that was run last, None if a program made it, and the sessions that ran in its folder."""
 
     settings: StudySettings | None
     sessions: tuple[Session, ...]
@@ -82,20 +82,12 @@ class _Kept:
 
 
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
-    """Add a session to the folder's manifest.
+    """Add a session to the folder's manifest, whose study is now this one.
 
     Raises:
-        InputError: the folder holds another study.
+        InputError: the manifest that is there is damaged.
     """
-    sessions: Sequence[Session] = ()
-    if (folder / FILE).exists():
-        known = read_manifest(folder)
-        sessions = known.sessions
-        if known.settings is not None and known.settings.to_json() != settings.to_json():
-            raise InputError(
-                f"{str(folder)!r} holds another study; continue that one with --resume alone, choose another folder with "
-                "--out, or delete it"
-            )
+    sessions: Sequence[Session] = read_manifest(folder).sessions
     data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
     write_json(folder / FILE, data)
 
@@ -112,7 +104,9 @@ def read_manifest(folder: Path) -> Manifest:
     raw = read_json(path, "manifest", remedy=REMEDY)
     with refusing(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
         kept = decoded(_Kept, raw)
-    return Manifest(settings=settings_from(kept.study, f"manifest {str(path)!r}"), sessions=kept.sessions)
+    return Manifest(
+        settings=settings_from(kept.study, f"manifest {str(path)!r}", runs_code=False), sessions=kept.sessions
+    )
 
 
 def _versions() -> dict[str, str]:

@@ -161,6 +161,26 @@ class RunRecord:
             **found,
         )
 
+    @classmethod
+    def failed(cls, task: Task, status: str) -> RunRecord:
+        """Record of a run that has no result."""
+        return cls.of(
+            task,
+            settings={},
+            status=status,
+            success=False,
+            x={},
+            objective=None,
+            violation=None,
+            verdict=Verdict.without_point(),
+            evaluations={"f": 0},
+            failed_evaluations=0,
+            iterations=0,
+            active_constraints=(),
+            history=History(evaluations=(), objective=()),
+            time_s=Times(build=0.0, compile=0.0, solve=0.0, objective=0.0, history=()),
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
         return {"schema": SCHEMA, **without_nan(asdict(self))}
@@ -175,6 +195,7 @@ class _Definition:
     algorithm: str | Mapping[str, Any]
     settings: Mapping[str, Any]
     seed: int
+    imported: Mapping[str, str] | None = None
     handling: Mapping[str, Any] | None = None
     stop: Mapping[str, Any] | None = None
     polishes: Mapping[str, Any] | None = None
@@ -194,7 +215,12 @@ def read_record(path: Path) -> RunRecord:
         remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
         raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
     with refusing(f"record {str(path)!r} is damaged", InputError, REMEDY):
-        return _checked(decoded(RunRecord, raw, unread=("schema",)))
+        return record_from(raw)
+
+
+def record_from(raw: Any) -> RunRecord:
+    """Record from what ``to_json`` gives; ValueError if it is none."""
+    return _checked(decoded(RunRecord, raw, unread=("schema",)))
 
 
 def _checked(record: RunRecord) -> RunRecord:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.apart import run_apart
+from compare.study.record import RunRecord
 from compare.study.runs.gradient_run import gradient_run
 from compare.study.runs.search_run import search_run
 from compare.study.task import Task
 
 Run = Callable[[Task, RunRecord | None], RunRecord]
 """Does one run of a task, from the run that it polishes if it does; it crosses process borders."""
+
+LONGEST_REASON = 500  # characters of an error that a record keeps
 
 
 def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., None] | None = None) -> RunRecord:
@@ -25,23 +28,19 @@ def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., 
 
 
 def attempt(task: Task, start: RunRecord | None = None, run: Run = run_task) -> RunRecord:
-    """Do one run; whatever goes wrong in it is its record, not the end of the study."""
+    """Do one run; whatever goes wrong in it is its record, not the end of the study.
+
+    Code of one's own by name runs in a process of its own, which is ended when it does not return.
+    """
+    if task.is_own_code:
+        return run_apart(task, lambda: _attempt(task, start, run))
+    return _attempt(task, start, run)
+
+
+def _attempt(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
     try:
         return run(task, start)
-    except Exception as error:
-        return RunRecord.of(
-            task,
-            settings={},
-            status=f"failed: {type(error).__name__}: {error}",
-            success=False,
-            x={},
-            objective=None,
-            violation=None,
-            verdict=Verdict.without_point(),
-            evaluations={"f": 0},
-            failed_evaluations=0,
-            iterations=0,
-            active_constraints=(),
-            history=History(evaluations=(), objective=()),
-            time_s=Times(build=0.0, compile=0.0, solve=0.0, objective=0.0, history=()),
-        )
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split())
+        said = f"{type(error).__name__}: {reason[:LONGEST_REASON]}" if reason else type(error).__name__
+        return RunRecord.failed(task, f"failed: {said}")

@@ -8,10 +8,12 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, solver_names
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, read_text, refusing
+from nlp_gait.problem.registry import PROBLEMS
+from nlp_gait.references import named_as
 
 SCHEMA = 1  # of study files; they may leave it out
 LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
@@ -85,16 +87,17 @@ class StudySettings:
                 runs = range(self._runs(solver))
                 found += [replace(task, run=run) for run in runs]
                 if solver.polish:
-                    title = solver.label or solver.algorithm
-                    polish = replace(task, algorithm=IPOPT, settings={}, label=f"{title}+{IPOPT}", polishes=title)
-                    found += [replace(polish, run=run) for run in runs]
+                    polish = replace(
+                        task, algorithm=IPOPT, settings={}, label=f"{task.title}+{IPOPT}", polishes=task.title
+                    )
+                    found += [replace(polish, run=run, polished=replace(task, run=run)) for run in runs]
         return tuple(found)
 
     def to_json(self) -> dict[str, Any]:
         """As ``settings_from`` reads it."""
         return {
             "problem": [
-                {"name": p.name, "label": p.label, "options": dict(p.options), "set": dict(p.values)}
+                {"name": p.called, "label": p.label, "options": dict(p.options), "set": dict(p.values)}
                 for p in self.problems
             ],
             "solver": [{key: v for key, v in asdict(s).items() if v is not None} for s in self.solvers],
@@ -111,6 +114,22 @@ class StudySettings:
         return self.starts if solver.algorithm in GRADIENT_SOLVERS else self.runs
 
 
+def as_named(settings: StudySettings, owner: str) -> StudySettings:
+    """Settings that were read from a folder, with code of one's own as it was named in this process.
+
+    Raises:
+        OwnCodeError: it was not named.
+    """
+    return replace(
+        settings,
+        problems=tuple(replace(p, name=named_as(p.called, "problem", owner)) for p in settings.problems),
+        solvers=tuple(
+            s if s.algorithm in solver_names() else replace(s, algorithm=named_as(s.algorithm, "algorithm", owner))
+            for s in settings.solvers
+        ),
+    )
+
+
 def read_settings(path: Path) -> StudySettings:
     """Settings from a TOML file.
 
@@ -123,12 +142,13 @@ def read_settings(path: Path) -> StudySettings:
     return settings_from(raw, f"study file {str(path)!r}")
 
 
-def settings_from(raw: Any, source: str) -> StudySettings:
+def settings_from(raw: Any, source: str, *, runs_code: bool = True) -> StudySettings:
     """Settings from plain data.
 
     Args:
         raw: tables ``problem`` and ``solver``, and the study's own values.
         source: where it comes from, for messages.
+        runs_code: False where nobody named what stands in it: then no problem is built.
 
     Raises:
         InputError: a key that does not exist, or a value of the wrong kind or that is not allowed.
@@ -149,7 +169,7 @@ def settings_from(raw: Any, source: str) -> StudySettings:
         {"name": study.handling} if isinstance(study.handling, str) else {"name": "deb", **study.handling}
     )
     return StudySettings(
-        problems=tuple(problem.spec() for problem in study.problem),
+        problems=tuple(problem.spec(source, runs_code) for problem in study.problem),
         solvers=study.solver,
         runs=study.runs,
         starts=study.starts,
@@ -169,7 +189,11 @@ class _Problem:
     set: Mapping[str, Any] = field(default_factory=dict)
     fix: Mapping[str, Any] = field(default_factory=dict)
 
-    def spec(self) -> ProblemSpec:
+    def spec(self, source: str, runs_code: bool) -> ProblemSpec:
+        if self.fix and not runs_code and self.name not in PROBLEMS:
+            raise InputError(
+                f"{source}: 'fix' of {self.name!r} would run code that nobody named; write bounds under 'set'"
+            )
         spec = ProblemSpec(name=self.name, options=self.options, label=self.label, values=self.set)
         return replace(spec, values=dict(spec.load().fix(**self.fix).values)) if self.fix else spec
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,12 +10,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from compare.study.definition import sha256_of
 from compare.study.progress import Progress
 from compare.study.workers import default_jobs, side_by_side
-from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, writable_folder, write_json
-from nlp_gait.problem import GaitProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,31 +66,20 @@ class Steps:
         """
         results: dict[int, Any] = {}
         for k, step in enumerate(steps):
-            if (kept := _kept(self._path(step), _digest(step.inputs, self._code))) is not None:
+            if (kept := _kept(self._path(step), sha256_of(step.inputs, self._code))) is not None:
                 self._progress(f"{step.name}: kept from an earlier run")
                 results[k] = kept["result"]
         waiting = {k: step for k, step in enumerate(steps) if k not in results}
         for k, computed in _computed(waiting, min(jobs or default_jobs(), len(waiting)), self._progress):
             # As JSON gives it back, now and whenever it is read again.
             step, result = steps[k], json.loads(json.dumps(computed, allow_nan=False))
-            digests = {"sha256": _digest(step.inputs, self._code), "result_sha256": _digest(result)}
+            digests = {"sha256": sha256_of(step.inputs, self._code), "result_sha256": sha256_of(result)}
             write_json(self._path(step), {"inputs": step.inputs, "result": result, **digests})
             results[k] = result
         return [results[k] for k in range(len(steps))]
 
     def _path(self, step: Step) -> Path:
         return self._folder / f"{step.name}.json"
-
-
-def fingerprint(problem: GaitProblem) -> dict[str, Any]:
-    """What identifies a problem's mathematics and its parameter values, for ``inputs``."""
-    mathematics = exact_model(problem).function.serialize()
-    return {
-        "problem": problem.name,
-        "options": dict(problem.options),
-        "parameters": problem.p.tolist(),
-        "mathematics_sha256": hashlib.sha256(mathematics.encode()).hexdigest(),
-    }
 
 
 def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
@@ -117,9 +104,4 @@ def _kept(path: Path, digest: str) -> dict[str, Any] | None:
         return None  # damaged: made again
     if not isinstance(content, dict) or content.get("sha256") != digest or "result" not in content:
         return None
-    return content if content.get("result_sha256") == _digest(content["result"]) else None
-
-
-def _digest(data: Any, code: str = "") -> str:
-    """Checksum of inputs with the code that takes them, or of a result: a file that was changed or broke is made again."""
-    return hashlib.sha256((json.dumps(data, sort_keys=True) + code).encode()).hexdigest()
+    return content if content.get("result_sha256") == sha256_of(content["result"]) else None

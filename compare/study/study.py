@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from compare.study.record import RunRecord, read_record
+from compare.judge import evaluate
+from compare.study.definition import HASH, differences, key_of, without_hashes
+from compare.study.record import RunRecord, Verdict, read_record
 from compare.study.runner import Run, run_task
 from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
@@ -18,6 +23,8 @@ from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_js
 __all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
 
 RECORDS = "records"
+KEY_DIGITS = 8
+SAME_VALUE = 1e-9  # relative: another processor rounds otherwise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,24 +63,30 @@ def run_study(
     study: Study,
     progress: Callable[[Task, RunRecord], None] | None = None,
     kept: Callable[[int], None] | None = None,
+    anew: Callable[[str], None] | None = None,
 ) -> list[RunRecord]:
     """Run what has no record yet, and return the records of all tasks in their order.
 
-    Each record is written as soon as its run has ended, so whatever stops the study loses only the runs in progress.
+    Each record is written as soon as its run has ended, so whatever stops the study loses only the runs in progress. A record is
+    of a task if it has its definition; others stay in the folder under the key of theirs.
 
     Args:
         study: what to run.
         progress: called after each run.
         kept: called once with the number of runs that had a record already.
+        anew: called with a sentence for each solver whose runs have records of another definition, and so are made again.
 
     Raises:
         UnknownNameError: a problem, option, parameter, algorithm or setting does not exist.
-        InputError: the folder holds another study.
+        InputError: a record is damaged.
         OutputError: the folder cannot be written to; found out before the first run.
         Interrupted: Ctrl-C; carries the records of the finished runs.
     """
     check_study(study)
-    records = _finished(study)
+    records, others = _finished(study)
+    if anew is not None:
+        for sentence in _sentences(study, others):
+            anew(sentence)
     if kept is not None:
         kept(len(records))
     try:
@@ -98,15 +111,34 @@ def _run_waiting(
         for position, record in run_jobs(list(zip(tasks, starts, strict=True)), study.jobs, study.scheduler, study.run):
             index = waiting[position]
             if study.folder is not None:
-                _keep(record, record_file(study.folder, study.tasks[index]), len(records))
+                _keep(record, study.folder, len(records))
             records[index] = record
             if progress is not None:
                 progress(study.tasks[index], record)
 
 
-def _keep(record: RunRecord, path: Path, before: int) -> None:
+def keep_record(record: RunRecord, folder: Path) -> Path:
+    """Write a record under its plain name, and put one of another definition that has it under its key; returns its path.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = _file(folder, record.problem, record.algorithm, record.run)
+    if not path.parent.is_dir():
+        writable_folder(path.parent)
+    if path.exists():
+        with suppress(InputError):  # a damaged one is written over
+            earlier = read_record(path)
+            if key_of(earlier.definition) != key_of(record.definition):
+                with refusing(f"cannot write to {str(path.parent)!r}", OutputError):
+                    path.replace(_keyed(path, earlier))
+    write_json(path, record.to_json())
+    return path
+
+
+def _keep(record: RunRecord, folder: Path, before: int) -> None:
     try:
-        write_json(path, record.to_json())
+        keep_record(record, folder)
     except OutputError as error:
         raise OutputError(
             f"{error}; the {before} runs before it are kept: mend that, and the same call continues"
@@ -120,7 +152,10 @@ def check_study(study: Study) -> None:
 
 
 def record_file(folder: Path, task: Task) -> Path:
-    """``<folder>/records/<problem>/<solver>-<run>.json``; a colon in a label becomes a full stop."""
+    """``<folder>/records/<problem>/<solver>-<run>.json``, where a task's record is written; a colon becomes a full stop.
+
+    One of another definition that was there goes to ``<solver>-<run>.<key>.json``.
+    """
     return _file(folder, task.problem.title, task.title, task.run)
 
 
@@ -129,8 +164,12 @@ def _file(folder: Path, problem: str, solver: str, run: int) -> Path:
     return folder / RECORDS / problem / f"{solver}-{run:04d}.json"
 
 
+def _keyed(path: Path, record: RunRecord) -> Path:
+    return path.with_name(f"{path.stem}.{key_of(record.definition)[:KEY_DIGITS]}.json")
+
+
 def read_records(folder: Path) -> list[RunRecord]:
-    """All records below a folder, in the order of their names.
+    """All records below a folder, in the order of their names; those of earlier definitions come last.
 
     Raises:
         InputError: there are none, or one is damaged.
@@ -139,41 +178,78 @@ def read_records(folder: Path) -> list[RunRecord]:
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
-    return [_named_alike(path, read_record(path)) for path in paths]
+    records = [(path, _named_alike(path, read_record(path))) for path in paths]
+    records.sort(key=lambda item: item[0] != _file(folder, item[1].problem, item[1].algorithm, item[1].run))
+    return [record for _, record in records]
 
 
 def _named_alike(path: Path, record: RunRecord) -> RunRecord:
     """The record, if it lies where a study puts it: a copy under another name would count twice."""
     own = _file(path.parents[2], record.problem, record.algorithm, record.run)
-    if own != path:
+    if path not in (own, _keyed(own, record)):
         raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
+    if path != own and own.exists() and key_of(read_record(own).definition) == key_of(record.definition):
+        raise InputError(f"record {str(path)!r} is also {own.parent.name}/{own.name}; delete one of them")
     return record
 
 
-def _finished(study: Study) -> dict[int, RunRecord]:
-    """Records that are there already."""
-    if study.folder is None:
-        return {}
+def _finished(study: Study) -> tuple[dict[int, RunRecord], dict[int, RunRecord]]:
+    """By index of the task, records that are there already, and records under its name that are of another definition."""
     records: dict[int, RunRecord] = {}
+    others: dict[int, RunRecord] = {}
+    if study.folder is None:
+        return records, others
     for folder in {record_file(study.folder, task).parent for task in study.tasks}:
         remove_leftovers(writable_folder(folder))
     for index, task in enumerate(study.tasks):
         path = record_file(study.folder, task)
-        if path.exists():
-            records[index] = _matching(path, task)
-    return records
+        if not path.exists():
+            continue
+        definition = task.definition()
+        keyed = path.with_name(f"{path.stem}.{key_of(definition)[:KEY_DIGITS]}.json")
+        for candidate in (path, keyed):
+            if candidate.exists():
+                record = _named_alike(candidate, read_record(candidate))
+                if is_of(record, definition, task):
+                    if HASH not in record.definition["problem"]:  # the judge has agreed with it
+                        record = replace(record, definition=definition)
+                        write_json(candidate, record.to_json())
+                    records[index] = record
+                    break
+                others.setdefault(index, record)
+    return records, {index: record for index, record in others.items() if index not in records}
 
 
-def _matching(path: Path, task: Task) -> RunRecord:
-    """Record of an earlier call, if it is of the same task."""
-    record = read_record(path)
-    definition = task.definition()
-    if record.definition != definition:
-        differs = ", ".join(
-            key for key in {**record.definition, **definition} if record.definition.get(key) != definition.get(key)
+def is_of(record: RunRecord, definition: Mapping[str, Any], task: Task) -> bool:
+    """Whether a record is of a task with this definition.
+
+    One from before definitions held hashes is, if they agree in all that it says and the judge still finds at its point what it
+    found then; of code of one's own it is not, for nobody knows what that was.
+    """
+    if HASH in record.definition["problem"]:
+        return key_of(record.definition) == key_of(definition)
+    if not record.x or record.definition != without_hashes(definition):
+        return False
+    problem = task.problem.load()
+    now, then = Verdict.of(evaluate(problem, problem.check_x(record.x))), record.verdict
+    pairs = ((now.objective, then.objective), (now.violation, then.violation))
+    return all(math.isclose(a, b, rel_tol=SAME_VALUE, abs_tol=SAME_VALUE) for a, b in pairs)
+
+
+def _sentences(study: Study, others: Mapping[int, RunRecord]) -> list[str]:
+    """Which runs are made again and why, one sentence for each solver and reason."""
+    found: Counter[tuple[str, str, str]] = Counter()
+    for index, record in others.items():
+        task = study.tasks[index]
+        old, new = record.definition, task.definition()
+        if HASH not in old["problem"]:
+            new = without_hashes(new)
+        reason = (
+            differences(old, new)
+            or "nothing says that it is of this problem: its record is from before hashes were kept"
         )
-        raise InputError(
-            f"{str(path.parents[2])!r} holds another study: {path.parent.name}/{path.name} differs in {differs}; choose "
-            "another folder with --out, or delete it"
-        )
-    return record
+        found[task.problem.title, task.title, reason] += 1
+    return [
+        f"{solver} on {problem}: {count} run{'s' * (count > 1)} made again: {reason}"
+        for (problem, solver, reason), count in found.items()
+    ]

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 import metaheuristics
 import nlp_gait
+from compare.study.definition import SOURCE, group_of, problem_part, sha256_of, source_of
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.registry import check_options
+from nlp_gait.problem.registry import PROBLEMS, check_options
+from nlp_gait.references import check_reference, installed, is_own, load_object, short_name, source_sha256
+from nlp_gait.robots.loading import is_robot_file, robot_content
 
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
-LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+:-]{0,63}")
+LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])?")
+PYMOO = "pymoo:"  # before the names of that package's algorithms, which are no modules' names
+FUNCTION = "function"  # kind of a plain function in settings
+# Stands for an algorithm of one's own in checks before its code runs.
+UNREAD: Any = metaheuristics.PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
 
 def solver_names() -> tuple[str, ...]:
@@ -33,34 +43,51 @@ class ProblemSpec:
     """A problem as plain data.
 
     Attributes:
-        name: as in ``nlp-gait list``.
+        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.problem.registry.problem_maker``; or a ``GaitProblem``
+            itself, which then has its options already.
         options: what it is built with, where that differs from the defaults.
         values: parameters, where they differ from the defaults.
-        label: what a study calls it; the name if empty.
+        label: what a study calls it; the name if empty, of one's own without file or module.
     """
 
-    name: str
+    name: str | GaitProblem
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     label: str = ""
 
     @property
+    def called(self) -> str:
+        """Name."""
+        return self.name if isinstance(self.name, str) else self.name.address
+
+    @property
     def title(self) -> str:
         """Label, or name without one."""
-        return self.label or self.name
+        return self.label or (self.called if self.called in PROBLEMS else short_name(self.called))
 
     def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
         """The same with other options beside those that it has."""
         return replace(self, options={**self.options, **options})
 
     def load(self) -> GaitProblem:
-        """The problem, built once in each process."""
+        """The problem, built once in each process for each content of what it is built from."""
+        if isinstance(self.name, GaitProblem):
+            if self.options:
+                raise InputError(
+                    f"{self.called!r} is built already, so it takes no options; got {', '.join(self.options)}"
+                )
+            return self.name.with_values(**self.values)
         check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
-        return _load(self.name, tuple(sorted(self.options.items()))).with_values(**self.values)
+        robot = self.options.get("robot")
+        contents = (
+            robot_content(robot) if isinstance(robot, str) and is_robot_file(robot) else "",
+            source_sha256(self.name, "problem") if self.name not in PROBLEMS else "",
+        )
+        return _load(self.name, tuple(sorted(self.options.items())), contents).with_values(**self.values)
 
 
 @lru_cache(maxsize=16)
-def _load(name: str, options: tuple[tuple[str, Any], ...]) -> GaitProblem:
+def _load(name: str, options: tuple[tuple[str, Any], ...], contents: tuple[str, ...]) -> GaitProblem:
     return nlp_gait.load(name, **dict(options))
 
 
@@ -95,7 +122,8 @@ class Task:
 
     Attributes:
         problem: what is solved.
-        algorithm: name of the solver, or settings of a search algorithm of one's own (which must be picklable).
+        algorithm: name of the solver, also of one's own as ``file.py:name`` or ``module:name``; or a search algorithm itself, or
+            a plain function (see ``metaheuristics.as_algorithm``), which must be picklable.
         settings: of the named algorithm, where they differ from its defaults.
         handling: of constraints, in searches.
         stop: criteria.
@@ -103,11 +131,12 @@ class Task:
         run: number of the run; its own seed is ``seed + run``, so that equal runs of all algorithms start alike.
         label: what the study calls the solver; the algorithm's name if empty.
         polishes: label of the search whose equal run gives the start point; empty for a random one.
+        polished: that run, where it is known.
         start: values of all variables by name, where IPOPT or another NLP solver begins; empty for a random point.
     """
 
     problem: ProblemSpec
-    algorithm: str | Algorithm
+    algorithm: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)
     handling: Handling = field(default_factory=Handling)
     stop: Stop = field(default_factory=Stop)
@@ -115,6 +144,7 @@ class Task:
     run: int = 0
     label: str = ""
     polishes: str = ""
+    polished: Task | None = None
     start: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -125,7 +155,18 @@ class Task:
     @property
     def title(self) -> str:
         """Label, or the algorithm's name without one."""
-        return self.label or (self.algorithm if isinstance(self.algorithm, str) else self.algorithm.name)
+        if isinstance(self.algorithm, str):
+            return self.label or (short_name(self.algorithm) if self.is_own_code else self.algorithm)
+        kind = type(self.algorithm).__name__
+        return self.label or str(getattr(self.algorithm, "name", getattr(self.algorithm, "__name__", kind)))
+
+    @property
+    def is_own_code(self) -> bool:
+        """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
+        name = self.algorithm
+        if not isinstance(name, str) or name in solver_names() or name.startswith(PYMOO):
+            return False
+        return is_own(name, "algorithm")
 
     @property
     def is_search(self) -> bool:
@@ -135,11 +176,10 @@ class Task:
     def definition(self) -> dict[str, Any]:
         """All that the result depends on, as JSON gives it back; equal definitions have equal results."""
         problem = self.problem.load()
-        named = isinstance(self.algorithm, str)
         parts: dict[str, Any] = {
-            "problem": {"name": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)},
+            "problem": problem_part(problem),
             "objective": asdict(problem.objective),
-            "algorithm": self.algorithm if named else plain_settings(self.algorithm),
+            "algorithm": self._algorithm_part(),
             "settings": dict(self.settings),
             "seed": self.run_seed,
         }
@@ -153,16 +193,35 @@ class Task:
             parts["start"] = dict(self.start)
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
+            if self.polished is not None:
+                parts["polishes"]["key"] = sha256_of(group_of(self.polished.definition()))
         try:
             return json.loads(json.dumps(parts, allow_nan=False))
         except (TypeError, ValueError) as error:
             raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
 
-    def search(self) -> Algorithm:
-        """Settings of the search algorithm."""
-        if isinstance(self.algorithm, str):
-            return metaheuristics.algorithm(self.algorithm, **self.settings)
+    def _algorithm_part(self) -> str | dict[str, Any]:
+        """Name, or settings, and the hash of the source where it is not this package's."""
+        if not isinstance(self.algorithm, str):
+            source = source_of(self.algorithm)
+            return {**plain_settings(self.algorithm), **({} if source is None else {SOURCE: source})}
+        if self.is_own_code:
+            return {"name": self.algorithm, SOURCE: source_sha256(self.algorithm, "algorithm")}
         return self.algorithm
+
+    def search(self) -> Algorithm:
+        """Settings of the search algorithm; code of one's own runs here for the first time.
+
+        Raises:
+            SearchError: it is no algorithm, or does not take its settings.
+            OwnCodeError: its code cannot be found or fails.
+        """
+        if not isinstance(self.algorithm, str):
+            return metaheuristics.as_algorithm(self.algorithm, self.title, self.settings)
+        if self.is_own_code:
+            own = load_object(self.algorithm, "algorithm")
+            return metaheuristics.as_algorithm(own, self.title, self.settings)
+        return metaheuristics.algorithm(self.algorithm, **self.settings)
 
     def solver(self) -> Solver:
         """NLP solver with its settings and the limits that it heeds.
@@ -185,18 +244,21 @@ def check_task(task: Task) -> None:
     for title in (task.problem.title, task.title):
         if not LABEL.fullmatch(title):
             raise InputError(
-                f"a label has 1 to 64 letters, digits and . _ + : -, and begins with a letter or digit; got {title!r}"
+                f"a label has 1 to 64 letters, digits, spaces and . _ + : ( ) -, and begins with a letter or digit; got {title!r}"
             )
-    if isinstance(task.algorithm, str) and task.algorithm not in solver_names():
-        raise unknown("algorithm", task.algorithm, solver_names())
+    if task.is_own_code:
+        check_reference(str(task.algorithm), "algorithm")  # without running it
+    elif isinstance(task.algorithm, str) and task.algorithm not in solver_names():
+        raise unknown("algorithm", task.algorithm, [*solver_names(), *installed("algorithm")])
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
     if not task.is_search:
         task.solver().check(problem)
     else:
         metaheuristics.handling(task.handling.name, **task.handling.settings)
+        algorithm = UNREAD if task.is_own_code else task.search()
         metaheuristics.check_limits(
-            task.search(), task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s
+            algorithm, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s
         )
     if task.start:
         if task.is_search:
@@ -206,9 +268,27 @@ def check_task(task: Task) -> None:
 
 def plain_problem(problem: GaitProblem) -> dict[str, Any]:
     """Name, options and changed parameter values of a problem, as plain data from which ``load_result`` makes it again."""
-    return {"problem": problem.name, "options": dict(problem.options), "parameters": dict(problem.values)}
+    return {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
 
 
 def plain_settings(settings: Any) -> dict[str, Any]:
-    """Settings with their class name, as plain data."""
-    return {"kind": type(settings).__name__, **asdict(settings)}
+    """Settings with their class name, as plain data; of an object that is no data class what is plain among its attributes."""
+    if isinstance(settings, metaheuristics.PlainFunction):
+        return {**plain_settings(settings.function), **settings.settings}
+    if inspect.isroutine(settings):
+        return {"kind": FUNCTION, "function": settings.__qualname__}
+    kind = type(settings).__name__
+    known = is_dataclass(settings) and not isinstance(settings, type)
+    values = asdict(settings) if known else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
+    return {"kind": kind, **{name: _plain(value) for name, value in values.items()}}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it; what it has not is named by its type."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return value if value is None or isinstance(value, (str, int, float)) else f"<{type(value).__name__}>"

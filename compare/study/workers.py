@@ -46,16 +46,19 @@ def run_jobs(
         WorkerError: worker processes keep dying.
         InputError: no Dask scheduler answers at the address, or Dask is not installed.
     """
-    if scheduler is None and (workers == 1 or len(jobs) <= 1):
-        for position, job in enumerate(jobs):
-            with remembered_interrupts() as check:
-                record = attempt(*job, run)
-                check()
-            yield position, record
+    alone = scheduler is None and (workers == 1 or len(jobs) <= 1)
+    # A problem that was given itself holds symbols and functions that cannot leave this process.
+    here = {position for position, (task, _) in enumerate(jobs) if alone or not isinstance(task.problem.name, str)}
+    for position in sorted(here):
+        with remembered_interrupts() as check:
+            record = attempt(*jobs[position], run)
+            check()
+        yield position, record
+    if len(here) == len(jobs):
         return
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    waiting = dict(enumerate(jobs))
+    waiting = {position: job for position, job in enumerate(jobs) if position not in here}
     deaths = 0
     with ExitStack() as stack:
         if scheduler is not None:
@@ -82,7 +85,8 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
 
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
     with children_ignore_interrupts():
-        results = parallel(delayed(_numbered)(number, call) for number, call in calls.items())
+        folder = os.getcwd() if workers > 0 else None  # another machine has other folders
+        results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
     try:
         for result in results:  # noqa: UP028  `yield from` would close them before what is below
             yield result
@@ -92,7 +96,10 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
             results.close()
 
 
-def _numbered(number: int, call: Callable[[], T]) -> tuple[int, T]:
+def _numbered(number: int, call: Callable[[], T], folder: str | None) -> tuple[int, T]:
+    """Number and result of a call made where the caller is: a worker stays where it was started, and paths may be relative."""
+    if folder is not None and os.getcwd() != folder:
+        os.chdir(folder)
     return number, call()
 
 

@@ -111,7 +111,7 @@ def solution_of(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0
         status += f"; in the way: {names}; relax these limits or widen the bounds" if names else ""
         status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
     return Solution(
-        problem=problem.name,
+        problem=problem.address,
         options=dict(problem.options),
         parameters=dict(problem.values),
         success=best.success,

@@ -24,7 +24,7 @@ def write_json(path: Path, result: Result, signals: Signals) -> None:
     problem = result.problem
     data = {
         "schema": SCHEMA,
-        "problem": problem.name,
+        "problem": problem.address,
         "options": dict(problem.options),
         "parameters": dict(problem.values),
         "x": problem.by_name(result.x),

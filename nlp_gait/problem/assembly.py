@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, TypeAlias, TypeVar
 import casadi as ca
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import unknown
+from nlp_gait.errors import InputError, unknown
 
 Expression = TypeVar("Expression", MX, SX, DM)
 
@@ -27,6 +27,16 @@ class Variable:
     minimum: float = -math.inf
     maximum: float = math.inf
 
+    def __post_init__(self) -> None:
+        """Refuse bounds that leave no range, which is a variable's unit of length."""
+        owner = f"variable {self.name!r}"
+        for end in ("lower", "upper"):
+            _check_number(owner, end, getattr(self, end))
+        if not self.lower < self.upper:
+            raise InputError(
+                f"{owner}: lower must be below upper, got {self.lower} and {self.upper}; hold a variable at a value by fixing it"
+            )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
@@ -38,6 +48,15 @@ class Parameter:
     description: str
     minimum: float = -math.inf
     maximum: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse a default that is no number."""
+        _check_number(f"parameter {self.name!r}", "default", self.default)
+
+
+def _check_number(owner: str, field: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"{owner}: {field} must be a finite number, got {value!r}")
 
 
 def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
@@ -84,6 +103,25 @@ class Constraint:
     lower: MX | None = None
     upper: MX | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse what gives no rows, by the name of the row."""
+        owner = f"constraint {self.name!r}"
+        _check_number(owner, "scale", self.scale)
+        if not self.scale > 0.0:
+            raise InputError(f"{owner}: scale must be > 0: a violation of this size counts as 1; got {self.scale}")
+        m = _rows_of(owner, "value", self.value)
+        for end in ("lower", "upper"):
+            bound = getattr(self, end)
+            if bound is not None and (count := _rows_of(owner, end, bound)) not in (1, m):
+                raise InputError(f"{owner}: {end} must have one row or as many as value, {m}, got {count}")
+        if self.lower is None and self.upper is None:
+            raise InputError(f"{owner}: it needs lower, upper or both")
+        if isinstance(self.labels, str) or len(self.labels) != (len(self.labels) and m) or (m != 1 and not self.labels):
+            raise InputError(
+                f"{owner}: its value has {m} rows, labels has {len(self.labels)}: give one label for each row"
+                + (", or none" if m == 1 else "")
+            )
+
     @property
     def row_names(self) -> tuple[str, ...]:
         """For example ``torque_change[LKneePitch, 3]``."""
@@ -102,6 +140,21 @@ class Constraint:
         return self.value, column(self.lower, -math.inf), column(self.upper, math.inf)
 
 
+def _rows_of(owner: str, field: str, value: object) -> int:
+    """Number of rows of a column of symbols."""
+    if not isinstance(value, MX):
+        remedy = f"; write MX({value})" if isinstance(value, (int, float)) else ""
+        raise InputError(f"{owner}: {field} must be a CasADi MX, got {type(value).__name__} {_short(value)}{remedy}")
+    if value.shape[1] != 1:
+        raise InputError(f"{owner}: {field} must be a column, got shape {value.shape}; casadi.vec makes one")
+    return int(value.shape[0])
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:40]} ..."
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assembly:
     """A problem's mathematics under one interpretation of the non-smooth operations.
@@ -115,6 +168,18 @@ class Assembly:
     objective: MX
     constraints: tuple[Constraint, ...]
     indexes: Mapping[str, MX]
+
+    def __post_init__(self) -> None:
+        """Refuse an objective or index that is no scalar, and what is no constraint."""
+        for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):
+            if not isinstance(value, MX) or value.shape != (1, 1):
+                got = f"shape {value.shape}" if isinstance(value, MX) else f"{type(value).__name__} {_short(value)}"
+                raise InputError(f"{owner} must be a scalar MX, got {got}")
+        for constraint in self.constraints:
+            if not isinstance(constraint, Constraint):
+                raise InputError(
+                    f"constraints must be Constraint, got {type(constraint).__name__} {_short(constraint)}"
+                )
 
     def group(self, name: str) -> Constraint:
         """Rows of a name; raises KeyError."""

@@ -88,6 +88,7 @@ class GaitProblem:
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
         searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
+        loaded_as: what ``load`` was asked for, where that is not the name: code of one's own.
     """
 
     name: str
@@ -110,6 +111,7 @@ class GaitProblem:
     starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
+    loaded_as: str = ""
     # No argument, so that every copy but those of ``with_values`` begins with nothing built.
     _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -119,6 +121,11 @@ class GaitProblem:
         twice = [name for name, count in counts.items() if count > 1]
         if twice:
             raise InputError(f"problem {self.name!r}: these variables or parameters stand twice: {', '.join(twice)}")
+
+    @property
+    def address(self) -> str:
+        """What ``load`` takes, and files of results name."""
+        return self.loaded_as or self.name
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -261,6 +268,7 @@ class GaitProblem:
             motion=None if motion is None else lambda at: motion(at.only(self.names)),
             start=start if self.start is not None or variables else None,
             refine=None if self.refine is None else refine,
+            loaded_as="" if name else self.loaded_as,
         )
 
     def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:

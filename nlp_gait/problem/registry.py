@@ -11,7 +11,9 @@ from dataclasses import replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from nlp_gait.errors import InputError, check_name, kind_name, unknown
+from nlp_gait.problem.checks import check_mathematics
 from nlp_gait.problem.gait_problem import GaitProblem, is_number
+from nlp_gait.references import guarded, installed, is_own, load_object, name_code, reference
 
 # Module and maker of each problem, imported when it is asked for: no process pays for those that it does not use.
 PROBLEMS = {
@@ -50,6 +52,8 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
             check(made, options)
             call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
             problem = make(**call)
+            if not isinstance(problem, GaitProblem):
+                raise InputError(f"{make.__name__!r} must make a GaitProblem, it made {type(problem).__name__}")
             grid, values = problem.grid, dict(call)
             if grid is not None and "samples_per_interval" in call:
                 values["samples_per_interval"] = grid.samples_per_interval  # as chosen where that was left to it
@@ -63,6 +67,7 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
             own = getattr(grid, refined_by)
             return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
 
+        made.options_checked = True  # type: ignore[attr-defined]
         return made
 
     return decorate
@@ -76,14 +81,50 @@ def problem_names() -> tuple[str, ...]:
 def problem_maker(name: str) -> Maker:
     """Function that makes a problem; its keyword arguments are the problem's options.
 
+    Args:
+        name: of a problem of the package, of an installed package's entry point, or ``file.py:name`` or ``module:name`` of
+            a maker or a ``GaitProblem``.
+
     Raises:
         UnknownNameError: no such problem.
+        OwnCodeError: code of one's own that cannot be found or fails.
     """
+    if name not in PROBLEMS and is_own(name, "problem"):
+        return own_maker(name)
     if name not in PROBLEMS:
-        raise unknown("problem", name, PROBLEMS)
+        raise unknown("problem", name, [*PROBLEMS, *installed("problem")])
     module, _, function = PROBLEMS[name].partition(":")
     make: Maker = getattr(importlib.import_module(module), function)
     return make
+
+
+def own_maker(name: str) -> Maker:
+    """Maker of a problem of one's own, which is checked as it is made."""
+    name_code(name, "problem")
+    own = load_object(name, "problem")
+    path = reference(name, "problem").home
+    if isinstance(own, GaitProblem):
+        kept = own
+
+        def make() -> GaitProblem:
+            return kept
+
+    elif callable(own):
+        make = own if hasattr(own, "options_checked") else maker()(own)
+        for option, parameter in inspect.signature(make).parameters.items():
+            if type(parameter.default) not in (str, int, float, bool) or parameter.kind is parameter.POSITIONAL_ONLY:
+                raise InputError(f"{name!r}: option {option} needs a default: a text, a number, true or false")
+    else:
+        raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(own).__name__}")
+
+    @functools.wraps(make)
+    def made(**options: Any) -> GaitProblem:
+        check(make, options)
+        problem = guarded(name, path, lambda: make(**options))
+        guarded(name, path, lambda: check_mathematics(problem))
+        return replace(problem, loaded_as=name)
+
+    return made
 
 
 def check_options(name: str, options: Mapping[str, Any]) -> None:
@@ -125,9 +166,13 @@ def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Problem by name, built with the given options; the others keep their defaults.
 
+    Args:
+        name: see ``problem_maker``.
+        options: of its maker.
+
     Raises:
         UnknownNameError: no such problem or option.
-        InputError: a value that the option does not allow.
+        InputError: a value that the option does not allow, or code of one's own that fails.
     """
     check_name("problem", name)
     return problem_maker(name)(**options)

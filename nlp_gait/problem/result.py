@@ -14,6 +14,7 @@ from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.problem.registry import load
 from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
+from nlp_gait.references import named_as
 
 SCHEMA = 1  # of a result; one that does not say so is taken as the first
 # What `solve`, `evaluate` and `export --format json` write beside what is read here.
@@ -30,11 +31,21 @@ BESIDE_RECORD = (
 
 @dataclass(frozen=True, kw_only=True)
 class StoredProblem:
-    """A problem as a study's record holds it."""
+    """A problem as a study's record holds it.
+
+    Attributes:
+        name: that ``load`` takes.
+        options: of its maker.
+        parameters: that differ from the defaults.
+        sha256: hash of what was made, empty in records from before there was one.
+        source_sha256: hash of the source of a problem of one's own.
+    """
 
     name: str
     options: Mapping[str, str | int | float | bool]
     parameters: Mapping[str, float]
+    sha256: str = ""
+    source_sha256: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,5 +116,5 @@ def _of_result(raw: Any) -> Result:
 def _result(
     name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
 ) -> Result:
-    problem = load(name, **options).with_values(**parameters)
+    problem = load(named_as(name, "problem", "it"), **options).with_values(**parameters)
     return Result(problem=problem, x=problem.check_x(x))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -21,6 +22,7 @@ from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector
 from nlp_gait.robots.tree import reversed_joint
 from nlp_gait.robots.urdf import urdf_record
 
+FILE_ENDINGS = (".json", ".urdf")
 LONGEST_CHAIN = 8  # of robots that extend each other
 
 T = TypeVar("T")
@@ -79,17 +81,39 @@ def robot_names() -> tuple[str, ...]:
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _DATA.iterdir() if entry.name.endswith(".json")))
 
 
-@cache
 def load_robot(name_or_path: str) -> Robot:
     """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
 
-    Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``.
+    Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read anew each
+    time: it may have changed, or be another one under the same relative path.
 
     Raises:
         UnknownNameError: no such robot.
         RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
         MissingExtraError: a URDF cannot be read without its extra.
     """
+    return _made_from(name_or_path) if is_robot_file(name_or_path) else _loaded(name_or_path)
+
+
+def is_robot_file(name_or_path: str) -> bool:
+    """Whether a robot comes from a file rather than with the package."""
+    return split_name(name_or_path)[0].endswith(FILE_ENDINGS)
+
+
+def robot_content(path: str) -> str:
+    """Hash of all files that a robot from a file is made of; raises as ``load_robot``."""
+    source, _ = split_name(path)
+    return hashlib.sha256(
+        repr(_merged(_beside_urdf(source) if source.endswith(".urdf") else source)).encode()
+    ).hexdigest()
+
+
+@cache
+def _loaded(name: str) -> Robot:
+    return _made_from(name)
+
+
+def _made_from(name_or_path: str) -> Robot:
     source, changes = split_name(name_or_path)
     path = _beside_urdf(source) if source.endswith(".urdf") else source
     return perturbed(_robot(_merged(path), path), changes)

@@ -18,6 +18,7 @@ from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.playback import LEAST_LOAD, Trace
 
 AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a servo counts as saturated
+LASTING = round(0.003 / TIME_STEP)  # [steps of the engine] of a load that is no brush
 MIDDLE = (0.2, 0.8)  # part of the phase that neither the start from unloaded servos nor the landing disturbs
 
 
@@ -63,13 +64,13 @@ class Landing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Touchdown:
-    """One swinging foot's first touch of the ground in the second half of its swing.
+    """Where the ground first carried a swinging foot for 3 ms on end, in the second half of its swing.
 
     Attributes:
         side: of the foot.
         planned_s: when the plan sets it down.
-        measured_s: when the ground first carried it.
-        speed_m_s: of the sole under the ankle towards the ground just before.
+        measured_s: when that began.
+        speed_m_s: of the sole under the ankle towards the ground just before; 0 if it moved away from it.
     """
 
     side: str
@@ -215,10 +216,12 @@ def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
             planned = min(int(set_down), len(trace.t) - 1)
             middle = (int(lifted) + planned) // 2
-            carried = np.flatnonzero(trace.loads[middle:, i] > LEAST_LOAD)
+            loaded = (trace.loads[middle:, i] > LEAST_LOAD).astype(float)
+            # From here on the ground carries for a while: a toe that brushes an edge has not landed.
+            carried = np.flatnonzero(np.convolve(loaded, np.ones(LASTING), "valid") == LASTING)
             if middle > 0 and carried.size:
                 first = middle + int(carried[0])
-                speed = float(trace.feet[first - 1, i, 2] - trace.feet[first, i, 2]) / TIME_STEP
+                speed = max(0.0, float(trace.feet[first - 1, i, 2] - trace.feet[first, i, 2]) / TIME_STEP)
                 found.append(
                     Touchdown(
                         side=side,

@@ -12,8 +12,8 @@ from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.playback import play
 
 DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}
-PUSH_STEP, LARGEST_PUSH = 0.05, 3.0  # [N s]
-SLOPE_STEP, LARGEST_SLOPE = 0.5, 20.0  # [degrees]
+PUSH_STEP, LARGEST_PUSH = 0.1, 3.0  # [N s]
+SLOPE_STEP, LARGEST_SLOPE = 1.0, 20.0  # [degrees]
 FRICTIONS = tuple(round(0.1 * k, 1) for k in range(3, 11))
 MASS_FACTORS = (0.9, 1.1)
 

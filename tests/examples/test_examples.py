@@ -17,6 +17,7 @@ EXPECTED = {
     "evaluate_your_own_x.py": "power 0.866844 W, feasible: True",
     "your_own_objective.py": "0.0 W/s: 0.845869 W",
     "your_own_algorithm.py": "| box-0.97 | 5 |",
+    "bring_your_own.py": "annealing, 2000 evaluations: power ",
     "sweep.py": "15.0 mm: 0.84587 W, converged",
     "custom_robot.py": "nao-with-a-load: ",
 }

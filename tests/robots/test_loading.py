@@ -122,7 +122,6 @@ def test_what_is_wrong_with_a_robot_is_said(
 ) -> None:
     raw = tiny()
     load_robot(written(tmp_path, raw))  # unharmed it loads
-    load_robot.cache_clear()
     damage(raw)
     with pytest.raises(RobotDataError, match=message):
         load_robot(written(tmp_path, raw))

@@ -47,7 +47,6 @@ def stored(folder: Path, tree: ElementTree.Element | str, robot: object = None) 
     path = folder / "robot.urdf"
     path.write_text(tree if isinstance(tree, str) else ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
     written(folder, partner(nao(), "robot.urdf") if robot is None else robot)
-    load_robot.cache_clear()
     return str(path)
 
 

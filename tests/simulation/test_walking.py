@@ -104,7 +104,7 @@ def test_held_set_points_cost_energy_and_way(cycle: Result) -> None:
     assert found.walked_m is not None and found.engine_J_per_planned_m is not None
     assert 0.8 * found.planned_m < found.walked_m < 0.95 * found.planned_m
     assert found.engine_J_per_planned_m > 2.0 * found.model_J_per_m
-    assert (found.measurements.landing_speed_m_s or 0.0) > 0.1 and (found.measurements.earliest_landing_s or 0.0) > 0.05
+    assert (found.measurements.landing_speed_m_s or 0.0) > 0.1 and (found.measurements.earliest_landing_s or 0.0) > 0.03
 
 
 def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:

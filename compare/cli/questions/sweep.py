@@ -31,6 +31,7 @@ def sweep(
     from compare.questions.sweep.report import sweep_answer
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
+    from compare.study.task import Task
 
     spec = problem.spec()
     axes = [parse_axis(text) for text in over]
@@ -46,7 +47,7 @@ def sweep(
                 progress=advance,
             )
         )
-    output.take(sweep_answer(points, spec.load(), algorithm))
+    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title))
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
         end_interrupted(f"{stopped}; these are in {output.out}{not_twice}")

@@ -12,9 +12,10 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers.nao.paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
+from compare.study.definition import fingerprint
 from compare.study.record import RunRecord
 from compare.study.runner import run_task
-from compare.study.steps import Step, fingerprint
+from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.ipopt import IpoptSettings

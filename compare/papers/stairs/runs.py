@@ -14,8 +14,9 @@ from compare.papers.runs import Runs, best, point, searches, starts
 from compare.papers.stairs.motion import swing_leg
 from compare.papers.stairs.paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
 from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
+from compare.study.definition import fingerprint
 from compare.study.record import RunRecord
-from compare.study.steps import Step, fingerprint
+from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm

@@ -12,7 +12,8 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.runs import Runs, best, searches, starts
 from compare.papers.walk12.paper import F1MAX, TABLE_3, TABLE_4, PaperRow
-from compare.study.steps import Step, fingerprint
+from compare.study.definition import fingerprint
+from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 from nlp_gait.backends.optima.continuation import Continuation

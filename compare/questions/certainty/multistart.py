@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Steps
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError

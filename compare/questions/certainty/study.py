@@ -16,8 +16,9 @@ from compare.questions.certainty import branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Steps
 from compare.study.task import plain_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decoded

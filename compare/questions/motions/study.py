@@ -13,8 +13,9 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Steps
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings

@@ -93,7 +93,7 @@ def motor_variants(
     published = spec.load()
     if "motors" in spec.options:
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
-    if "motors" not in inspect.signature(problem_maker(spec.name)).parameters:
+    if "motors" not in inspect.signature(problem_maker(spec.called)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
     limited = {rotor: spec.with_options(motors=f"limits{rotor}").load() for rotor in ("", ",rotor")}
     found: list[Variant] = []

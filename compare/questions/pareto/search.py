@@ -12,8 +12,9 @@ import numpy as np
 
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Steps
 from metaheuristics.array import Array
 from metaheuristics.multi_objective import MultiObjective, minimize_many
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective

@@ -14,8 +14,9 @@ from compare.questions.pareto.competing import CompetingObjective, competing_obj
 from compare.questions.pareto.front import FrontPoint, pareto_front
 from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps, fingerprint
+from compare.study.steps import Steps
 from compare.study.task import plain_problem
 from metaheuristics.multi_objective import MultiObjective
 from nlp_gait.decoding import decoded

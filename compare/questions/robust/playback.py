@@ -11,14 +11,11 @@ import numpy as np
 from compare.questions.robust.study import Robust
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem import Result
+from nlp_gait.problem import Array, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import averaged_pressure
 from nlp_gait.simulation.plan import SIDES, Plan, plan_of
-from nlp_gait.simulation.playback import Trace, play
-
-MARGIN = "dbm_y_mean_m"
+from nlp_gait.simulation.playback import play
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +29,7 @@ class Played:
         largest_tilt_deg: of the torso.
         margin_m: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the
             nearer edge of the supporting soles.
-        predicted_margin_m: the same of the model's ZMP on this robot.
+        predicted_margin_m: the same of the planned ZMP on this robot, over the same instants.
     """
 
     gait: str
@@ -62,21 +59,21 @@ def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> P
     point = problem.check_x(x)
     plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
     trace = play(plan, drive=drive)
+    during = trace.t <= plan.duration_s
     return Played(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,
         largest_tilt_deg=math.degrees(float(trace.tilt.max())),
-        margin_m=lateral_margin(plan, trace, drive),
-        predicted_margin_m=exact_model(problem).at(point, problem.p).indexes[MARGIN],
+        margin_m=lateral_margin(plan, averaged_pressure(trace, drive.period_s)[during, 1]),
+        predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
     )
 
 
-def lateral_margin(plan: Plan, trace: Trace, drive: Drive) -> float:
-    """Mean over the phase of the centre of pressure's distance to the nearer side of the supporting soles [m]."""
+def lateral_margin(plan: Plan, y: Array) -> float:
+    """Mean distance of lateral positions (T,) [m] to the nearer side of the supporting soles [m]."""
     feet = [
         (plan.at(f"{side}_foot", np.zeros(1))[0, 1], plan.robot.feet[side]) for side in SIDES if side in plan.supports
     ]
     left, right = max(y + foot.left_m for y, foot in feet), min(y - foot.right_m for y, foot in feet)
-    y = averaged_pressure(trace, drive.period_s)[trace.t <= plan.duration_s, 1]
     return float(np.nanmean(np.minimum(left - y, y - right)))

@@ -49,7 +49,14 @@ def _numbers(stem: str, points: Sequence[SweepPoint], problem: GaitProblem) -> T
     # A variable may be an axis too; its column then says what the axis asked for, exactly.
     columns = [name for name in problem.names if name not in axes]
     objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
-    header = [*axes, objective, "feasible", "violation", *columns, "evaluations", "time_s", "status"]
+    taken = {*axes, *columns}
+    verdict, cost = (
+        [
+            f"run_{name}" if name in taken else name for name in names
+        ]  # a problem of one's own may have a variable time_s
+        for names in ((objective, "feasible", "violation"), ("evaluations", "time_s", "status"))
+    )
+    header = [*axes, *verdict, *columns, *cost]
     rows: list[list[Value]] = [
         [
             *(*p.at.values(), p.objective, p.feasible, p.violation),

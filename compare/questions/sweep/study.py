@@ -12,7 +12,7 @@ import numpy as np
 
 from compare.study.progress import Progress, unwatched
 from compare.study.record import RunRecord
-from compare.study.runner import run_task
+from compare.study.runner import attempt, run_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
@@ -172,7 +172,7 @@ def _searched(tasks: Sequence[Task], progress: Progress) -> list[RunRecord]:
     try:
         for task in tasks:
             with remembered_interrupts() as check:
-                record = run_task(task)
+                record = attempt(task) if task.is_own_code else run_task(task)
                 progress("")
                 check()
             records.append(record)

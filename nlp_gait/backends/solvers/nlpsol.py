@@ -144,7 +144,11 @@ class Fatrop(CasadiSolver):
 
 @dataclass(frozen=True, kw_only=True)
 class WatchedSolver(CasadiSolver):
-    """A solver that heeds a limit of wall time for all stages, checked after each iteration; None for no limit."""
+    """A solver that heeds a limit of wall time for all stages, checked after each iteration; None for no limit.
+
+    Attributes:
+        time_limit_s: limit of wall time, checked between iterations [s]; None for no limit.
+    """
 
     watched: ClassVar[bool] = True
 

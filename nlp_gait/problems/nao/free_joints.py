@@ -35,7 +35,7 @@ from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.economy import economical, tabulated
-from nlp_gait.symbolic.kinematics import Pose, forward_kinematics
+from nlp_gait.symbolic.kinematics import forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.splines import fitted
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, plus
@@ -54,11 +54,13 @@ class FreeParts(NamedTuple):
         torso: (3,) origin of the torso [m].
         ankle: (3,) of the right foot [m].
         corners: (3, 4) of the right sole [m].
+        upright: cosine of the torso's lean.
     """
 
     torso: SX
     ankle: SX
     corners: SX
+    upright: SX
 
 
 OTHERS = (YAW_PITCHES[0], *ARM_SWING)
@@ -109,22 +111,7 @@ class FreeMotion:
 
     def body(self, q: Mapping[str, SX]) -> FreeParts:
         """Where torso and right foot are, from angles by joint name."""
-        poses = self._poses(q)
-        torso = poses[self.robot.root]
-        entry = next(body.joint for body in self._tree if body.link.name == self.robot.root)
-        assert entry is not None  # the torso is not the fixed link; for the type checker
-        foot = self.robot.feet["right"]
-        ankle = poses[foot.link]
-        corners = [
-            (along, across, -foot.ankle_height_m)
-            for along in (-foot.back_m, foot.front_m)
-            for across in (-foot.right_m, foot.left_m)
-        ]
-        return FreeParts(
-            torso.position - torso.rotation @ DM(entry.origin_m),
-            ankle.position,
-            ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
-        )
+        return free_parts(self.robot, self._tree, q, self.support)
 
     @cached_property
     def instant(self) -> ca.Function:
@@ -145,9 +132,36 @@ class FreeMotion:
     def _tree(self) -> tuple[Body, ...]:
         return tree_from(self.robot, self.robot.feet["left"].link)
 
-    def _poses(self, q: Mapping[str, SX]) -> dict[str, Pose]:
-        poses = forward_kinematics(self._tree, q, SX(DM(self.support)))
-        return {body.link.name: pose for body, pose in zip(self._tree, poses, strict=True)}
+
+def free_parts(
+    robot: Robot, tree: Sequence[Body], q: Mapping[str, SX], support: tuple[float, float, float]
+) -> FreeParts:
+    """Where torso and right foot are.
+
+    Args:
+        robot: with links welded that never move.
+        tree: of the robot from its left foot.
+        q: angles by joint name [rad].
+        support: (3,) the left ankle, which stands [m].
+    """
+    found = forward_kinematics(tree, q, SX(DM(support)))
+    poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
+    torso = poses[robot.root]
+    entry = next(body.joint for body in tree if body.link.name == robot.root)
+    assert entry is not None  # the torso is not the fixed link; for the type checker
+    foot = robot.feet["right"]
+    ankle = poses[foot.link]
+    corners = [
+        (along, across, -foot.ankle_height_m)
+        for along in (-foot.back_m, foot.front_m)
+        for across in (-foot.right_m, foot.left_m)
+    ]
+    return FreeParts(
+        torso.position - torso.rotation @ DM(entry.origin_m),
+        ankle.position,
+        ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
+        torso.rotation[2, 2],
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import PANELS, app, common
 from compare.cli.common import PlainConsole, print_table
+from tests.compare.cli.calls import as_json
 
 ROOT = Path(__file__).parents[3]
 HEADER = (
@@ -96,3 +97,15 @@ def test_the_solution_is_in_its_file_although_the_reader_of_the_output_has_gone(
     command = f"{sys.executable} -P -m nlp_gait solve nao-dsp --starts 1 --out {target} | true"
     subprocess.run(command, shell=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
     assert '"success": true' in target.read_text()
+
+
+def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():
+    from compare.study.description import description_of
+    from compare.study.task import solver_names
+
+    for name in solver_names():
+        found = description_of(name)
+        assert found.title and all(setting.words for setting in found.settings), name
+    (swarm,) = as_json("list", "pso")["algorithms"]
+    assert {"name": "inertia_damping", "default": "0.99"}.items() <= swarm["settings"][2].items()
+    assert "Kennedy, Eberhart (1995)" in swarm["source"]

@@ -57,7 +57,6 @@ def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> N
     [
         (["compare", "--resume", "--out", "{folder}", "--runs", "3"], ["--resume", "leave out --runs"]),
         (["compare", "nao-ssp", "--config", "x.toml", "--out", "{new}"], ["--config", "leave out [PROBLEM]"]),
-        (["compare", "nao-ssp", "--runs", "2", "--out", "{folder}"], ["holds another study", "--out"]),
         (["compare", "--resume", "--out", "{new}"], ["no study to resume"]),
         (["compare", "--config", "{new}/none.toml", "--out", "{new}"], ["cannot be read"]),
         (["compare", "nao-ssp", "--algorithms", "psso", "--out", "{new}"], ["unknown algorithm 'psso'", "pso"]),

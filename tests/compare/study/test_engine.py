@@ -148,7 +148,7 @@ def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
 ) -> None:
     pytest.importorskip("mujoco")
     loaded = task._load
-    monkeypatch.setattr(task, "_load", lambda name, options: replace(loaded(name, options), playback=None))
+    monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), playback=None))
     refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
     assert refused.exit_code == 1 and "no gait of nao-dsp can be played; leave out --engine" in refused.stderr
     assert not (tmp_path / "study.json").exists()

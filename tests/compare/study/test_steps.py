@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import nlp_gait
-from compare.study.steps import Step, Steps, fingerprint
+from compare.study.definition import fingerprint
+from compare.study.steps import Step, Steps
 
 
 def test_a_step_runs_once_for_equal_inputs(tmp_path: Path) -> None:

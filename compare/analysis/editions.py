@@ -1,0 +1,47 @@
+"""Records of one folder told apart where problems or solvers of one name are of several definitions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from compare.study.definition import edition, group_of, sha256_of
+from compare.study.record import RunRecord
+
+# An edition's name is a label, so that files can be named after it.
+NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
+LONGEST = 30
+
+
+def told_apart(records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Records under names that say how an earlier problem or solver differs from today's: ``pso (evaluations 500)``.
+
+    Of each name, the definition of the first record keeps it; ``read_records`` puts the latest first.
+    """
+    first: dict[str, dict[str, Any]] = {}
+    named: dict[tuple[str, str], str] = {}
+    found = []
+    for record in records:
+        whole = group_of(record.definition)
+        problem = _name(record.problem, {"problem": whole["problem"], "algorithm": ""}, first, named)
+        solver = _name(f"{problem}\0{record.algorithm}", whole, first, named).partition("\0")[2]
+        found.append(replace(record, problem=problem, algorithm=solver))
+    return found
+
+
+def _name(
+    label: str, definition: Mapping[str, Any], first: dict[str, dict[str, Any]], named: dict[tuple[str, str], str]
+) -> str:
+    """A label, with what differs from the first definition that had it."""
+    key = label, sha256_of(definition)
+    if key not in named:
+        name = label
+        if label in first:
+            said = NOT_IN_LABELS.sub("", edition(definition, first[label]))[:LONGEST]
+            name = f"{label} ({said})"
+            name = name if name not in named.values() else f"{label} ({key[1][:8]})"
+        first.setdefault(label, dict(definition))
+        named[key] = name
+    return named[key]

@@ -1,0 +1,53 @@
+"""``nlp-gait import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compare.cli.command import command
+from compare.cli.common import print_result
+from compare.cli.compare import print_summaries, summaries_of
+from compare.cli.options import RESULTS, AsCsv, AsJson, NamedProblem
+
+
+@command
+def import_results(
+    *,
+    problem: NamedProblem,
+    finals: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FINALS.csv",
+            help="One row a run: the variables, and run, seed, objective, violation, evaluations, time_s where known.",
+        ),
+    ],
+    history: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="Best so far: run, evaluations, objective and maybe time_s.")
+    ] = None,
+    label: Annotated[str, typer.Option("--as", help='What the report calls it, for example "GA (MATLAB)".')],
+    evaluations: Annotated[int | None, typer.Option(min=1, help="Of every run, where neither file says it.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of a study, new or not.")] = RESULTS,
+    as_csv: AsCsv = False,
+    as_json: AsJson = False,
+) -> None:
+    """Take results from elsewhere into a study: judged like everything else, beside the others in its report.
+
+    Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
+    """
+    from compare.analysis.editions import told_apart
+    from compare.report import write_report
+    from compare.study.imported import imported
+    from compare.study.manifest import read_manifest
+    from compare.study.study import keep_record, read_records
+    from nlp_gait.files import writable_folder
+
+    spec = problem.spec()
+    records = imported(spec, finals, label, history, evaluations)
+    kept = [keep_record(record, writable_folder(out)) for record in records]
+    everything = told_apart(read_records(out))
+    written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
+    shown = [record for record in everything if record.problem == spec.title]
+    print_result(as_json, {"problems": summaries_of(shown)}, written, lambda: print_summaries(shown))

@@ -1,0 +1,71 @@
+"""All runs, and all judged points, as CSV files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from compare.study.record import RunRecord
+from nlp_gait.files import csv_text, without_nan, write_text
+
+CALLS = ("f", "g", "gradient", "jacobian", "hessian")
+RUN = ("problem", "solver", "run", "seed", "success", "status", "claimed_objective", "claimed_violation")
+JUDGED = ("objective", "violation", "feasible", "feasible_between_samples")
+COST = (*(f"calls_{kind}" for kind in CALLS), "failed_evaluations", "iterations", "time_s")
+
+
+def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
+    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; what is not known is an empty cell.
+
+    Args:
+        folder: to write to.
+        records: of all problems.
+        stems: of the files, by problem.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    files = [folder / "runs.csv"]
+    write_text(
+        files[0], csv_text([(*RUN, *JUDGED, *COST), *(_cells([*_run(r), *_judged(r), *_cost(r)]) for r in records)])
+    )
+    for problem, stem in stems.items():
+        own = [record for record in records if record.problem == problem]
+        names = list(dict.fromkeys(name for record in own for name in record.x))
+        taken = {*names, *JUDGED}
+        indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in taken))
+        rows = [
+            _cells(
+                [
+                    r.algorithm,
+                    r.run,
+                    *(r.x.get(n) for n in names),
+                    *_judged(r),
+                    *(r.verdict.indexes.get(n) for n in indexes),
+                ]
+            )
+            for r in own
+            if r.x
+        ]
+        files.append(folder / f"{stem}-points.csv")
+        write_text(files[-1], csv_text([("solver", "run", *names, *JUDGED, *indexes), *rows]))
+    return files
+
+
+def _run(record: RunRecord) -> list[object]:
+    claims = (record.objective, record.violation)
+    return [record.problem, record.algorithm, record.run, record.seed, record.success, record.status, *claims]
+
+
+def _judged(record: RunRecord) -> list[object]:
+    verdict = record.verdict
+    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible]
+
+
+def _cost(record: RunRecord) -> list[object]:
+    calls = [record.evaluations.get(kind) for kind in CALLS]
+    return [*calls, record.failed_evaluations, record.iterations, record.time_s.solve]
+
+
+def _cells(row: list[object]) -> list[object]:
+    return ["" if value is None else value for value in without_nan(row)]

@@ -1,0 +1,151 @@
+"""What a run depends on, by content: the one hash of a problem, and when two definitions are of the same run.
+
+Paths are part of a definition, for whoever reads it, and no part of its key: a robot or code of one's own is what its text says,
+wherever it lies.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.files import read_bytes
+from nlp_gait.problem import GaitProblem
+from nlp_gait.references import short_name, source_digest, source_sha256
+from nlp_gait.robots.loading import is_robot_file
+
+HASH, SOURCE = "sha256", "source_sha256"
+SHOWN_DIGITS = 8  # of a hash
+MATHEMATICS = "the problem's mathematics or limits"
+WORDS: Mapping[tuple[str, ...], str] = {
+    ("problem", HASH): MATHEMATICS,
+    ("problem", SOURCE): "the problem's source",
+    ("algorithm", SOURCE): "the algorithm's source",
+    ("polishes", "key"): "the search that it polishes",
+}
+
+
+def sha256_of(data: Any, code: str = "") -> str:
+    """Hash of plain data, and of the text of the code that takes it."""
+    return hashlib.sha256((json.dumps(data, sort_keys=True) + code).encode()).hexdigest()
+
+
+def fingerprint(problem: GaitProblem) -> dict[str, Any]:
+    """What identifies a problem's mathematics and its parameter values: every number of a robot is in one of both."""
+
+    def mathematics() -> str:
+        return hashlib.sha256(exact_model(problem).function.serialize().encode()).hexdigest()
+
+    return {
+        "problem": problem.address,
+        "options": dict(problem.options),
+        "parameters": problem.p.tolist(),
+        "mathematics_sha256": problem.built("mathematics_sha256", mathematics),
+    }
+
+
+def problem_part(problem: GaitProblem) -> dict[str, Any]:
+    """A problem in a definition: how to make it again, and the hash of what was made."""
+    found = fingerprint(problem)
+    content = [found["mathematics_sha256"], found["parameters"], problem.names]
+    part = {
+        "name": found["problem"],
+        "options": found["options"],
+        "parameters": dict(problem.values),
+        HASH: sha256_of(content),
+    }
+    if problem.loaded_as:
+        part[SOURCE] = source_sha256(problem.loaded_as, "problem")
+    return part
+
+
+def source_of(algorithm: object) -> str | None:
+    """Hash of the source file of an object of a program's own; None for this package's, and where there is no file."""
+    kind = algorithm if inspect.isroutine(algorithm) else type(algorithm)
+    if kind.__module__.partition(".")[0] == "metaheuristics":
+        return None
+    try:
+        path = inspect.getsourcefile(kind)
+    except TypeError:
+        return None
+    if path is None:
+        return None
+    return source_digest(Path(path), read_bytes(Path(path), "source"), kind.__qualname__.partition(".")[0])
+
+
+def key_of(definition: Mapping[str, Any]) -> str:
+    """Hash of a definition without what says only where something lies."""
+    return sha256_of(_content(definition))
+
+
+def group_of(definition: Mapping[str, Any]) -> dict[str, Any]:
+    """What all runs of a solver in a study share: no seed, no start point, and nothing that says only where something lies."""
+    return {key: part for key, part in _content(definition).items() if key not in ("seed", "start", "imported")}
+
+
+def without_hashes(definition: Mapping[str, Any]) -> dict[str, Any]:
+    """A definition as the first records have it; that of code of one's own, which they could not identify, is like no other."""
+    problem = {key: value for key, value in definition["problem"].items() if key != HASH}
+    found = {**definition, "problem": problem}
+    if "polishes" in found:
+        found["polishes"] = {key: value for key, value in found["polishes"].items() if key != "key"}
+    return found
+
+
+def _content(definition: Mapping[str, Any]) -> dict[str, Any]:
+    problem = dict(definition["problem"])
+    if HASH in problem:
+        problem["name"] = short_name(problem["name"]) if SOURCE in problem else problem["name"]
+        robot = problem["options"].get("robot")
+        if isinstance(robot, str) and is_robot_file(robot):
+            problem["options"] = {**problem["options"], "robot": ""}  # it is in the hash
+    algorithm = definition["algorithm"]
+    if isinstance(algorithm, Mapping) and "name" in algorithm:
+        algorithm = {**algorithm, "name": short_name(algorithm["name"])}
+    return {**definition, "problem": problem, "algorithm": algorithm}
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """In words, what differs between two definitions: ``evaluations 500 -> 1000, the algorithm's source``."""
+    found = {
+        place: WORDS.get(place) or f"{place[-1]} {_shown(before)} -> {_shown(after)}"
+        for place, before, after in _changed(old, new)
+    }
+    return ", ".join(found.values())
+
+
+def edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """In a few words, what a definition has where it differs from another one: ``evaluations 500``, ``source 3fa9c1d2``."""
+    said = []
+    for place, before, _ in _changed(old, new):
+        name = {HASH: "mathematics", SOURCE: "source"}.get(place[-1], place[-1])
+        said.append(f"{name} {str(before)[:SHOWN_DIGITS] if place[-1] in (HASH, SOURCE, 'key') else _shown(before)}")
+    return ", ".join(said)
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any, Any]]:
+    """Places at which two definitions differ, with both values; the mathematics only where nothing else explains it."""
+    before, after = dict(_leaves(_content(old))), dict(_leaves(_content(new)))
+    places = [place for place in {**before, **after} if before.get(place) != after.get(place)]
+    causes = [place for place in places if place[0] == "problem" and place[-1] != HASH]
+    for place in places:
+        if place != ("problem", HASH) or not causes:
+            yield place, before.get(place), after.get(place)
+
+
+def _leaves(data: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from _leaves(value, (*place, str(key)))
+    else:
+        yield place, data
+
+
+def _shown(value: Any) -> str:
+    text = "none" if value is None else str(value)
+    return text if len(text) <= 40 else f"{text[:40]} ..."

@@ -1,0 +1,179 @@
+"""Results from elsewhere as records of a study: judged like everything else; what is not known stays unknown."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.study.definition import problem_part, sha256_of
+from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.study import RECORDS, read_records
+from compare.study.task import LABEL, ProblemSpec
+from nlp_gait.columns import Columns, read_columns
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array, GaitProblem
+
+# Columns beside the variables.
+FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
+HISTORY = ("run", "evaluations", "objective")
+
+
+def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) -> tuple[Columns, Array]:
+    """Points (m, n) of a CSV file: columns by the variables' names in any order, or without a header in the order of x.
+
+    Args:
+        path: of the file.
+        problem: whose points they are.
+        beside: names of columns that may stand beside the variables.
+
+    Raises:
+        InputError: the file cannot be read, or a row is no point.
+        UnknownNameError: a column that nobody reads.
+    """
+    table = read_columns(path, "points")
+    if table.header:
+        table.check_header(problem.names, beside)
+        order = [table.header.index(name) for name in problem.names]
+    elif table.width == len(problem.names):
+        order = list(range(table.width))
+    else:
+        raise InputError(
+            f"{table.owner} has {table.width} columns and no header; {problem.name} has {len(problem.names)} variables: "
+            f"{', '.join(problem.names)}"
+        )
+    points = np.array(table.rows)[:, order]
+    for line, x in zip(table.lines, points, strict=True):
+        if not np.isfinite(x).all():
+            name = problem.names[int(np.flatnonzero(~np.isfinite(x))[0])]
+            raise InputError(f"{table.owner}, line {line}: {name} must be a finite number")
+    return table, points
+
+
+def imported(
+    spec: ProblemSpec, finals: Path, label: str, histories: Path | None = None, evaluations: int | None = None
+) -> list[RunRecord]:
+    """A record for each row of a file of final points.
+
+    Args:
+        spec: the problem.
+        finals: one row a run: the variables and, where known, ``run``, ``seed``, ``objective`` and ``violation`` as claimed,
+            ``evaluations``, ``time_s``.
+        label: what the study calls the solver.
+        histories: best so far: ``run``, ``evaluations``, ``objective`` (empty while nothing was feasible) and maybe ``time_s``.
+        evaluations: of every run, where neither file says it.
+
+    Raises:
+        InputError: a file cannot be read, or holds what no run can have.
+    """
+    if not LABEL.fullmatch(label):
+        raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
+    problem = spec.load()
+    table, points = read_points(finals, problem, FINALS)
+    given = {name: None if name in problem.names else table.column(name) for name in FINALS}
+    runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
+    if len(set(runs)) < len(runs):
+        raise InputError(f"{table.owner}: a run stands twice")
+    known = {} if histories is None else _histories(histories, runs)
+    part, objective = problem_part(problem), asdict(problem.objective)
+    records = []
+    for k, (run, x) in enumerate(zip(runs, points, strict=True)):
+        row = {name: math.nan if column is None else column[k] for name, column in given.items()}
+        verdict = Verdict.of(evaluate(problem, x))
+        history, seconds = known.get(run, (None, ()))
+        if history is None:
+            count = row["evaluations"] if given["evaluations"] else evaluations
+            if count is None:
+                raise InputError(
+                    f"{table.owner} says nothing of evaluations: add a column 'evaluations', give --history, or --evaluations N "
+                    "for all runs"
+                )
+            history = History(
+                evaluations=(table.count("evaluations", k, count, 1),),
+                objective=(verdict.objective if verdict.feasible else None,),
+            )
+            seconds = (row["time_s"],)
+        claim = None if math.isnan(row["objective"]) else row["objective"]
+        seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
+        content = [x.tolist(), {name: repr(value) for name, value in row.items()}, asdict(history), repr(seconds)]
+        records.append(
+            RunRecord(
+                problem=spec.title,
+                algorithm=label,
+                run=run,
+                seed=seed,
+                definition=json.loads(
+                    json.dumps(
+                        {
+                            "problem": part,
+                            "objective": objective,
+                            "algorithm": label,
+                            "settings": {},
+                            "seed": seed,
+                            "imported": {"sha256": sha256_of(content)},
+                        }
+                    )
+                ),
+                settings={"kind": "imported", "file": finals.name},
+                status=f"imported from {finals.name}",
+                success=claim is not None and not row["violation"] > 0.0,
+                x=problem.by_name(x),
+                objective=claim,
+                violation=None if math.isnan(row["violation"]) else row["violation"],
+                verdict=verdict,
+                evaluations={"f": history.evaluations[-1]},
+                failed_evaluations=0,
+                iterations=0,
+                active_constraints=(),
+                history=history,
+                time_s=Times(build=math.nan, compile=math.nan, solve=seconds[-1], objective=math.nan, history=seconds),
+            )
+        )
+    return records
+
+
+def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
+    """Best so far and times by run."""
+    table = read_columns(path, "history")
+    table.check_header(HISTORY, ("time_s",))
+    columns = [table.column(name) or () for name in HISTORY]
+    seconds = table.column("time_s") or (math.nan,) * len(table.rows)
+    found: dict[int, list[tuple[int, float | None, float]]] = {}
+    for k, (run, count, value, time) in enumerate(zip(*columns, seconds, strict=True)):
+        entries = found.setdefault(table.count("run", k, run), [])
+        evaluations = table.count("evaluations", k, count, 1)
+        if entries and evaluations < entries[-1][0]:
+            raise InputError(f"{table.owner}, line {table.lines[k]}: evaluations of run {run:g} must ascend")
+        entries.append((evaluations, None if math.isnan(value) else value, time))
+    for run in found:
+        if run not in runs:
+            raise InputError(f"{table.owner}: run {run} has no final point")
+    missing = [run for run in runs if run not in found]
+    if missing:
+        raise InputError(f"{table.owner}: run {missing[0]} has no history")
+    return {
+        run: (
+            History(evaluations=tuple(e for e, _, _ in entries), objective=tuple(f for _, f, _ in entries)),
+            tuple(t for _, _, t in entries),
+        )
+        for run, entries in found.items()
+    }
+
+
+def imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Imported records of a folder that are of the very problems of some records."""
+    if not (folder / RECORDS).is_dir():
+        return []
+    known = {record.problem: record.definition["problem"].get("sha256") for record in records}
+    return [
+        record
+        for record in read_records(folder)
+        if "imported" in record.definition
+        and record.problem in known
+        and record.definition["problem"].get("sha256") == known[record.problem]
+    ]

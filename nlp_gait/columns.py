@@ -1,0 +1,103 @@
+"""Tables of numbers from CSV files, as other programs write them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import read_text
+
+DELIMITERS = ",;\t"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Columns:
+    """Numbers in rows.
+
+    Attributes:
+        owner: the file, for messages.
+        header: names of the columns; empty if the file has none.
+        rows: of equal length; NaN where a cell is empty.
+        lines: of the file, one for each row.
+    """
+
+    owner: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+    lines: tuple[int, ...]
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.rows[0])
+
+    def column(self, name: str) -> tuple[float, ...] | None:
+        """Values under a name, None without such a column."""
+        return tuple(row[self.header.index(name)] for row in self.rows) if name in self.header else None
+
+    def check_header(self, needed: Collection[str], allowed: Collection[str]) -> None:
+        """Refuse a column that is missing, or one that nobody reads.
+
+        Raises:
+            InputError: one is missing.
+            UnknownNameError: one is not known.
+        """
+        missing = [name for name in needed if name not in self.header]
+        if missing:
+            raise InputError(
+                f"{self.owner} needs the columns {', '.join(missing)}; it has {', '.join(self.header) or 'no header'}"
+            )
+        for name in self.header:
+            if name not in needed and name not in allowed:
+                raise unknown(f"column of {self.owner}", name, [*needed, *allowed])
+
+    def count(self, name: str, row: int, value: float, at_least: int = 0) -> int:
+        """A whole number of a cell; raises InputError."""
+        if not (math.isfinite(value) and value == int(value) and value >= at_least):
+            raise InputError(
+                f"{self.owner}, line {self.lines[row]}: {name} must be a whole number >= {at_least}, got {value:g}"
+            )
+        return int(value)
+
+
+def read_columns(path: Path, what: str) -> Columns:
+    """Numbers of a CSV file; commas, semicolons or tabs between them, and a header if its first line is not all numbers.
+
+    Raises:
+        InputError: it cannot be read, has no row, or a cell that is no number.
+    """
+    text = read_text(path, what)
+    owner = f"{what} {str(path)!r}"
+    first = text.partition("\n")[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
+    found = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
+    header: tuple[str, ...] = ()
+    if found and not all(_is_number(cell) for cell in found[0][1] if cell):
+        header = tuple(found.pop(0)[1])
+        if len(set(header)) < len(header):
+            raise InputError(f"{owner}: two columns have the same name")
+    if not found:
+        raise InputError(f"{owner} has no rows of numbers")
+    width = len(header) or len(found[0][1])
+    rows = []
+    for number, row in found:
+        if len(row) != width:
+            raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns")
+        for cell in row:
+            if cell and not _is_number(cell):
+                raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
+        rows.append(tuple(float(cell) if cell else math.nan for cell in row))
+    return Columns(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

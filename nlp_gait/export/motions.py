@@ -1,0 +1,71 @@
+"""Joint angles over time, read from the files of other programs: CSV, and Webots' ``.motion``."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from nlp_gait.columns import read_columns
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.export.webots import read_motion
+from nlp_gait.problems.nao.recorded.motion import JointAngles
+from nlp_gait.robots import Robot
+
+# ``q LKneePitch [rad]`` as `export --format csv` writes it, ``LKneePitch``, ``LKneePitch [deg]``, ``t``, ``time_s``.
+COLUMN = re.compile(r"(?:(?P<what>\w+) )?(?P<name>\w+)(?: ?\[(?P<unit>[^\]]*)\])?")
+TIMES = ("t", "time", "time_s")
+FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
+
+
+def read_gait(path: Path, robot: Robot) -> JointAngles:
+    """Angles over time of the joints of a robot.
+
+    Args:
+        path: a ``.motion`` file of Webots, or CSV with a column of times [s] and one of angles for each joint: ``t``,
+            ``LKneePitch``, or ``LKneePitch [deg]``; of what ``nlp-gait export --format csv`` writes, the angles.
+        robot: with all its joints.
+
+    Raises:
+        InputError: the file cannot be read, or has no times.
+        UnknownNameError: a column that is no joint.
+    """
+    if path.suffix == ".motion":
+        points = read_motion(path, robot.joints)
+        known = [k for k, column in enumerate(points.angles.T) if not np.isnan(column).all()]
+        joints = tuple(points.joints[k] for k in known)
+        return JointAngles(
+            owner=f"motion {str(path)!r}",
+            joints=joints,
+            t=np.array(points.times_ms) / 1000.0,
+            q=points.angles[:, known],
+        )
+    table = read_columns(path, "motion")
+    times: int | None = None
+    angles: dict[str, tuple[int, float]] = {}
+    for k, heading in enumerate(table.header):
+        match = COLUMN.fullmatch(heading)
+        what, name, unit = (match["what"], match["name"], match["unit"] or "") if match else (None, heading, "")
+        if what is None and name in TIMES:
+            if unit not in ("", "s"):
+                raise InputError(f"{table.owner}: times must be in s, got [{unit}]")
+            times = k
+        elif what in (None, "q") and name in robot.joints:
+            if unit not in FACTORS:
+                raise InputError(f"{table.owner}: {name} must be in rad or deg, got [{unit}]")
+            angles[name] = k, FACTORS[unit]
+        elif what is None:
+            raise unknown(f"joint in {table.owner}", heading, robot.joints)
+    if times is None:
+        raise InputError(
+            f"{table.owner} needs a header with a column t of times [s]; it has {', '.join(table.header) or 'none'}"
+        )
+    values = np.array(table.rows)
+    q = (
+        np.column_stack([values[:, k] * factor for k, factor in angles.values()])
+        if angles
+        else np.empty((len(values), 0))
+    )
+    return JointAngles(owner=table.owner, joints=tuple(angles), t=values[:, times], q=q)

@@ -1,0 +1,94 @@
+"""One file of a user's own: a problem, an asked algorithm and a plain function, in every command by ``file.py:name``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
+STUDY = """
+runs = 1
+starts = 1
+evaluations = 300
+[[problem]]
+name = "my.py:two_link"
+options = {intervals = 10}
+fix = {time_s = 1.5}
+[[solver]]
+algorithm = "my.py:Shrinking"
+settings = {population = 10}
+polish = true
+"""
+
+
+@pytest.fixture
+def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(EXAMPLE, tmp_path / "my.py")
+    return tmp_path / "my.py"
+
+
+def edited(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert text.count(old) == 1
+    file.write_text(text.replace(old, new))
+
+
+def test_they_take_part_and_an_edit_runs_again_just_what_it_changes(mine: Path) -> None:
+    names = "pso,my.py:Shrinking,my.py:annealing"
+    call = ["compare", "my.py:two_link", "--algorithms", names, "--runs", "2", "--starts", "1", "--evaluations", "300"]
+
+    def again() -> list[str]:
+        done = nlp_gait(*call, "--jobs", "1", "--out", "study")
+        return [line for line in done.stderr.splitlines() if "made again" in line]
+
+    assert again() == [] and len(list(Path("study").glob("records/two_link/*.json"))) == 7
+    assert again() == []
+    edited(mine, "shrink: float = 0.95", "shrink: float = 0.90")
+    assert again() == ["Shrinking on two_link: 2 runs made again: the algorithm's source"]
+    edited(mine, "maxfun=evaluations", "maxfun=2 * evaluations")
+    assert again() == ["annealing on two_link: 2 runs made again: the algorithm's source"]
+    edited(mine, "HIP_HEIGHT = 0.77 ", "HIP_HEIGHT = 0.775 ")
+    assert len(again()) == 4
+    edited(mine, "HIP_HEIGHT = 0.775 ", "HIP_HEIGHT = 0.77 ")
+    assert again() == []
+    labels = nlp_gait("report", "study").stdout and Path("study/report.md").read_text()
+    assert "Shrinking" in labels and "two_link" in labels and "source" in labels
+
+
+def test_every_command_takes_them(mine: Path) -> None:
+    best = as_json("solve", "my.py:two_link", "--starts", "3", "--out", "best.json", "--option", "intervals=10")
+    assert best["problem"] == "my.py:two_link" and best["success"]
+    x = ",".join(map(repr, best["x"].values()))
+    verdict = as_json("evaluate", "my.py:two_link", "--option", "intervals=10", "--x", x)
+    assert verdict["objective"]["value"] == pytest.approx(best["objective"])
+    found = as_json("search", "my.py:two_link", "--algorithm", "my.py:annealing", "--runs", "1", "--evaluations", "300")
+    assert found["runs"][0]["evaluations"] == 300 and found["runs"][0]["verdict"]["feasible"]
+    assert "swing_rad" in nlp_gait("list", "my.py:two_link").stdout
+    swept = ["sweep", "my.py:two_link", "--over", "speed_m_s=0.5,0.6", "--out", "sweep", "--evaluations", "200"]
+    assert "speed_m_s" in nlp_gait(*swept, "--algorithm", "my.py:Shrinking").stdout
+    assert "speed_m_s" in nlp_gait(*swept, "--starts", "1").stdout
+    assert "my.py" in one_sentence("solve", "my.py:three_link")
+
+
+def test_a_study_file_names_them_and_a_folder_does_not(mine: Path) -> None:
+    Path("study.toml").write_text(STUDY)
+    nlp_gait("compare", "--config", "study.toml", "--out", "study", "--jobs", "1")
+    names = sorted(path.name for path in Path("study").glob("records/two_link/*.json"))
+    assert names == ["Shrinking+ipopt-0000.json", "Shrinking-0000.json"]
+    assert json.loads(Path("study/records/two_link/Shrinking-0000.json").read_text())["settings"]["population"] == 10
+    nlp_gait("report", "study")
+    mine.rename("moved.py")
+    refused = one_sentence("compare", "--resume", "--out", "study")
+    assert "runs only if you name it: add --code my.py:" in refused
+    code = ["--code", "moved.py:two_link", "--code", "moved.py:Shrinking"]
+    assert "my.py" in one_sentence("compare", "--resume", "--out", "study", *code)
+    Path("moved.py").rename("my.py")
+    code = ["--code", "my.py:two_link", "--code", "my.py:Shrinking"]
+    done = nlp_gait("compare", "--resume", "--out", "study", "--jobs", "1", *code)
+    assert "made again" not in done.stderr

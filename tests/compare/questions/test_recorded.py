@@ -1,0 +1,75 @@
+"""A gait from elsewhere beside the optimum at its step and time, and in the engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.questions.recorded import judge_gait
+from nlp_gait import load
+from nlp_gait.export.formats import write_as
+from nlp_gait.export.motions import read_gait
+from nlp_gait.problem import Result
+from nlp_gait.problems.nao.recorded.motion import JointAngles
+from nlp_gait.problems.nao.recorded.problem import recorded
+from nlp_gait.robots import load_robot
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+
+X = (0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0)
+
+
+@pytest.fixture(scope="module")
+def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("gait") / "gait.csv"
+    problem = load("nao-ssp")
+    write_as("csv", path, Result(problem=problem, x=problem.check_x(X)), 20)
+    return path
+
+
+def test_the_command_judges_plays_and_sets_it_beside_the_optimum(gait: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    found = as_json("evaluate", "--motion", gait, "--robot", "nao-v5", "--signals", tmp_path / "s.npz")
+    own, best = found["recorded"]["indexes"], found["optimum"]["indexes"]
+    planned = load("nao-ssp")
+    expected = as_json("evaluate", "nao-ssp", "--x", ",".join(map(str, X)))["indexes"]
+    assert found["gait"] == "nao-ssp" and found["step_m"] == pytest.approx(0.06, abs=1e-6)
+    assert own["power_W"] == pytest.approx(expected["power_W"], rel=1e-4) and best["power_W"] < own["power_W"]
+    assert found["optimum"]["x"]["single_support_time_s"] == pytest.approx(4.0, abs=1e-6)
+    assert not found["engine"]["fallen"]
+    assert found["engine"]["predicted"]["mechanical_W"] > 0 and (tmp_path / "s.npz").stat().st_size
+    assert set(planned.names) == set(found["optimum"]["x"])
+
+
+def test_tighter_limits_are_named(gait: Path) -> None:
+    shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
+    assert "Infeasible on the own samples" in shown and "torque_change[" in shown and "In the engine" not in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
+        (["evaluate", "--x", "1,2"], "name the problem that --x is a point of"),
+        (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no meaning for a motion"),
+        (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
+    ],
+)
+def test_wrong_use_is_one_sentence(arguments: list[str], words: str, gait: Path) -> None:
+    assert words in one_sentence(*(a.replace("{gait}", str(gait)) for a in arguments))
+
+
+def test_what_cannot_be_is_a_remark(gait: Path) -> None:
+    """A step on the spot has no optimum; a torso that leans at the beginning is not played."""
+    angles = read_gait(gait, load_robot("nao-v5"))
+    q = np.array(angles.q)
+    q[:, [angles.joints.index(name) for name in ("LHipPitch", "RHipPitch")]] -= (
+        0.1  # the torso leans over straight legs
+    )
+    leaning = recorded(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
+    judged = judge_gait(leaning)
+    assert any("the torso leans by" in remark for remark in judged.remarks) and judged.engine is None
+    still = JointAngles(owner="still", joints=angles.joints, t=angles.t, q=np.tile(angles.q[0], (len(angles.t), 1)))
+    standing = judge_gait(recorded(still, gait="nao-ssp"), in_engine=False)
+    assert standing.optimum is None and any("no optimum of nao-ssp" in remark for remark in standing.remarks)

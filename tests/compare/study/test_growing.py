@@ -1,0 +1,118 @@
+"""A study grows in its folder: records are kept by what they depend on, and nothing is deleted."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from compare.study.record import RunRecord
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import Study, read_records, record_file, run_study
+from compare.study.task import ProblemSpec, Stop
+from nlp_gait.errors import InputError
+from tests.robots.custom import humanoid
+
+STUDY = StudySettings(
+    problems=(ProblemSpec(name="walk12"),),
+    solvers=(SolverSpec(algorithm="pso"), SolverSpec(algorithm="ga")),
+    runs=2,
+    stop=Stop(evaluations=200),
+)
+
+
+def grown(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int, list[str]]:
+    """Records, how many were kept, and what is said of runs that are made again."""
+    kept: list[int] = []
+    said: list[str] = []
+    records = run_study(Study(tasks=settings.tasks(), folder=folder), kept=kept.append, anew=said.append)
+    return records, kept[0], said
+
+
+def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -> None:
+    assert grown(tmp_path, STUDY)[1:] == (0, [])
+    assert grown(tmp_path, replace(STUDY, runs=4))[1:] == (4, [])
+    assert grown(tmp_path, replace(STUDY, solvers=(*STUDY.solvers, SolverSpec(algorithm="de"))))[1:] == (4, [])
+    small = ProblemSpec(name="walk12", label="slow", values={"lambda": 1.0})
+    assert grown(tmp_path, replace(STUDY, problems=(*STUDY.problems, small)))[1:] == (4, [])
+    assert len(read_records(tmp_path)) == 8 + 2 + 4
+
+
+def test_a_larger_budget_is_another_run_and_the_smaller_ones_stay(tmp_path: Path) -> None:
+    first = grown(tmp_path, STUDY)[0]
+    more = replace(STUDY, stop=Stop(evaluations=300))
+    records, kept, said = grown(tmp_path, more)
+    assert kept == 0 and said == [f"{s} on walk12: 2 runs made again: evaluations 200 -> 300" for s in ("pso", "ga")]
+    assert {r.evaluations["f"] for r in records} == {300}
+    assert sorted(r.evaluations["f"] for r in read_records(tmp_path)) == [200] * 4 + [300] * 4
+    again, kept, said = grown(tmp_path, STUDY)
+    assert kept == 4 and not said and again == first
+
+
+def test_a_solver_that_is_left_out_is_hidden_and_kept(tmp_path: Path) -> None:
+    grown(tmp_path, STUDY)
+    records, kept, _ = grown(tmp_path, replace(STUDY, solvers=STUDY.solvers[:1]))
+    assert {r.algorithm for r in records} == {"pso"} and kept == 2
+    assert {r.algorithm for r in read_records(tmp_path)} == {"pso", "ga"}
+
+
+def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None:
+    def polishing(population: int) -> StudySettings:
+        solver = SolverSpec(algorithm="pso", label="swarm", settings={"population": population}, polish=True)
+        return replace(STUDY, solvers=(solver,), runs=1)
+
+    grown(tmp_path, polishing(20))
+    _, kept, said = grown(tmp_path, polishing(30))
+    assert kept == 0 and said == [
+        "swarm on walk12: 1 run made again: population 20 -> 30",
+        "swarm+ipopt on walk12: 1 run made again: the search that it polishes",
+    ]
+
+
+def test_a_robot_is_its_content_wherever_its_file_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Made heavier, it is another problem; moved, it is the same."""
+
+    def study(robot: str) -> StudySettings:
+        spec = ProblemSpec(name="nao-ssp", options={"robot": robot})
+        return replace(STUDY, problems=(spec,), solvers=STUDY.solvers[:1], runs=1)
+
+    out, elsewhere = tmp_path / "study", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for folder in (tmp_path, elsewhere):
+        (folder / "my.json").write_text(json.dumps(humanoid()))
+    monkeypatch.chdir(tmp_path)
+    (first,), kept, said = grown(out, study("my.json"))
+    assert grown(out, study(str(elsewhere / "my.json")))[1:] == (1, [])
+    heavier = humanoid()
+    heavier["links"]["torso"]["mass_kg"] *= 1.5
+    (elsewhere / "my.json").write_text(json.dumps(heavier))
+    monkeypatch.chdir(elsewhere)
+    (second,), kept, said = grown(out, study("my.json"))
+    assert kept == 0 and said == ["pso on nao-ssp: 1 run made again: the problem's mathematics or limits"]
+    assert second.verdict.objective != first.verdict.objective
+    monkeypatch.chdir(tmp_path)
+    assert grown(out, study("my.json"))[1:] == (1, [])
+
+
+def test_a_record_from_before_hashes_counts_if_the_judge_agrees_with_it(tmp_path: Path) -> None:
+    records = grown(tmp_path, STUDY)[0]
+    for task in STUDY.tasks():
+        path = record_file(tmp_path, task)
+        old = json.loads(path.read_text())
+        del old["definition"]["problem"]["sha256"]
+        if task.title == "ga":
+            old["verdict"]["objective"] *= 1.001
+        path.write_text(json.dumps(old))
+    again, kept, said = grown(tmp_path, STUDY)
+    assert kept == 2 and len(said) == 1 and "from before hashes were kept" in said[0]
+    assert [r.verdict for r in again] == [r.verdict for r in records]
+
+
+def test_a_copy_of_a_record_under_a_key_is_refused(tmp_path: Path) -> None:
+    grown(tmp_path, STUDY)
+    path = record_file(tmp_path, STUDY.tasks()[0])
+    path.with_name(f"{path.stem}.00000000.json").write_text(path.read_text())
+    with pytest.raises(InputError, match="belongs to walk12/pso-0000.json"):
+        read_records(tmp_path)

@@ -1,0 +1,156 @@
+"""Results from elsewhere: judged like everything else, unknown times left out of what needs them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.analysis.comparison import compare_problems
+from compare.analysis.editions import told_apart
+from compare.analysis.table import cells, summarise
+from compare.judge import evaluate
+from compare.report import rebuild_report
+from compare.study.imported import imported, read_points
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import Study, keep_record, read_records, run_study
+from compare.study.task import ProblemSpec, Stop
+from nlp_gait.errors import GaitError
+from tests.compare.cli.calls import as_json, nlp_gait
+
+WALK = ProblemSpec(name="walk12")
+PROBLEM = WALK.load()
+POINTS = np.random.default_rng(0).uniform(PROBLEM.lower, PROBLEM.upper, (3, 4))
+
+
+def finals(folder: Path, *, header: bool = True, extra: dict[str, list[object]] | None = None, sep: str = ",") -> Path:
+    path = folder / "finals.csv"
+    more = extra or {}
+    rows = [[*x.tolist(), *(column[k] for column in more.values())] for k, x in enumerate(POINTS)]
+    lines = [[*PROBLEM.names, *more]] * header + rows
+    path.write_text("\n".join(sep.join(map(str, line)) for line in lines) + "\n")
+    return path
+
+
+def test_each_row_is_a_judged_record(tmp_path: Path) -> None:
+    extra = {"run": [4, 5, 6], "objective": [0.5, "", 0.7], "violation": [0, 0, 2.5], "evaluations": [100, 200, 300]}
+    records = imported(WALK, finals(tmp_path, extra=extra), "GA (MATLAB)")
+    assert [(r.run, r.success, r.objective, r.evaluations["f"]) for r in records] == [
+        (4, True, 0.5, 100),
+        (5, False, None, 200),
+        (6, False, 0.7, 300),
+    ]
+    for record, x in zip(records, POINTS, strict=True):
+        own = evaluate(PROBLEM, x)
+        assert (record.verdict.objective, record.verdict.violation) == (own.objective["value"], own.violation)
+        assert math.isnan(record.time_s.solve) and list(record.x.values()) == x.tolist()
+
+
+def test_columns_in_any_order_without_a_header_and_with_other_separators(tmp_path: Path) -> None:
+    for header, sep in ((True, ";"), (True, "\t"), (False, ",")):
+        np.testing.assert_array_equal(read_points(finals(tmp_path, header=header, sep=sep), PROBLEM)[1], POINTS)
+    names = list(PROBLEM.names)
+    turned = tmp_path / "turned.csv"
+    turned.write_text("\n".join(",".join(map(str, row)) for row in [names[::-1], *POINTS[:, ::-1].tolist()]))
+    np.testing.assert_array_equal(read_points(turned, PROBLEM)[1], POINTS)
+
+
+def test_histories_give_runs_their_course(tmp_path: Path) -> None:
+    history = tmp_path / "h.csv"
+    history.write_text("run,evaluations,objective,time_s\n0,10,,0.1\n0,50,0.3,0.5\n1,10,0.2,0.1\n2,10,0.1,0.2\n")
+    first, *_ = imported(WALK, finals(tmp_path), "ga", history)
+    assert first.history.evaluations == (10, 50) and first.history.objective == (None, 0.3)
+    assert first.time_s.history == (0.1, 0.5) and first.time_s.solve == 0.5
+
+
+def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
+    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
+    run_study(Study(tasks=study.tasks(), folder=tmp_path))
+    records = imported(WALK, finals(tmp_path), "GA (MATLAB)", evaluations=5000)
+    for record in records:
+        keep_record(record, tmp_path)
+    again = read_records(tmp_path)
+    assert {record.algorithm for record in again} == {"pso", "GA (MATLAB)"}
+    (comparison,) = compare_problems(again)
+    (ga,) = [s for s in summarise(comparison) if s.algorithm == "GA (MATLAB)"]
+    row = cells(ga, comparison)
+    assert row[-1] == "-" and row[2] == "-" and "nan" not in " ".join(row)
+    assert all(math.isnan(seconds) for seconds in ga.expected_s) and ga.evaluations == 5000
+    files = rebuild_report(tmp_path, as_csv=True)
+    page = (tmp_path / "report.md").read_text()
+    assert "GA (MATLAB)" in page and "nan" not in page.lower().replace("nan,", "")
+    with open(next(path for path in files if path.name == "runs.csv")) as file:
+        rows = list(csv.DictReader(file))
+    assert [r["time_s"] for r in rows if r["solver"] == "GA (MATLAB)"] == ["", "", ""] and len(rows) == 5
+    with open(next(path for path in files if path.name == "walk12-points.csv")) as file:
+        points = [
+            [float(r[name]) for name in PROBLEM.names] for r in csv.DictReader(file) if r["solver"].startswith("GA")
+        ]
+    np.testing.assert_array_equal(points, POINTS)
+
+
+def test_a_file_that_grows_keeps_the_rows_that_it_had(tmp_path: Path) -> None:
+    for record in imported(WALK, finals(tmp_path), "ga", evaluations=100):
+        keep_record(record, tmp_path)
+    before = read_records(tmp_path)
+    (tmp_path / "finals.csv").write_text((tmp_path / "finals.csv").read_text() + ",".join(map(str, POINTS[0])) + "\n")
+    for record in imported(WALK, tmp_path / "finals.csv", "ga", evaluations=100):
+        keep_record(record, tmp_path)
+    assert [r.definition for r in read_records(tmp_path)][:3] == [r.definition for r in before]
+    assert len(read_records(tmp_path)) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a,b\n1,2\n", "needs the columns"),
+        ("1,2,3\n", "has 3 columns and no header; .* has 4 variables"),
+        ("1,2,3,4\n1,2,x,4\n", "line 2: expected a number, got 'x'"),
+        ("1,2,3,4\n1,2,3\n", "line 2: 3 cells, but 4 columns"),
+        ("1,2,,4\n", "line 1: .* must be a finite number"),
+        ("", "has no rows"),
+    ],
+)
+def test_a_file_that_is_none_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(text)
+    with pytest.raises(GaitError, match=message):
+        read_points(tmp_path / "x.csv", PROBLEM)
+
+
+def test_what_nobody_can_know_is_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(GaitError, match="says nothing of evaluations: add a column"):
+        imported(WALK, finals(tmp_path), "ga")
+    with pytest.raises(GaitError, match="--as takes letters"):
+        imported(WALK, finals(tmp_path), "../ga", evaluations=3)
+    with pytest.raises(GaitError, match="unknown column of .* 'objectiv'; did you mean .*'objective'"):
+        imported(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
+
+
+def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
+    run_study(Study(tasks=study.tasks(), folder=tmp_path))
+    from dataclasses import replace
+
+    run_study(Study(tasks=replace(study, runs=1, stop=Stop(evaluations=300)).tasks(), folder=tmp_path))
+    labels = [(r.problem, r.algorithm, r.run) for r in told_apart(read_records(tmp_path))]
+    earlier = "pso (evaluations 200)"
+    assert sorted(labels) == [("walk12", "pso", 0), ("walk12", earlier, 0), ("walk12", earlier, 1)]
+
+
+def test_the_commands(tmp_path: Path) -> None:
+    path = finals(tmp_path)
+    found = as_json("evaluate", "walk12", "--x", path, "--csv", tmp_path / "judged.csv")
+    assert [p["objective"]["value"] for p in found["points"]] == [
+        evaluate(PROBLEM, x).objective["value"] for x in POINTS
+    ]
+    assert len((tmp_path / "judged.csv").read_text().splitlines()) == 4
+    out = tmp_path / "study"
+    done = nlp_gait("import", "walk12", path, "--as", "GA (MATLAB)", "--evaluations", "100", "--out", out, "--csv")
+    assert "GA (MATLAB)" in done.stdout and (out / "runs.csv").exists()
+    assert (
+        json.loads((out / "records/walk12/GA (MATLAB)-0002.json").read_text())["status"] == "imported from finals.csv"
+    )

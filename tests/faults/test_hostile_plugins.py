@@ -1,0 +1,181 @@
+"""Algorithms of one's own that fail in every way: each is a record that says so, and the others' records are whole."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import compare.study.apart
+from compare.study.runner import attempt
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import Study, read_records, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.references import load_object
+from tests.compare.cli.calls import nlp_gait
+
+WALK = ProblemSpec(name="walk12")
+STOP = Stop(evaluations=200, time_limit_s=0.5)
+
+ALGORITHM = """
+import os, sys, time
+import numpy as np
+
+class Algorithm:
+    population = 20
+    name = "hostile"
+
+    def start(self, start):
+        {start}
+        self.s, self.X = start, start.initial
+        return self
+
+    def ask(self):
+        {ask}
+        return self.X
+
+    def tell(self, X, f, violation, rule):
+        {tell}
+        self.X = self.s.rng.uniform(self.s.lower, self.s.upper, (20, len(self.s.lower)))
+
+    def stop(self):
+        return ()
+{end}
+"""
+# Where it is put, what is done there, and what the record says; None for a run that ends well in spite of it.
+WAYS: dict[str, tuple[str, str, str | None]] = {
+    "raises at import": ("end", "raise RuntimeError('no luck')", r"fails at line \d+, `raise Runtime.*no luck"),
+    "exits at import": ("end", "sys.exit(3)", "SystemExit: 3"),
+    "is no code": ("end", "def :", "SyntaxError"),
+    "raises at start": ("start", "raise ValueError('x' * 10**6)", "failed: ValueError: xxx"),
+    "raises in ask": ("ask", "raise KeyError", "failed: KeyError"),
+    "raises in tell": ("tell", "1 / 0", "ZeroDivisionError: division by zero"),
+    "raises what is no Exception": ("tell", "raise BaseException('b')", "ended without a result, by status 1"),
+    "another shape": ("ask", "return np.zeros(3)", r"ask must return points of shape \(P, 4\)"),
+    "no points": ("ask", "return np.zeros((0, 4))", "with P >= 1"),
+    "no numbers": ("ask", "return 'points'", "it returned no numbers"),
+    "nothing": ("ask", "return None", "ask must return points"),
+    "not a number": ("ask", "return np.full((2, 4), np.nan)", "outside the bounds"),
+    "out of bounds": ("ask", "return self.s.upper[None] + 1", "outside the bounds"),
+    "never returns": ("tell", "time.sleep(10**6)", "did not return within 0.3 s after the time limit of 0.5 s"),
+    "never returns at import": ("end", "while True: pass", "did not return within"),
+    "calls sys.exit": ("tell", "sys.exit('bye')", "failed: SystemExit: bye"),
+    "ends its process": ("tell", "os._exit(7)", "its process ended without a result, by status 7"),
+    "is killed": ("tell", "os.kill(os.getpid(), 9)", "by signal SIGKILL"),
+    "prints megabytes": ("tell", "print('x' * 10**7); sys.stderr.write('y' * 10**7)", None),
+    "closes the outputs": ("start", "os.close(1); os.close(2)", None),
+    "changes what it was told": ("tell", "f[:] = -1e9; violation[:] = 0", None),
+    "writes into its bounds": ("start", "start.lower[:] = -9", "read-only"),
+    "a population that is none": ("end", "Algorithm.population = 'many'", "population must be a whole number >= 1"),
+    "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
+}
+ROUNDS = 5
+ENDED = ("evaluation budget used", "time limit reached")
+
+
+def written(folder: Path, name: str, way: str) -> Path:
+    place, what, _ = WAYS[way]
+    parts = dict.fromkeys(("start", "ask", "tell"), "pass") | {"end": ""}
+    path = folder / f"{name}.py"
+    path.write_text(ALGORITHM.format(**{**parts, place: what}))
+    return path
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare.study.apart, "GRACE_S", 0.3)
+
+
+@pytest.mark.slow
+def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
+    impatient: None, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    alone = run_study(Study(tasks=(Task(problem=WALK, algorithm="pso", stop=STOP),)))
+    solvers, ways = [SolverSpec(algorithm="pso")], {}
+    for i in range(ROUNDS):
+        for k, way in enumerate(WAYS):
+            name = f"h{i}-{k}"
+            ways[name] = way
+            reference = f"{written(tmp_path, name, way)}:Algorithm"
+            solvers.append(SolverSpec(algorithm=reference, label=name))
+    assert len(ways) >= 100
+    study = StudySettings(problems=(WALK,), solvers=tuple(solvers), runs=1, stop=STOP)
+    records = run_study(Study(tasks=study.tasks(), folder=tmp_path / "out"))
+    assert capfd.readouterr().out == ""
+    assert len(read_records(tmp_path / "out")) == len(solvers)  # every file is read strictly
+    (pso,) = [record for record in records if record.algorithm == "pso"]
+    assert (pso.x, pso.verdict, pso.history) == (alone[0].x, alone[0].verdict, alone[0].history)
+    for record in records:
+        if record.algorithm in ways:
+            said = WAYS[ways[record.algorithm]][2]
+            if said is None:
+                assert record.success and record.status.startswith(ENDED), (ways[record.algorithm], record.status)
+            else:
+                assert not record.success and not record.verdict.feasible
+                assert pytest.approx(0) == record.time_s.solve
+                assert re.search(said, record.status), (ways[record.algorithm], record.status)
+
+
+def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
+    bad = f"{written(tmp_path, 'bad', 'ends its process')}:Algorithm"
+    tasks = [Task(problem=WALK, algorithm=a, label=b, stop=STOP) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
+    records = run_study(Study(tasks=tuple(tasks), jobs=2))
+    assert [record.success for record in records] == [False, True, True] and "by status 7" in records[0].status
+
+
+def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient: None, tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "def stubborn(f, lower, upper, evaluations, seed):\n"
+        "    while True:\n"
+        "        try:\n            f((lower + upper) / 2)\n"
+        "        except BaseException:\n            seed += 1\n"
+        "        if seed < 0: break\n"
+        "def deaf(f, lower, upper, evaluations, seed):\n"
+        "    for _ in range(10 * evaluations):\n"
+        "        try:\n            f((lower + upper) / 2)\n        except BaseException:\n            pass\n"
+        "def lazy(f, lower, upper, evaluations, seed):\n    return lower\n"
+        "def wrong(f, lower, upper, evaluations, seed):\n    f(lower[:2])\n"
+        "def few(f, lower):\n    f(lower)\n"
+    )
+
+    def status(name: str) -> str:
+        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=STOP)).status
+
+    assert "did not return" in status("stubborn")
+    deaf = attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:deaf", stop=STOP))
+    assert (deaf.status, deaf.evaluations) == ("evaluation budget used", {"f": 200})
+    assert "returned without any call of f" in status("lazy")
+    assert "f takes one point of shape (4,)" in status("wrong")
+    assert "a plain function takes (f, lower, upper, evaluations, seed)" in status("few")
+
+
+def test_what_is_not_there_is_said_before_the_work(tmp_path: Path) -> None:
+    file = written(tmp_path, "good", "raises in ask")
+    for name, words in (
+        (f"{tmp_path}/none.py:A", "cannot be read: No such file"),
+        (f"{file}:Algorithmus", "did you mean 'Algorithm'"),
+        ("nowhere_at_all:A", "no module 'nowhere_at_all' is installed; name a file as nowhere_at_all.py:A"),
+        ("pymoo:XYZ", "unknown algorithm 'pymoo:XYZ'"),
+    ):
+        done = nlp_gait("compare", "walk12", "--algorithms", name, "--out", tmp_path / "out", status=1)
+        assert words in done.stderr and not list(tmp_path.rglob("*.json"))
+
+
+def test_naming_is_what_runs_code(tmp_path: Path) -> None:
+    """A file of data that names code runs nothing; the same file runs once the code is named."""
+    mark = tmp_path / "it-ran"
+    own = tmp_path / "own.py"
+    own.write_text(f"from nlp_gait.problem import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
+    walk = load_object(f"{own}:leg", "problem")
+    assert mark.exists()
+    mark.unlink()
+    result = tmp_path / "best.json"
+    x = dict(zip(walk.names, ((walk.lower + walk.upper) / 2).tolist(), strict=True))  # type: ignore[attr-defined]
+    result.write_text(json.dumps({"problem": "other/own.py:leg", "x": x}))
+    refused = nlp_gait("export", result, "--format", "csv", status=1).stderr
+    assert "runs only if you name it: add --code other/own.py:leg" in refused and not mark.exists()
+    own.write_text(own.read_text() + "\n# another text\n")
+    nlp_gait("export", result, "--format", "csv", "--code", f"{own}:leg")
+    assert mark.exists()

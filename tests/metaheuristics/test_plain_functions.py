@@ -1,0 +1,142 @@
+"""Plain functions and objects of one's own as algorithms: counted, stopped and judged as all others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import dual_annealing
+from scipy.optimize import minimize as scipy_minimize
+
+from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, as_algorithm, minimize
+from metaheuristics.adapters.function import FAILED, INFEASIBLE
+from metaheuristics.array import Array
+
+
+class Disk:
+    """Least x + y in the unit disk: -sqrt(2)."""
+
+    names = ("x", "y")
+    lower, upper = np.full(2, -2.0), np.full(2, 2.0)
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        self.calls += len(X)
+        return X.sum(axis=1), np.maximum(0.0, (X**2).sum(axis=1) - 1.0)
+
+
+def annealing(f: Callable[[Array], float], lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+    dual_annealing(f, list(zip(lower, upper, strict=True)), maxfun=10 * evaluations, seed=seed)
+
+
+def test_it_is_ended_at_its_budget_and_its_best_point_kept() -> None:
+    disk = Disk()
+    result = minimize(disk, as_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
+    assert (result.evaluations, disk.calls, result.reasons) == (1500, 1500, ("evaluation budget used",))
+    assert result.feasible and -np.sqrt(2.0) <= result.objective < -1.35
+    again = minimize(Disk(), as_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
+    np.testing.assert_array_equal(again.x, result.x)
+    history = result.history
+    assert (
+        len(history.evaluations) < 500 and history.evaluations[-1] == 1500 and history.objective[-1] == result.objective
+    )
+
+
+def test_it_may_return_early_and_ask_for_many_points_at_once() -> None:
+    def batches(f: Any, lower: Array, upper: Array, evaluations: int, seed: int, *, share: float = 0.5) -> str:
+        rng = np.random.default_rng(seed)
+        assert f(rng.uniform(lower, upper, (7, 2))).shape == (7,)
+        assert isinstance(f([0.0, 0.0]), float)
+        f(rng.uniform(lower, upper, (int(share * evaluations), 2)))
+        return "ignored"
+
+    result = minimize(Disk(), as_algorithm(batches, "batches"), evaluations=100)
+    assert (result.evaluations, result.reasons) == (58, ("the function returned",))
+    assert minimize(Disk(), as_algorithm(batches, "b", {"share": 0.2}), evaluations=100).evaluations == 28
+    assert minimize(Disk(), as_algorithm(batches, "b", {"share": 5.0}), evaluations=100).evaluations == 100
+
+
+def test_what_it_is_told_orders_points_as_the_rule_does() -> None:
+    told: list[float] = []
+
+    def listening(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        told[:] = [f(np.array(x)) for x in ((0.5, 0.0), (2.0, 0.0), (2.0, 2.0), (np.nan, 0.0))]
+
+    minimize(Disk(), as_algorithm(listening, "l"), evaluations=10, handling=Deb())
+    assert told == [0.5, INFEASIBLE + 3.0, INFEASIBLE + 7.0, FAILED]
+    minimize(Disk(), as_algorithm(listening, "l"), evaluations=10, handling=StaticPenalty(weight=2.0))
+    assert told == [0.5, 2.0 + 6.0, 4.0 + 14.0, FAILED]
+
+
+def test_a_gradient_method_of_another_library_is_a_plain_function_too() -> None:
+    def bfgs(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        start = np.random.default_rng(seed).uniform(lower, upper)
+        scipy_minimize(f, start, method="Nelder-Mead", options={"maxfev": evaluations})
+
+    result = minimize(Disk(), as_algorithm(bfgs, "nm"), evaluations=400, handling=StaticPenalty(weight=10.0))
+    assert result.feasible and result.objective < -1.3
+
+
+class Plain:
+    """No data class."""
+
+    population = 4
+
+    def __init__(self, width: float = 0.1) -> None:
+        self.width = width
+
+    def start(self, start: Any) -> Any:
+        return as_algorithm(ParticleSwarm(population=4), "pso").start(start)
+
+
+def test_objects_classes_and_makers_are_algorithms() -> None:
+    def maker(*, population: int = 5) -> ParticleSwarm:
+        return ParticleSwarm(population=population)
+
+    assert as_algorithm(ParticleSwarm(), "p", {"population": 7}) == ParticleSwarm(population=7)
+    assert as_algorithm(ParticleSwarm, "p", {"population": 7}) == ParticleSwarm(population=7)
+    assert as_algorithm(maker, "m", {"population": 9}) == ParticleSwarm(population=9)
+    for own in (Plain, Plain()):
+        assert minimize(Disk(), as_algorithm(own, "plain"), evaluations=20).evaluations == 20
+
+
+@pytest.mark.parametrize(
+    ("own", "settings", "message"),
+    [
+        (3, {}, "must be an algorithm with `population` and `start`, or a plain function of \\(f, lower"),
+        (
+            lambda f: f,
+            {},
+            "'own' cannot be called as an algorithm: missing a required argument: 'f'; a plain function takes",
+        ),
+        (ParticleSwarm, {"popl": 3}, "cannot be called as an algorithm: got an unexpected keyword argument 'popl'"),
+        (Plain(), {"width": 1.0}, "'own' takes no settings, got width: it is no data class"),
+        (type("Odd", (), {"start": print, "population": 2.5}), {}, "population must be a whole number >= 1, got 2.5"),
+    ],
+)
+def test_what_is_none_is_refused(own: Any, settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        as_algorithm(own, "own", settings)
+
+
+def test_points_outside_the_bounds_are_refused_with_their_place() -> None:
+    class Careless(Plain):
+        def start(self, start: Any) -> Any:
+            self.X = start.initial
+            return self
+
+        def ask(self) -> Array:
+            return self.X
+
+        def tell(self, X: Array, *_: object) -> None:
+            self.X = X + 4.0
+
+        def stop(self) -> tuple[str, ...]:
+            return ()
+
+    with pytest.raises(SearchError, match="for variable 0 of point 0, outside the bounds -2.0..2.0: clip the points"):
+        minimize(Disk(), as_algorithm(Careless, "c"), evaluations=20)
