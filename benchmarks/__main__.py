@@ -12,6 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks import ipopt, kernel, process, search
+from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 
@@ -34,6 +35,7 @@ def main() -> None:
         lambda: ipopt.compiled_derivatives(starts),
         lambda: ipopt.formulations(starts),
         lambda: process.starts(rounds),
+        lambda: overhead.adapter(max(5, rounds // 2)),
     ):
         rows += group()
         print(".", end="", flush=True)

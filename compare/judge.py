@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
+from nlp_gait.backends.exact import exact_model, violated_rows
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 
@@ -72,11 +72,12 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         InputError: x has the wrong length or is not finite.
     """
     point = problem.check_x(x)
-    values, rows = _at(problem, point)
+    exact = exact_model(problem)
+    values = exact.at(point, problem.p)
     parts = DENSE_INTERVALS if problem.grid is None else problem.grid.parts
     factor = math.ceil(DENSE_INTERVALS / parts)
     dense = problem.dense(factor)
-    dense_values, dense_rows = (None, ()) if dense is None else _at(dense, point)
+    dense_values = None if dense is None else exact_model(dense).at(point, dense.p)
     objective = problem.objective
     return Evaluation(
         problem=problem.address,
@@ -85,16 +86,10 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         x=problem.by_name(point),
         objective={"name": objective.name, "value": objective.sign * values.cost, "unit": objective.unit},
         indexes=values.indexes,
-        constraints=rows,
+        constraints=exact.rows(values),
         violation=values.violation,
         feasible=values.violation <= FEASIBILITY_TOLERANCE,
         dense=None if dense_values is None else dense_values.indexes,
-        dense_violations=violated_rows(dense_rows),
+        dense_violations=() if dense is None or dense_values is None else exact_model(dense).violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
     )
-
-
-def _at(problem: GaitProblem, x: Array) -> tuple[ExactValues, tuple[ConstraintValue, ...]]:
-    exact = exact_model(problem)
-    values = exact.at(x, problem.p)
-    return values, exact.rows(values)

@@ -12,6 +12,7 @@ from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
 from metaheuristics.algorithms.genetic_operators import Flip, Polynomial, SimulatedBinary, SinglePoint
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
+from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
@@ -39,6 +40,7 @@ __all__ = [
     "ParticleSwarm",
     "PlainFunction",
     "Polynomial",
+    "RandomSearch",
     "Result",
     "Rule",
     "Search",

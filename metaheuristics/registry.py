@@ -16,6 +16,7 @@ from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
+from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm
@@ -26,7 +27,7 @@ T = TypeVar("T")
 ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
     {
         factory.name: factory
-        for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid, DifferentialEvolution)
+        for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid, DifferentialEvolution, RandomSearch)
     }
 )
 """This package's own algorithms."""

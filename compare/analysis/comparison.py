@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -110,22 +111,34 @@ class Comparison:
         return relative_gap(self.value(cost), self.reference, self.objective)
 
 
-def compare_problems(records: Sequence[RunRecord], weighting: Weighting = DEFAULT_WEIGHTING) -> list[Comparison]:
+def compare_problems(
+    records: Sequence[RunRecord],
+    weighting: Weighting = DEFAULT_WEIGHTING,
+    references: Mapping[str, float] = MappingProxyType({}),
+) -> list[Comparison]:
     """One comparison for each problem among records, in their order.
+
+    Args:
+        records: of all runs.
+        weighting: of calls.
+        references: by problem, the objective that gaps are measured from; without one, the best of its own records.
 
     Raises:
         InputError: runs of one problem disagree on its objective.
     """
     problems = dict.fromkeys(record.problem for record in records)
-    return [_comparison(name, [r for r in records if r.problem == name], weighting) for name in problems]
+    return [
+        _comparison(name, [r for r in records if r.problem == name], weighting, references.get(name))
+        for name in problems
+    ]
 
 
-def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting) -> Comparison:
+def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting, known: float | None) -> Comparison:
     objective = objective_of(records[0])
     for record in records:
         if objective_of(record) != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.algorithm}, run {record.run}")
-    reference = best_known(records, objective)
+    reference = best_known(records, objective) if known is None else known
     solvers = []
     for name in dict.fromkeys(record.algorithm for record in records):
         runs = tuple(sorted((r for r in records if r.algorithm == name), key=lambda r: r.run))

@@ -1,8 +1,8 @@
 """Command line: ``nlp-gait COMMAND``.
 
-From the problems to the comparison: ``list | evaluate | solve | search | compare | import | report | sweep | reproduce |
-walk``. From a result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty |
-motors | motions | robust``.
+From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
+result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
+robust``. To and from other packages: ``import | bench | logs | export-objective``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -19,8 +19,11 @@ from compare.cli.animate import animate
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
+from compare.cli.exchange.bench import bench
+from compare.cli.exchange.export_objective import export_objective
+from compare.cli.exchange.import_results import import_results
+from compare.cli.exchange.logs import logs
 from compare.cli.export import export
-from compare.cli.import_results import import_results
 from compare.cli.list import list_problems
 from compare.cli.questions.certainty import certainty
 from compare.cli.questions.motions import motions
@@ -38,9 +41,9 @@ from compare.cli.solve import solve
 
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, search),
-    "Comparison": (compare, import_results, report, reproduce),
+    "Comparison": (compare, import_results, report, reproduce, bench),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
-    "Show and share": (simulate, animate, export),
+    "Show and share": (simulate, animate, export, logs, export_objective),
 }
 
 app = typer.Typer(
@@ -67,8 +70,8 @@ def options_of_all(
     """Take what belongs to no command."""
 
 
-# Commands whose names Python has taken.
-NAMES = {list_problems: "list", import_results: "import"}
+# Commands whose names Python has taken, or does not allow.
+NAMES = {list_problems: "list", import_results: "import", export_objective: "export-objective"}
 for panel, functions in PANELS.items():
     for function in functions:
         app.command(NAMES.get(function, function.__name__), rich_help_panel=panel)(function)

@@ -11,7 +11,16 @@ import typer
 
 from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
-from compare.cli.common import fail, output_file, print_json, print_result, print_rows, print_table, stdout
+from compare.cli.common import (
+    fail,
+    output_file,
+    print_json,
+    print_result,
+    print_rows,
+    print_table,
+    print_written,
+    stdout,
+)
 from compare.cli.options import AnyProblem, AsJson, numbers_in
 from compare.judge import Evaluation
 from nlp_gait.files import csv_text, write_text
@@ -85,6 +94,7 @@ def evaluate(
         print_json(evaluation.to_json())
     else:
         _print(evaluation)
+        print_written(*(path for path in (signals, table) if path is not None))
 
 
 def _evaluate_motion(gait: Recorded, engine: bool, signals: Path | None, as_json: bool) -> None:

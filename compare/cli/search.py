@@ -76,6 +76,8 @@ def search(
         )
         print_summaries(records, "All runs")
         stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
+        if out is not None:
+            stdout.print(f"wrote {len(records)} records to {out}", soft_wrap=True)
     if stopped:
         kept = "printed, but kept nowhere: name a folder with --out" if out is None else f"kept in {out}"
         end_interrupted(f"{stopped}; finished runs are {kept}" + (out is not None) * "; the same command continues")

@@ -103,11 +103,13 @@ def simulate(
     data = {"schema": 1, **_plain(*measured[0])}
     if film.beside is not None:
         data["beside"] = _plain(*measured[1])
+    written = [] if target is None else [target]
     if folder is not None:
+        written += [folder / name for name in ("report.json", "model.xml", "playback.npz")]
         write_json(folder / "report.json", without_nan(data))
         write_text(folder / "model.xml", plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
-        plot_playback(plan, traces[0], drive, folder / "playback")
+        written += plot_playback(plan, traces[0], drive, folder / "playback")
     if robustness:
         try:
             survival = sweep(plan, drive)
@@ -127,8 +129,7 @@ def simulate(
             _print(report, survival if i == 0 else None)
             if walk is not None:
                 _print_course(walk)
-        if target is not None:
-            print_written(target)
+        print_written(*written)
 
 
 def _filmed(

@@ -33,6 +33,32 @@ def ecdf_figure(comparison: Comparison) -> Figure:
     return cost_figure(comparison, draw, "share of runs and targets")
 
 
+def suite_figure(comparisons: Sequence[Comparison]) -> Figure:
+    """Share of all triples of problem, run and target solved within evaluations per variable; solvers that ran on all."""
+    solvers = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
+    shared = [name for name in solvers[0] if all(name in on_problem for on_problem in solvers)]
+    with style():
+        figure = new_figure(7.4, 3.6)
+        axes = figure.subplots()
+        drawn = {}
+        for name in shared:
+            runs = [(curve, len(s[name].records[0].x) or 1) for s in solvers for curve in s[name].curves]
+            costs = np.array([curve.reached(target) / n for curve, n in runs for target in ECDF_TARGETS])
+            drawn[name] = (*ecdf(costs), max([curve.total() / n for curve, n in runs] + [1.0]))
+        last = max(end for _, _, end in drawn.values())
+        best_first = sorted(drawn, key=lambda name: -drawn[name][1][-1] if drawn[name][1].size else 0.0)
+        for name, look in looks(best_first).items():
+            at, share, _ = drawn[name]
+            if at.size:
+                at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
+            _draw_share(axes, at, share, name, look)
+        axes.set_xlabel("equivalent evaluations per variable")
+        axes.set_ylabel("share of problems, runs and targets")
+        logarithmic(axes)
+        legend_below(figure)
+    return figure
+
+
 def final_gap_figure(comparison: Comparison) -> Figure:
     """Gap of each run at its end, one row a solver; infeasible runs as crosses at the right edge."""
     with style():

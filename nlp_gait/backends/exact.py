@@ -64,18 +64,25 @@ class ExactModel:
 
     def rows(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
         """Every row of these values with its name and unit."""
-        excess = np.maximum(np.maximum(values.lower - values.g, values.g - values.upper), 0.0)
-        columns = (part.tolist() for part in (values.g, values.lower, values.upper, excess))
+        return self._named(values, range(len(self.row_names)))
+
+    def violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
+        """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
+        return violated_rows(self._named(values, np.flatnonzero(~(_excess(values) <= FEASIBILITY_TOLERANCE))))
+
+    def _named(self, values: ExactValues, chosen: Iterable[int]) -> tuple[ConstraintValue, ...]:
+        """Some rows, by their positions."""
+        excess = _excess(values)
         return tuple(
             ConstraintValue(
-                name=name,
-                value=value,
-                lower=low if math.isfinite(low) else None,
-                upper=high if math.isfinite(high) else None,
-                violation=violation,
-                unit=unit,
+                name=self.row_names[k],
+                value=float(values.g[k]),
+                lower=float(values.lower[k]) if math.isfinite(values.lower[k]) else None,
+                upper=float(values.upper[k]) if math.isfinite(values.upper[k]) else None,
+                violation=float(excess[k]),
+                unit=self.row_units[k],
             )
-            for name, unit, value, low, high, violation in zip(self.row_names, self.row_units, *columns, strict=True)
+            for k in chosen
         )
 
 
@@ -88,6 +95,11 @@ def violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...
     """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
     violated = [row for row in rows if not row.violation <= FEASIBILITY_TOLERANCE]
     return tuple(sorted(violated, key=lambda row: -math.inf if math.isnan(row.violation) else -row.violation))
+
+
+def _excess(values: ExactValues) -> Array:
+    """(m,) by how much each row is outside its bounds, in its unit; NaN if it has no value."""
+    return np.maximum(np.maximum(values.lower - values.g, values.g - values.upper), 0.0)
 
 
 def _build(problem: GaitProblem) -> ExactModel:

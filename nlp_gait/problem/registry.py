@@ -26,6 +26,7 @@ PROBLEMS = {
     "stairs-plan": "nlp_gait.problems.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.problems.stairs.track:stairs_track",
     "stairs-ideal": "nlp_gait.problems.stairs.ideal:stairs_ideal",
+    "gaitbench": "nlp_gait.gaitbench.problem:gaitbench",
 }
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
@@ -62,7 +63,7 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
                 if any(values[name] != value for name, value in group.items()):
                     recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
-            if refined_by is None:
+            if refined_by is None or refined_by not in call:  # a maker without that option refines its problem itself
                 return replace(problem, options=recorded)
             own = getattr(grid, refined_by)
             return replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))

@@ -26,6 +26,7 @@ OTHER: dict[str, Any] = {
     "motors": "limits,ankle",
     "load_degree": 3,
     "duration_s": 3.0,
+    "instance": "walk12-w100",
 }
 # What the first studies recorded; their records must stay valid.
 FIRST_OPTIONS = ["robot", "intervals", "derivatives", "rotational_inertia", "step_length_m"]

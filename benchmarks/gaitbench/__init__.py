@@ -1,0 +1,1 @@
+"""What GaitBench ships, made anew: best known points and probes (``known``), baseline records (``baseline``)."""

@@ -1,0 +1,221 @@
+"""Best known points of GaitBench, the evidence for them, and probe values: ``python -m benchmarks.gaitbench.known``.
+
+Finished instances are kept in ``nlp_gait/gaitbench/known.json``; a call goes on with those that are missing. A better point
+than the one there may replace it, with ``--again``; probe values never change once they are published.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+import metaheuristics
+import nlp_gait
+from compare.questions.certainty.branch_and_bound import certify
+from metaheuristics.adapters.cma import CmaEs
+from nlp_gait import gaitbench
+from nlp_gait.decoding import decoded
+from nlp_gait.files import write_json
+from nlp_gait.gaitbench.instance import Instance
+from nlp_gait.gaitbench.known import Evidence, Known, Probe
+from nlp_gait.problem import Array
+
+FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
+SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How long is searched for the best point of an instance.
+
+    Attributes:
+        starts: of IPOPT, by the greatest number of variables for which they are made.
+        cma_runs: long runs of CMA-ES.
+        cma_evaluations: of each.
+        cma_most_variables: for more there are none.
+    """
+
+    starts: tuple[tuple[int, int], ...]
+    cma_runs: int
+    cma_evaluations: int
+    cma_most_variables: int
+
+
+THOROUGH = Effort(
+    starts=((12, 40), (22, 20), (60, 8), (300, 5)), cma_runs=2, cma_evaluations=30_000, cma_most_variables=22
+)
+QUICK = Effort(starts=((12, 6), (22, 2), (300, 1)), cma_runs=1, cma_evaluations=5_000, cma_most_variables=12)
+SHARES, TIMED = 100_000, 20_000
+# Slack that the best known point keeps to every row, in units of its scale: no machine's rounding makes it infeasible.
+SLACK = 1e-10
+PROOF_TOLERANCE = 1e-3
+
+
+class NothingFound(Exception):
+    """There is no point that could be called best known."""
+
+
+def main() -> None:
+    """Make what is missing."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.gaitbench.known", description=__doc__.splitlines()[0])
+    parser.add_argument("--subset", choices=("small", "full"), default="full")
+    parser.add_argument("--instance", action="append", help="only this one; repeatable")
+    parser.add_argument("--again", action="store_true", help="also those that are there; their probes stay")
+    parser.add_argument("--quick", action="store_true", help="a first pass: few starts, one short run of CMA-ES")
+    parser.add_argument("--prove-s", type=float, default=0.0, help="time for a proof where one can be had; 0 for none")
+    arguments = parser.parse_args()
+    for id in arguments.instance or gaitbench.names(arguments.subset):
+        kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+        if id in kept and not arguments.again:
+            continue
+        started = time.perf_counter()
+        try:
+            published = decoded(Known, kept[id], id) if id in kept else None
+            found = known_of(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
+        except NothingFound as error:
+            print(f"{id}: {error}", flush=True)
+            continue
+        kept[id] = asdict(found)
+        write_json(FILE, {name: kept[name] for name in gaitbench.names() if name in kept})
+        evidence = Evidence(**kept[id]["evidence"])
+        print(f"{id}: {kept[id]['best_known']:.10g}, {evidence} ({time.perf_counter() - started:.0f} s)", flush=True)
+
+
+def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -> Known:
+    """Everything that is known of an instance, found now; a better point that was published stays, and probes always do."""
+    instance = gaitbench.load(id)
+    problem, n = instance.gait_problem, len(instance.names)
+    starts = next(count for most, count in effort.starts if n <= most)
+    solution = nlp_gait.solve(problem, starts=starts, seed=0)
+    ends = [outcome for outcome in solution.starts if outcome.success]
+    if not ends:
+        raise NothingFound("no start of IPOPT converged to a feasible point")
+    ends.sort(key=lambda outcome: outcome.cost)
+    best = strictly_feasible(instance, np.array(ends[0].x))
+    best_known = float(instance(best[None])[0][0])
+    searched = long_search(instance, effort) if n <= effort.cma_most_variables else None
+    if searched is not None and searched[0] < best_known:  # CMA-ES is better: its point, refined by IPOPT
+        refined = nlp_gait.solve(problem, starts=1, x0=searched[1])
+        for x in (searched[1], strictly_feasible(instance, np.array(list(refined.x.values())))):
+            f, violation = instance(x[None])
+            if violation[0] == 0.0 and f[0] < best_known:
+                best, best_known = x, float(f[0])
+    if published is not None and published.best_known < best_known:
+        best, best_known = np.array(published.best_x), published.best_known
+    proven = proof(instance, best, prove_s)
+    if proven is None and published is not None:
+        proven = published.evidence.proven_gap
+    agreeing = sum(relative(outcome.cost, best_known) <= SAME for outcome in ends)
+    evidence = Evidence(
+        starts=starts,
+        agreeing=agreeing,
+        cma_runs=0 if searched is None else effort.cma_runs,
+        cma_evaluations=0 if searched is None else effort.cma_evaluations,
+        cma_gap=None if searched is None or not math.isfinite(searched[0]) else relative(searched[0], best_known),
+        proven_gap=proven,
+    )
+    rng = np.random.default_rng(0)
+    X = rng.uniform(instance.lower, instance.upper, (SHARES, n))
+    feasible = float(np.mean(instance(X)[1] == 0.0))
+    return Known(
+        best_known=best_known,
+        best_x=tuple(best.tolist()),
+        evidence=evidence,
+        feasible_share=feasible,
+        evaluation_us=evaluation_us(instance, X[:TIMED]),
+        probes=probes(instance, best) if published is None else published.probes,
+    )
+
+
+def relative(cost: float, reference: float) -> float:
+    """Distance of a cost from a reference, in units of the reference."""
+    return (cost - reference) / (abs(reference) or 1.0)
+
+
+def long_search(instance: Instance, effort: Effort) -> tuple[float, Array]:
+    """Best feasible objective of several long runs of CMA-ES, infinite if none ends feasible, and its point."""
+    results = [
+        metaheuristics.minimize(instance, CmaEs(), evaluations=effort.cma_evaluations, seed=1000 + run)
+        for run in range(effort.cma_runs)
+    ]
+    best = min(results, key=lambda result: (result.violation, result.objective))
+    return (best.objective if best.feasible else math.inf), np.array(best.x)
+
+
+def proof(instance: Instance, best: Array, limit_s: float) -> float | None:
+    """How much better than the best known a feasible point may be at most, by branch and bound; None without a bound."""
+    if len(instance.names) > 4 or not limit_s:
+        return None
+    certificate = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
+    return certificate.gap if math.isfinite(certificate.bound) else None
+
+
+def strictly_feasible(instance: Instance, x: Array) -> Array:
+    """The nearest point that keeps a slack to every row, by linear programs that move as little as they can.
+
+    IPOPT may leave a row violated by some 1e-8; what is shipped as best known has a violation of exactly zero everywhere. To go
+    downhill as well would be wrong where the objective is the largest of several: its gradient is that of one of them.
+    """
+    from scipy.optimize import linprog
+
+    width = instance.upper - instance.lower
+    first = np.clip(x, instance.lower, instance.upper)
+    n, found = len(width), list[tuple[float, Array]]()
+    for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
+        x = first
+        for _ in range(4):
+            G = instance.rows(x[None])[0]
+            if G.max() <= -SLACK / 2:
+                found.append((float(instance(x[None])[0][0]), x))
+                break
+            J = instance.jacobian(x) * width
+            near = np.abs(J).sum(axis=1) * radius + G > -SLACK
+            low, high = (instance.lower - x) / width / radius, (instance.upper - x) / width / radius
+            bounds = [*zip(np.maximum(low, -1.0), np.minimum(high, 1.0), strict=True), (0.0, 1.0)]
+            least = np.hstack([np.vstack([np.eye(n), -np.eye(n)]), -np.ones((2 * n, 1))])  # |step| <= its largest part
+            step = linprog(
+                np.eye(n + 1)[-1],
+                A_ub=np.vstack([np.hstack([J[near], np.zeros((int(near.sum()), 1))]), least]),
+                b_ub=np.concatenate([-(G[near] + SLACK) / radius, np.zeros(2 * n)]),
+                bounds=bounds,
+            )
+            if step.x is None:
+                break
+            x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
+    if not found:
+        raise NothingFound("no strictly feasible point near the end of IPOPT")
+    return min(found, key=lambda item: item[0])[1]
+
+
+def evaluation_us(instance: Instance, X: Array) -> float:
+    """Least processor time of an evaluation in a batch, over some rounds [us]."""
+    rounds = []
+    for _ in range(5):
+        before = time.process_time()
+        instance(X)
+        rounds.append((time.process_time() - before) / len(X))
+    return round(1e6 * min(rounds), 2)
+
+
+def probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
+    """Values at random points, on the way from them to the best one, and there."""
+    rng = np.random.default_rng(20260101)
+    draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
+    X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
+    f, violation = instance(X)
+    G = instance.rows(X)
+    weights = 1.0 + np.arange(G.shape[1]) % 7
+    return tuple(
+        Probe(x=tuple(x.tolist()), objective=float(fi), violation=float(vi), rows=float(ri))
+        for x, fi, vi, ri in zip(X, f, violation, G @ weights, strict=True)
+    )
+
+
+if __name__ == "__main__":
+    main()

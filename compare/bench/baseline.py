@@ -1,0 +1,129 @@
+"""Shipped records of the baseline: one compressed file an instance, with what the leaderboard needs of each run.
+
+What is left out of a record: time histories, the dense grid, prices and indexes; everything that an expected running time, a
+distribution or a test is made from stays.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from compare.study.definition import without_hashes
+from compare.study.record import History, RunRecord, Times, Verdict
+from nlp_gait.errors import InputError
+from nlp_gait.files import new_file, without_nan
+
+FOLDER = Path(__file__).with_name("records")
+DIGITS = 12  # of numbers in the histories
+
+
+def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:
+    """Write the records of one instance, by solver; returns the file. Equal records give an equal file."""
+    solvers: dict[str, dict[str, Any]] = {}
+    for record in records:
+        if record.problem != instance:
+            raise InputError(f"a record of {record.problem!r} does not belong to {instance!r}")
+        # Which mathematics an id stands for is held by its probe values, not by a hash that a version of CasADi may change.
+        shared = {key: value for key, value in without_hashes(record.definition).items() if key != "seed"}
+        entry = solvers.setdefault(record.algorithm, {"definition": shared, "settings": record.settings, "runs": []})
+        if entry["definition"] != shared:
+            raise InputError(f"runs of {record.algorithm!r} on {instance!r} differ in their settings")
+        entry["runs"].append(_packed(record))
+    text = json.dumps(without_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
+    path = folder / f"{instance}.json.gz"
+    folder.mkdir(parents=True, exist_ok=True)
+    with new_file(path) as temporary:
+        temporary.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
+    return path
+
+
+def shipped(folder: Path = FOLDER) -> tuple[str, ...]:
+    """Ids of the instances that have baseline records."""
+    return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
+
+
+@cache
+def baseline_records(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]:
+    """Records of all solvers of the baseline on an instance.
+
+    Raises:
+        InputError: none are shipped.
+    """
+    path = folder / f"{instance}.json.gz"
+    if not path.is_file():
+        raise InputError(
+            f"no baseline records of {instance!r} are shipped; those that are: {', '.join(shipped(folder))}"
+        )
+    solvers = json.loads(gzip.decompress(path.read_bytes()))["solvers"]
+    return tuple(_unpacked(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"])
+
+
+def _packed(record: RunRecord) -> dict[str, Any]:
+    """A run, its history thinned to the entries at which the best changed, and the last one."""
+    evaluations, objective = [], []
+    last = len(record.history.objective) - 1
+    before: float | None = None
+    for k, (count, value) in enumerate(zip(record.history.evaluations, record.history.objective, strict=True)):
+        if value != before or k == last:
+            evaluations.append(count)
+            objective.append(None if value is None else float(f"{value:.{DIGITS}g}"))
+        before = value
+    return {
+        "run": record.run,
+        "seed": record.seed,
+        "status": record.status,
+        "success": record.success,
+        "x": [float(f"{value:.{DIGITS}g}") for value in record.x.values()],
+        "claim": [record.objective, record.violation],
+        "judged": [record.verdict.objective, record.verdict.violation, record.verdict.feasible],
+        "calls": record.evaluations,
+        "failed": record.failed_evaluations,
+        "iterations": record.iterations,
+        "solve_s": float(f"{record.time_s.solve:.4g}"),
+        "history": [evaluations, objective],
+    }
+
+
+def _unpacked(instance: str, solver: str, entry: dict[str, Any], run: dict[str, Any]) -> RunRecord:
+    objective, violation, feasible = run["judged"]
+    evaluations, values = run["history"]
+    return RunRecord(
+        problem=instance,
+        algorithm=solver,
+        run=run["run"],
+        seed=run["seed"],
+        definition={**entry["definition"], "seed": run["seed"]},
+        settings=entry["settings"],
+        status=run["status"],
+        success=run["success"],
+        x={str(k): value for k, value in enumerate(run["x"])},
+        objective=run["claim"][0],
+        violation=run["claim"][1],
+        verdict=Verdict(
+            objective=math.nan if objective is None else objective,
+            violation=math.inf if violation is None else violation,
+            feasible=feasible,
+            indexes={},
+            dense=None,
+            dense_feasible=None,
+            violated=(),
+        ),
+        evaluations=run["calls"],
+        failed_evaluations=run["failed"],
+        iterations=run["iterations"],
+        active_constraints=(),
+        history=History(evaluations=tuple(evaluations), objective=tuple(values)),
+        time_s=Times(
+            build=math.nan,
+            compile=math.nan,
+            solve=run["solve_s"],
+            objective=math.nan,
+            history=(math.nan,) * len(evaluations),
+        ),
+    )

@@ -1,0 +1,166 @@
+"""Who is where on the suite: places by expected running time and by solved targets, and tests against every other solver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.analysis.comparison import Comparison, SolverRuns, compare_problems
+from compare.analysis.statistics.distribution import ECDF_TARGETS
+from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
+from compare.bench.baseline import baseline_records
+from compare.study.record import RunRecord
+from nlp_gait import gaitbench
+
+ALPHA = 0.05
+# Relative gap below which two ends are the same: COCO's precision, too.
+SAME = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """A solver's place on the suite.
+
+    Attributes:
+        solver: its name.
+        mean_rank: over all instances and ``TARGETS``, of its expected running time; equals share a rank, and pairs of instance
+            and target that nobody reached are left out.
+        solved: share of all triples of instance, run and target (31, from 100 % to 1e-4 % above the best known) that it solved.
+        solved_rank: place by that share.
+        feasible: share of its runs that end feasible.
+        reached: by target, number of instances of which it reached the target at least once.
+    """
+
+    solver: str
+    mean_rank: float
+    solved: float
+    solved_rank: int
+    feasible: float
+    reached: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duel:
+    """A solver against another one, Holm-corrected.
+
+    Attributes:
+        other: name of the other solver.
+        better: instances on which the rank-sum test finds the solver better, corrected over all duels and instances.
+        worse: likewise.
+        undecided: the other instances.
+        mean_a12: probability that a run of the solver is better, mean over instances.
+        signed_rank: p-value over the median gaps of all instances, corrected over all duels.
+    """
+
+    other: str
+    better: int
+    worse: int
+    undecided: int
+    mean_a12: float
+    signed_rank: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Leaderboard:
+    """All solvers on some instances.
+
+    Attributes:
+        comparisons: one an instance, gaps measured from the best known objective.
+        standings: best mean rank first.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    standings: tuple[Standing, ...]
+
+    def place(self, solver: str) -> int:
+        """Place of a solver, from 1."""
+        return [standing.solver for standing in self.standings].index(solver) + 1
+
+    def duels(self, solver: str) -> list[Duel]:
+        """A solver against every other one, in the order of the standings."""
+        others = [standing.solver for standing in self.standings if standing.solver != solver]
+        found = [_by_name(comparison) for comparison in self.comparisons]
+        if not others:
+            return []
+        gaps = {name: [self._gaps(on[name], k) for k, on in enumerate(found)] for name in (solver, *others)}
+        p = np.array([[rank_sum(a, b) for a, b in zip(gaps[solver], gaps[other], strict=True)] for other in others])
+        effect = np.array([[a12(a, b) for a, b in zip(gaps[solver], gaps[other], strict=True)] for other in others])
+        real = holm(p.ravel().tolist()).reshape(p.shape) < ALPHA
+        medians = {name: [float(np.sort(gap)[len(gap) // 2]) for gap in on_all] for name, on_all in gaps.items()}
+        overall = holm([signed_rank(medians[solver], medians[other]) for other in others])
+        return [
+            Duel(
+                other=other,
+                better=int((real[k] & (effect[k] > 0.5)).sum()),
+                worse=int((real[k] & (effect[k] < 0.5)).sum()),
+                undecided=int((~real[k]).sum()),
+                mean_a12=float(effect[k].mean()),
+                signed_rank=float(overall[k]),
+            )
+            for k, other in enumerate(others)
+        ]
+
+    def _gaps(self, runs: SolverRuns, number: int) -> list[float]:
+        """Final gap of each run on an instance; what is closer than ``SAME`` is the optimum, and no better than that."""
+        return [
+            max(self.comparisons[number].gap(cost), SAME) if math.isfinite(cost) else math.inf for cost in runs.costs
+        ]
+
+
+def leaderboard(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
+    """Standings of the baseline and of further records.
+
+    Args:
+        instances: ids.
+        records: of other solvers on the same instances, under names that the baseline does not have.
+
+    Raises:
+        InputError: no baseline records of an instance are shipped.
+    """
+    everything = [record for id in instances for record in (*baseline_records(id), *records) if record.problem == id]
+    comparisons = tuple(compare_problems(everything, references=references(instances)))
+    return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))
+
+
+def references(instances: Sequence[str]) -> Mapping[str, float]:
+    """Best known objective of each instance, in its problem's own sense."""
+    loaded = {id: gaitbench.load(id) for id in instances}
+    return {id: instance.gait_problem.objective.sign * instance.best_known for id, instance in loaded.items()}
+
+
+def _by_name(comparison: Comparison) -> dict[str, SolverRuns]:
+    return {solver.name: solver for solver in comparison.solvers}
+
+
+def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
+    from scipy.stats import rankdata
+
+    found = [_by_name(comparison) for comparison in comparisons]
+    names = [name for name in found[0] if all(name in on for on in found)]
+    costs = np.array([[[on[name].expected_cost(t) for name in names] for t in TARGETS] for on in found])
+    rows = costs.reshape(-1, len(names))
+    rows = rows[np.isfinite(rows).any(axis=1)]
+    ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), math.nan)
+    solved = [
+        float(np.mean([math.isfinite(c.reached(t)) for on in found for c in on[name].curves for t in ECDF_TARGETS]))
+        for name in names
+    ]
+    places = rankdata([-share for share in solved], method="min")
+    return sorted(
+        (
+            Standing(
+                solver=name,
+                mean_rank=float(ranks[k]),
+                solved=solved[k],
+                solved_rank=int(places[k]),
+                feasible=float(np.mean([math.isfinite(cost) for on in found for cost in on[name].costs])),
+                reached=tuple(int(np.isfinite(costs[:, t, k]).sum()) for t in range(len(TARGETS))),
+            )
+            for k, name in enumerate(names)
+        ),
+        key=lambda standing: (standing.mean_rank, standing.solved_rank),
+    )

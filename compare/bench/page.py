@@ -1,0 +1,160 @@
+"""The leaderboard as a page."""
+
+from __future__ import annotations
+
+import math
+
+from compare.analysis.comparison import Comparison
+from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.table import count, percent
+from compare.bench.leaderboard import Leaderboard, Standing
+from compare.bench.tasks import EVALUATIONS, RUNS
+from compare.drawing.distributions import suite_figure
+from compare.report.document import Document, Figure, Section, Table, text_table
+from nlp_gait import gaitbench
+
+PER_INSTANCE_TARGET = 1e-3
+
+
+def leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Document:
+    """Page of a leaderboard.
+
+    Args:
+        board: to show.
+        solver: whose page it is; None for the baseline alone.
+        suite: name of the subset, or what else the instances are.
+    """
+    count_of = len(board.comparisons)
+    title = f"GaitBench 1, {suite}: {count_of} instances, {len(board.standings)} solvers"
+    return Document(
+        title=title if solver is None else f"{solver} on {title}",
+        verdict=() if solver is None else verdict(board, solver),
+        parts=(
+            standings_table(board),
+            Figure(
+                name="gaitbench-runtime",
+                caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
+                "31 targets, from 100 % to 1e-4 % above the best known.",
+                drawing=suite_figure(board.comparisons),
+            ),
+            *(() if solver is None else (_duels(board, solver),)),
+            Section(title="Instance by instance", parts=(instances_table(board, solver),)),
+            Section(
+                title="How it was measured",
+                parts=(
+                    f"Each solver makes {RUNS} runs on each instance with {EVALUATIONS} evaluations each, run k with the seed k; "
+                    "IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within "
+                    "60 s. Calls of derivatives count as forward differences would: n + 1 evaluations for a gradient or a "
+                    "Jacobian, (n + 1)(n + 2)/2 for a Hessian. What counts is the exact functions' verdict. The mean rank is "
+                    "that of the expected running time over all instances and the targets "
+                    + ", ".join(f"{100 * target:g} %" for target in TARGETS)
+                    + " above the best known; equals share a rank, and what nobody reached is left out.",
+                ),
+            ),
+        ),
+    )
+
+
+def verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
+    """Where a solver stands, in sentences."""
+    place, standing = board.place(solver), _standing(board, solver)
+    duels = board.duels(solver)
+    won = sum(duel.better > duel.worse for duel in duels)
+    lost = sum(duel.worse > duel.better for duel in duels)
+    return (
+        f"{solver} takes place {place} of {len(board.standings)} by expected running time (mean rank "
+        f"{standing.mean_rank:.2f}) and place {standing.solved_rank} by solved targets ({100 * standing.solved:.1f} %).",
+        f"{100 * standing.feasible:.0f} % of its runs end feasible.",
+        f"It is better than {won} of the other {len(duels)} solvers on more instances than it is worse, and worse than {lost} "
+        "(rank-sum tests at 5 %, Holm-corrected).",
+    )
+
+
+def standings_table(board: Leaderboard) -> Table:
+    """Every solver, best mean rank first."""
+    rows = [
+        (
+            str(place),
+            s.solver,
+            f"{s.mean_rank:.2f}",
+            str(s.solved_rank),
+            f"{100 * s.solved:.1f} %",
+            f"{100 * s.feasible:.0f} %",
+            *(f"{reached}/{len(board.comparisons)}" for reached in s.reached),
+        )
+        for place, s in enumerate(board.standings, start=1)
+    ]
+    header = (
+        "place",
+        "solver",
+        "mean rank",
+        "by solved",
+        "solved",
+        "feasible",
+        *(f"to {100 * t:g} %" for t in TARGETS),
+    )
+    return text_table(
+        header, rows, "Mean rank of the expected running time; instances of which each target was reached"
+    )
+
+
+def instances_table(board: Leaderboard, solver: str | None) -> Table:
+    """Every instance: the best solver there, and how far the chosen one comes."""
+    header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
+    if solver is not None:
+        header += ["median gap", "cost", "rank"]
+    rows = [_instance_row(comparison, solver) for comparison in board.comparisons]
+    caption = f"Cost: expected evaluations to {100 * PER_INSTANCE_TARGET:g} % above the best known"
+    return text_table(header, rows, caption)
+
+
+def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]:
+    instance = gaitbench.load(comparison.problem)
+    costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
+    cheapest = min(costs, key=lambda name: costs[name])
+    known = math.isfinite(costs[cheapest])
+    row = (
+        comparison.problem,
+        str(len(instance.names)),
+        f"{comparison.reference:.6g}",
+        cheapest if known else "-",
+        count(costs[cheapest]),
+    )
+    if solver is None:
+        return row
+    runs = next(s for s in comparison.solvers if s.name == solver)
+    rank = 1 + sum(cost < costs[solver] for cost in costs.values())
+    return (
+        *row,
+        percent(comparison.gap(runs.median_cost)),
+        count(costs[solver]),
+        str(rank) if math.isfinite(costs[solver]) else "-",
+    )
+
+
+def _duels(board: Leaderboard, solver: str) -> Section:
+    rows = [
+        (
+            duel.other,
+            str(duel.better),
+            str(duel.worse),
+            str(duel.undecided),
+            f"{duel.mean_a12:.3f}",
+            f"{duel.signed_rank:.2g}",
+        )
+        for duel in board.duels(solver)
+    ]
+    header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
+    return Section(
+        title=f"{solver} against each of the others",
+        parts=(
+            "Instances on which the rank-sum test of the final gaps finds a difference at 5 %, Holm-corrected over all solvers "
+            "and instances; gaps below 1e-6 % count as none. A12 is the probability that a run of this solver ends better. The "
+            "signed-rank test compares the median gaps of all instances, Holm-corrected over the solvers.",
+            text_table(header, rows),
+        ),
+    )
+
+
+def _standing(board: Leaderboard, solver: str) -> Standing:
+    return next(standing for standing in board.standings if standing.solver == solver)

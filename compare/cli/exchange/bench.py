@@ -1,0 +1,114 @@
+"""``nlp-gait bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from compare.bench.tasks import BASELINE, RUNS, bench_tasks
+from compare.cli.command import command
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stderr, stdout
+from compare.cli.interrupts import until_interrupted
+from compare.cli.options import AsJson, Jobs, names_in
+from nlp_gait.errors import InputError
+from nlp_gait.files import writable_folder
+
+
+@command
+def bench(
+    algorithm: Annotated[
+        str | None,
+        typer.Option(
+            help="Yours as my.py:MyAlgo or module:name, or one by name; without it the baseline alone is shown."
+        ),
+    ] = None,
+    suite: Annotated[Literal["small", "full"], typer.Option(help="small (ten instances, minutes) or full.")] = "small",
+    instances: Annotated[
+        str | None, typer.Option(help="Only these instances, separated by commas, in place of a suite.")
+    ] = None,
+    label: Annotated[str, typer.Option(help="What the page calls your algorithm (default: its own name).")] = "",
+    runs: Annotated[int, typer.Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS,
+    out: Annotated[
+        Path, typer.Option(help="Folder for the page and the records; finished runs in it are kept.")
+    ] = Path("bench"),
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+) -> None:
+    """Give an algorithm its place on GaitBench: run it on the suite, and rank it among the shipped baseline.
+
+    Every run has 10 000 evaluations; run k has the seed k, as those of the baseline have.
+
+    Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
+    `nlp-gait bench --algorithm pso --label pso-again`
+    """
+    from compare.bench.baseline import shipped
+    from compare.bench.leaderboard import leaderboard
+    from compare.bench.page import leaderboard_page, verdict
+    from compare.report.writing import write_document
+    from compare.study.record import RunRecord
+    from compare.study.study import Study, check_study, default_jobs, run_study
+    from nlp_gait import gaitbench
+
+    chosen = gaitbench.names(suite) if instances is None else tuple(names_in(instances))
+    for id in chosen:
+        gaitbench.load(id)  # says what is unknown
+    known = shipped()
+    missing = [id for id in chosen if id not in known]
+    if missing and (instances is not None or len(missing) == len(chosen)):
+        raise InputError(
+            f"no baseline records of {', '.join(missing)} are shipped; choose others with --instances, for example "
+            f"--instances {','.join(known)}"
+        )
+    if missing:
+        stderr.print(f"left out, for no baseline records of them are shipped yet: {', '.join(missing)}", soft_wrap=True)
+        chosen = tuple(id for id in chosen if id in known)
+    writable_folder(out)
+    records: list[RunRecord] = []
+    name: str | None = None
+    if algorithm is not None:
+        label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
+        study = Study(
+            tasks=bench_tasks(chosen, algorithm, label=label, runs=runs), folder=out, jobs=jobs or default_jobs()
+        )
+        name = study.tasks[0].title
+        if name in BASELINE:
+            raise InputError(f"{name!r} is a solver of the baseline; call yours otherwise with --label")
+        check_study(study)
+        with progress_bar(f"{name} runs", len(study.tasks)) as advance:
+            records, stopped = until_interrupted(
+                lambda: run_study(study, progress=lambda task, _: advance(task.problem.title)), nothing=""
+            )
+        if stopped:
+            end_interrupted(f"{stopped}; finished runs are kept in {out}: the same command continues")
+    board = leaderboard(chosen, records)
+    suite_name = (
+        f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
+    )
+    written = write_document(out, leaderboard_page(board, name, suite_name), "leaderboard")
+
+    def tables() -> None:
+        print_table(
+            f"GaitBench 1, {suite_name}: {len(chosen)} instances",
+            ("place", "solver", "mean rank", "targets solved", "runs feasible"),
+            [
+                (str(k), s.solver, f"{s.mean_rank:.2f}", f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %")
+                for k, s in enumerate(board.standings, start=1)
+            ],
+        )
+        for sentence in () if name is None else verdict(board, name):
+            stdout.print(sentence)
+
+    data = {
+        "suite": suite_name,
+        "instances": list(chosen),
+        "left_out": missing,
+        "solver": name,
+        "place": None if name is None else board.place(name),
+        "standings": [
+            {"solver": s.solver, "mean_rank": s.mean_rank, "solved": s.solved, "feasible": s.feasible}
+            for s in board.standings
+        ],
+    }
+    print_result(as_json, data, written, tables)

@@ -1,0 +1,96 @@
+"""What is known of each instance: the best point, how sure that is, and values that must never change."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from nlp_gait.decoding import decoded
+
+FILE = "known.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Why the best known objective may be the best there is.
+
+    Attributes:
+        starts: of IPOPT, from random points.
+        agreeing: how many of them end within 1e-6 of the best, relatively.
+        cma_runs: long runs of CMA-ES, which shares nothing with IPOPT but the functions; 0 if none were made.
+        cma_evaluations: of each of them.
+        cma_gap: by how much the best of them is worse, relatively; negative if it is better, None if none ended feasible.
+        proven_gap: no feasible point is better than the best known by more than this, relatively; None without a proof.
+    """
+
+    starts: int
+    agreeing: int
+    cma_runs: int = 0
+    cma_evaluations: int = 0
+    cma_gap: float | None = None
+    proven_gap: float | None = None
+
+    def __str__(self) -> str:
+        """For example ``28 of 30 starts of IPOPT; CMA-ES ends 1.2e-05 % above it``."""
+        parts = [f"{self.agreeing} of {self.starts} starts of IPOPT"]
+        if self.proven_gap is not None:
+            parts.insert(0, f"proven to {100 * self.proven_gap:.2g} %")
+        elif self.agreeing <= 1:
+            parts.insert(0, "best known")
+        if self.cma_runs:
+            parts.append("CMA-ES finds nothing feasible" if self.cma_gap is None else _cma(self.cma_gap))
+        return "; ".join(parts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probe:
+    """Values at a point that define the instance as much as its formulas do.
+
+    Attributes:
+        x: (n,) the point.
+        objective: to be minimised.
+        violation: total.
+        rows: sum over all rows k of ``(1 + k % 7) * G[k]``.
+    """
+
+    x: tuple[float, ...]
+    objective: float
+    violation: float
+    rows: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What is known of an instance.
+
+    Attributes:
+        best_known: least feasible objective known, in the sense of minimisation.
+        best_x: (n,) where it is; its violation is exactly zero.
+        evidence: for it.
+        feasible_share: of 100 000 uniform random points.
+        evaluation_us: processor time of one evaluation in a batch of many, one core of the machine that made the suite [us].
+        probes: fixed points.
+    """
+
+    best_known: float
+    best_x: tuple[float, ...]
+    evidence: Evidence
+    feasible_share: float
+    evaluation_us: float
+    probes: tuple[Probe, ...]
+
+
+@cache
+def known() -> Mapping[str, Known]:
+    """By id."""
+    raw = json.loads(files("nlp_gait.gaitbench").joinpath(FILE).read_text(encoding="utf-8"))
+    return {id: decoded(Known, entry, id) for id, entry in raw.items()}
+
+
+def _cma(gap: float) -> str:
+    if abs(gap) < 1e-8:
+        return "CMA-ES ends at the same value"
+    return f"CMA-ES ends {100 * abs(gap):.2g} % {'above' if gap > 0 else 'below'} it"

@@ -1,0 +1,134 @@
+"""``bench``, ``logs`` and ``export-objective`` as users call them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from compare.bench.baseline import shipped
+from compare.bench.tasks import BASELINE
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+
+ID = "walk12-w015"
+# What a user brings: an algorithm with ask and tell, and a plain function around a library's optimiser.
+MINE = '''
+from dataclasses import dataclass
+
+from scipy.optimize import dual_annealing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Random steps from the best point so far, shorter and shorter."""
+
+    population: int = 20
+    name = "steps"
+
+    def start(self, start):
+        return Walk(start)
+
+
+class Walk:
+    def __init__(self, start):
+        self.start, self.X, self.width = start, start.initial, 0.5
+
+    def ask(self):
+        return self.X
+
+    def tell(self, X, f, violation, rule):
+        start, self.width = self.start, 0.98 * self.width
+        step = self.width * (start.upper - start.lower) * start.rng.standard_normal(X.shape)
+        self.X = (X[rule.best(f, violation)] + step).clip(start.lower, start.upper)
+
+    def stop(self):
+        return ()
+
+
+def annealing(f, lower, upper, evaluations, seed):
+    dual_annealing(f, list(zip(lower, upper)), maxfun=evaluations, rng=seed, no_local_search=True)
+'''
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.py"
+    path.write_text(MINE)
+    return path
+
+
+@pytest.mark.parametrize("name", ["Steps", "annealing"])
+def test_bench_gives_an_algorithm_of_ones_own_its_place(mine: Path, tmp_path: Path, name: str) -> None:
+    """By ``file.py:name``, without glue; called again it runs nothing and says the same."""
+    out = tmp_path / "out"
+    call = ("bench", "--algorithm", f"{mine}:{name}", "--instances", ID, "--runs", "3", "--jobs", "1", "--out", out)
+    found = as_json(*call)
+    assert 1 <= found["place"] <= 13 and found["instances"] == [ID]
+    assert {s["solver"] for s in found["standings"]} == {*BASELINE, found["solver"]}
+    assert (out / "leaderboard.html").is_file() and (out / "gaitbench-runtime.png").is_file()
+    records = list((out / "records").glob("*/*.json"))
+    assert len(records) == 3
+    times = [path.stat().st_mtime_ns for path in records]
+    shown = nlp_gait(*call).stdout
+    assert [path.stat().st_mtime_ns for path in records] == times
+    assert f"takes place {found['place']} of 13" in shown
+    assert (
+        max(
+            len(line)
+            for line in shown.splitlines()
+            if "wrote" not in line and "takes place" not in line and "better" not in line
+        )
+        <= 80
+    )
+
+    logs = tmp_path / "logs"
+    assert as_json("logs", out, "--to", logs)["runs"] == 3
+    (header,) = logs.rglob("*.json")
+    runs = json.loads(header.read_text())["scenarios"][0]["runs"]
+    assert len(runs) == 3 and all(0.0 < run["best"]["y"] < 1.0 for run in runs)
+    nlp_gait("logs", out, "--to", tmp_path / "coco", "--format", "coco")
+    assert len(list((tmp_path / "coco").rglob("*.info"))) == 1
+
+
+def test_bench_shows_the_baseline_alone(tmp_path: Path) -> None:
+    found = as_json("bench", "--instances", ID, "--out", tmp_path)
+    assert found["place"] is None and len(found["standings"]) == 12
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--algorithm", "psoo", "--instances", ID), "unknown algorithm 'psoo'"),
+        (("--algorithm", "pso", "--label", "pso", "--instances", ID), "is a solver of the baseline"),
+        (("--instances", "ssp-v55"), "unknown instance of GaitBench 'ssp-v55'"),
+    ],
+)
+def test_bench_refuses_in_one_sentence(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    assert words in one_sentence("bench", *arguments, "--out", tmp_path / "out")
+
+
+def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compare.bench.baseline.shipped", lambda: ("walk12-w100",))
+    assert "no baseline records of walk12-w015 are shipped" in one_sentence(
+        "bench", "--instances", ID, "--out", tmp_path
+    )
+    assert shipped()
+    done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
+    assert "left out, for no baseline records of them are shipped yet: walk12-w015, ssp-v5," in done.stderr
+    found = json.loads(done.stdout)
+    assert found["instances"] == ["walk12-w100"] and len(found["left_out"]) == 9
+
+
+def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
+    found = as_json("export-objective", ID, "--to", tmp_path / "c")
+    assert {Path(name).suffix for name in found["files"]} == {".cpp", ".h", ".c", ".m", ".jl", ".sh"}
+    assert all(Path(name).is_file() for name in found["files"])
+    assert "did you mean 'walk12-w015'" in one_sentence("export-objective", "walk12-w15", "--to", tmp_path)
+
+
+def test_an_instance_is_a_problem_of_every_command(tmp_path: Path) -> None:
+    """``evaluate`` and ``list`` know it by its option."""
+    x = "0.13,0.05,0.02,0.02"
+    found = as_json("evaluate", "gaitbench", "--option", f"instance={ID}", "--x", x)
+    assert found["options"] == {"instance": ID} and found["feasible"] in (True, False)

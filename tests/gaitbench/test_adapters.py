@@ -1,0 +1,185 @@
+"""Every adapter with the real package: the same values, bounds and best point, and an optimiser of that package on it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+from nlp_gait import gaitbench
+from nlp_gait.errors import MissingExtraError
+from nlp_gait.problem import Array
+
+ID = "ssp-v5"
+
+
+@pytest.fixture(scope="module")
+def instance() -> gaitbench.Instance:
+    return gaitbench.load(ID)
+
+
+@pytest.fixture(scope="module")
+def X(instance: gaitbench.Instance) -> Array:
+    return np.random.default_rng(5).uniform(instance.lower, instance.upper, (40, len(instance.names)))
+
+
+def package(name: str):  # type: ignore[no-untyped-def]
+    """An optional package, which may warn while it is imported."""
+    return pytest.importorskip(name, reason=f"{name} is not installed: pip install 'nlp-gait[suites]'")
+
+
+@pytest.mark.parametrize("rows", [False, True])
+def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
+    """Objective and constraints of a population; pymoo's own sum of violations is ours."""
+    package("pymoo")
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.optimize import minimize
+
+    problem = instance.to_pymoo(rows=rows)
+    assert (problem.n_var, problem.n_obj) == (9, 1)
+    assert problem.n_ieq_constr == (len(instance.row_names) if rows else 1)
+    F, G = problem.evaluate(X, return_values_of=["F", "G"])
+    f, violation = instance(X)
+    np.testing.assert_array_equal(F[:, 0], f)
+    np.testing.assert_allclose(np.maximum(G, 0.0).sum(axis=1), violation, rtol=1e-12)
+    assert problem.pareto_front()[0][0] == instance.best_known
+    again = pickle.loads(pickle.dumps(problem))
+    np.testing.assert_array_equal(again.evaluate(X, return_values_of=["F"]), F)
+    result = minimize(problem, GA(pop_size=20), ("n_gen", 15), seed=1, verbose=False)
+    assert result.F[0] >= instance.best_known and result.CV[0] == 0.0
+
+
+def test_pymoo_finds_the_same_with_one_row_as_with_all(instance: gaitbench.Instance) -> None:
+    package("pymoo")
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.optimize import minimize
+
+    ends = [
+        minimize(instance.to_pymoo(rows=rows), GA(pop_size=20), ("n_gen", 10), seed=1, verbose=False).X
+        for rows in (False, True)
+    ]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
+
+
+def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
+    """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
+    pygmo = package("pygmo")
+    problem = instance.to_pygmo()
+    assert (problem.get_nx(), problem.get_nic(), problem.has_gradient()) == (9, len(instance.row_names), True)
+    values = np.array([problem.fitness(x) for x in X])
+    np.testing.assert_array_equal(values[:, 0], instance(X)[0])
+    np.testing.assert_array_equal(values[:, 1:], instance.rows(X))
+    np.testing.assert_array_equal(problem.batch_fitness(X.ravel()), values.ravel())
+    np.testing.assert_array_equal(problem.gradient(X[0])[:9], instance.gradient(X[0]))
+    assert problem.feasibility_x(instance.best_x)
+    assert np.allclose(copy.deepcopy(problem).fitness(X[0]), values[0])
+    population = pygmo.population(problem, 0, seed=1)
+    population.push_back(instance.best_x + 0.02 * (instance.lower + instance.upper - 2 * instance.best_x))
+    solver = pygmo.algorithm(pygmo.nlopt("slsqp"))
+    found = solver.evolve(population).champion_f[0]
+    assert found == pytest.approx(instance.best_known, rel=1e-3)
+
+
+def test_ioh(instance: gaitbench.Instance, X: Array) -> None:
+    """Bounds of each variable, the optimum, and a soft constraint that makes an infeasible point dear."""
+    package("ioh")
+    problem = instance.to_ioh()
+    np.testing.assert_array_equal(problem.bounds.lb, instance.lower)
+    np.testing.assert_array_equal(problem.bounds.ub, instance.upper)
+    assert problem.optimum.y == instance.best_known
+    np.testing.assert_array_equal(problem.optimum.x, instance.best_x)
+    assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
+    f, violation = instance(X)
+    for x, fi, vi in zip(X.tolist(), f, violation, strict=True):
+        expected = fi + 1e3 * abs(instance.best_known) * vi
+        assert problem(x) == pytest.approx(expected, rel=1e-12)
+    assert problem.state.evaluations == 1 + len(X)
+    assert problem.meta_data.name == f"GaitBench-{ID}" and problem.meta_data.n_variables == 9
+
+
+def test_ioh_keeps_instances_apart() -> None:
+    """Two that were wrapped one after the other: each has its own functions."""
+    package("ioh")
+    first, second = gaitbench.load("walk12-w015").to_ioh(), gaitbench.load("walk12-w100").to_ioh()
+    for problem, id in ((first, "walk12-w015"), (second, "walk12-w100")):
+        instance = gaitbench.load(id)
+        assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
+
+
+def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
+    """SLSQP with our gradients, from the middle of the bounds, in the unit cube."""
+    from scipy.optimize import minimize
+
+    unit = gaitbench.load(ID, unit_cube=True)
+    result = minimize(**unit.to_scipy(), x0=np.full(9, 0.5), method="SLSQP", options={"maxiter": 500, "ftol": 1e-12})
+    assert result.success, result.message
+    assert result.fun == pytest.approx(instance.best_known, rel=1e-5)
+
+
+def test_pycma(instance: gaitbench.Instance) -> None:
+    """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
+    cma = package("cma")
+    arguments = instance.to_cma()
+    constraints = arguments["constraints"](instance.best_x)
+    assert 5 <= len(constraints) <= 15 and max(constraints) <= 0.0
+    middle = np.array(arguments["x0"])
+    assert max(arguments["constraints"](middle)) == instance.rows(middle[None]).max()
+    options = {**arguments.pop("options"), "maxfevals": 2000, "seed": 1, "verbose": -9, "verb_log": 0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of an archive that needs one more package
+        _, strategy = cma.fmin_con2(**arguments, options=options)
+    best = strategy.objective_function.best_feas.x
+    assert best is not None and instance(np.array(best)[None])[1][0] == 0.0
+
+
+def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
+    """Parameters by name, one constraint, and a sampler that knows it."""
+    package("optunahub")
+    optuna = package("optuna")
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    problem = instance.to_optuna()
+    params = dict(zip(instance.names, X[0].tolist(), strict=True))
+    f, violation = instance(X[:1])
+    assert problem.evaluate(params) == f[0]
+    assert problem.evaluate_constraints(params) == {"violation": violation[0]}
+    assert list(problem.search_space) == list(instance.names)
+    study = optuna.create_study(directions=problem.directions, sampler=optuna.samplers.RandomSampler(seed=0))
+    study.optimize(problem, n_trials=15)
+    for trial in study.trials:
+        x = np.array([[trial.params[name] for name in instance.names]])
+        assert trial.value == instance(x)[0][0]
+
+
+def test_nevergrad(instance: gaitbench.Instance, X: Array) -> None:
+    package("nevergrad")
+    import nevergrad as ng
+
+    function = instance.to_nevergrad()
+    f, violation = instance(X)
+    assert function(X[0]) == f[0] and function.violation(X[0]) == violation[0]
+    optimizer = ng.optimizers.OnePlusOne(parametrization=function.parametrization, budget=60)
+    optimizer.parametrization.random_state.seed(1)
+    found = optimizer.minimize(function, constraint_violation=[function.violation]).value
+    assert ((found >= instance.lower) & (found <= instance.upper)).all()
+    assert instance(found[None])[1][0] <= np.median(violation)
+
+
+@pytest.mark.parametrize("name", ["pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad"])
+def test_a_package_that_lacks_is_named(
+    name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nlp_gait.gaitbench.adapters.find_spec", lambda package: None)
+    with pytest.raises(MissingExtraError, match=rf"to_{name}\(\) needs the package {name}.*nlp-gait\[suites\]"):
+        getattr(instance, f"to_{name}")()
+
+
+def test_loading_an_instance_imports_none_of_them() -> None:
+    import subprocess
+
+    program = "import sys; from nlp_gait import gaitbench; gaitbench.names(); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad", "scipy.optimize", "matplotlib"} & set(loaded)

@@ -1,0 +1,36 @@
+"""What the page on GaitBench says, runs."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlp_gait import gaitbench
+
+PAGE = Path(__file__).parents[2] / "docs" / "gaitbench.md"
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", BLOCKS, ids=[re.sub(r"\W+", " ", block.splitlines()[0]) for block in BLOCKS])
+def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As pasted, in an empty folder; what a package lacks is skipped by its name."""
+    monkeypatch.chdir(tmp_path)
+    instance = gaitbench.load("ssp-v5")
+    X = np.random.default_rng(0).uniform(instance.lower, instance.upper, (3, len(instance.names)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the packages
+        for package in re.findall(r"^(?:import|from) (\w+)", block, flags=re.MULTILINE):
+            pytest.importorskip(package, reason=f"{package} is not installed: pip install 'nlp-gait[suites]'")
+        exec(block, {"gaitbench": gaitbench, "X": X, "x": X[0]})
+
+
+def test_the_page_shows_every_adapter() -> None:
+    shown = "\n".join(BLOCKS)
+    adapters = [name for name in dir(gaitbench.Instance) if name.startswith("to_")]
+    assert len(adapters) == 7
+    assert all(f".{name}()" in shown for name in adapters)
