@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import without_nan, writable_folder
+from nlp_gait.files import check_name, without_nan, writable_folder
 
 T = TypeVar("T")
 
@@ -65,10 +65,15 @@ def end_interrupted(sentence: str) -> NoReturn:
 
 def fail(message: str, status: int = 1) -> NoReturn:
     """End with a status and one sentence."""
+    say_error(message)
+    raise typer.Exit(status)
+
+
+def say_error(message: str) -> None:
+    """The sentence of an error on stderr."""
     said = " ".join(message.split())
     shown = said if len(said) <= LONGEST_SENTENCE else f"{said[:LONGEST_SENTENCE]} ..."
     stderr.print(f"nlp-gait: {shown}", soft_wrap=True)
-    raise typer.Exit(status)
 
 
 def say(sentence: str) -> None:
@@ -190,6 +195,7 @@ class _Log:
 
 def output_file(path: Path) -> Path:
     """Path that can be written to, checked before the work."""
+    check_name(path)
     writable_folder(path.parent)
     try:
         if path.is_dir():
