@@ -13,7 +13,14 @@ from metaheuristics.constraint_handling import ConstraintHandling, Deb, Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.evaluation import Evaluator, Observer
 from metaheuristics.interface import Algorithm, BatchObjective
-from metaheuristics.preparation import check_limits, checked_points, checked_seed, entropy, prepared
+from metaheuristics.preparation import (
+    check_helpers,
+    check_limits,
+    checked_points,
+    checked_seed,
+    entropy,
+    prepared,
+)
 from metaheuristics.result import Interrupted, Result
 
 _DEB = Deb()
@@ -60,6 +67,7 @@ def minimize(
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
     check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
+    check_helpers(handling, observe)
     sequence = checked_seed(seed)
     start = prepared(objective, algorithm.population, evaluations, sequence, initial)
     search = algorithm.start(start)

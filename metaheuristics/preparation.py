@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from numbers import Integral
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from metaheuristics.array import Array, real_array
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, Bounded, Start
+
+LONGEST_VALUE = 80  # characters of a value in a message
+LARGEST = 1e100  # of a bound; algorithms multiply distances
 
 
 def prepared(
@@ -43,6 +46,8 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
     Raises:
         SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
     """
+    if not callable(objective) or not all(hasattr(objective, part) for part in ("names", "lower", "upper")):
+        raise SearchError(f"objective must be a function of X with names, lower and upper, got {_shown(objective)}")
     names = tuple(objective.names)
     try:
         lower, upper = np.array(real_array(objective.lower)), np.array(real_array(objective.upper))
@@ -54,9 +59,9 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
             f"lower of shape {lower.shape}, upper of shape {upper.shape}"
         )
     for name, low, high in zip(names, lower.tolist(), upper.tolist(), strict=True):
-        if not (low <= high and math.isfinite(high - low)):  # NaN fails too
+        if not -LARGEST <= low <= high <= LARGEST:  # NaN fails too
             raise SearchError(
-                f"variable {name!r}: bounds must be finite with lower <= upper, got {low} and {high}; "
+                f"variable {name!r}: bounds must be finite, within +-{LARGEST:g}, with lower <= upper, got {low} and {high}; "
                 "equal bounds fix a variable"
             )
     lower.setflags(write=False)
@@ -83,19 +88,44 @@ def check_limits(
     Raises:
         SearchError: One of them is not allowed; the budget must hold at least the starting points.
     """
-    if not isinstance(evaluations, Integral) or evaluations < algorithm.population:
+    if isinstance(algorithm, type) or not (
+        hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
+    ):
+        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {_shown(algorithm)}")
+    if not _whole(evaluations) or evaluations < algorithm.population:
         raise SearchError(
             f"evaluations must be a whole number >= the population of {called(algorithm)!r}, {algorithm.population}, got "
             f"{evaluations!r}: raise the budget or take a smaller population"
         )
-    if target is not None and math.isnan(target):
-        raise SearchError("target must be a number or None, got nan")
-    if stagnation is not None and (not isinstance(stagnation, Integral) or stagnation < 1):
+    if target is not None and (not _number(target) or math.isnan(target)):
+        raise SearchError(f"target must be a number or None, got {_shown(target)}")
+    if stagnation is not None and (not _whole(stagnation) or stagnation < 1):
         raise SearchError(
             f"stagnation must be a whole number of generations >= 1, or None for never, got {stagnation!r}"
         )
-    if time_limit_s is not None and not time_limit_s > 0.0:
-        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {time_limit_s!r}")
+    if time_limit_s is not None and not (_number(time_limit_s) and time_limit_s > 0.0):
+        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {_shown(time_limit_s)}")
+
+
+def check_helpers(handling: object, observe: object) -> None:
+    """Raise SearchError unless these are a constraint handling and, if there is one, a function."""
+    if isinstance(handling, type) or not callable(getattr(handling, "rule", None)):
+        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {_shown(handling)}")
+    if observe is not None and not callable(observe):
+        raise SearchError(f"observe must be a function of X, f and violation, got {_shown(observe)}")
+
+
+def _whole(value: object) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
 
 
 def called(algorithm: Algorithm) -> str:
@@ -133,7 +163,7 @@ def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
     """
     if isinstance(seed, np.random.SeedSequence):
         return seed
-    if not isinstance(seed, Integral) or seed < 0:
+    if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
         raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {seed!r}")
     return np.random.SeedSequence(int(seed))
 
@@ -173,8 +203,8 @@ def starting_points(
     if given is not None:
         try:
             rows = np.array(real_array(given))
-        except (TypeError, ValueError) as error:
-            raise SearchError(f"initial must be numbers: {error}") from error
+        except (TypeError, ValueError, OverflowError) as error:
+            raise SearchError(f"initial must be rows of numbers, got {_shown(given)}: {error}") from error
         if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
             raise SearchError(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "

@@ -56,7 +56,7 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
         SearchError: Unknown name or setting (the nearest known ones are suggested), a value that is not allowed, or the
             package that it comes from is not installed.
     """
-    if name in ADAPTERS:
+    if isinstance(name, str) and name in ADAPTERS:
         check_installed(name, name.partition(":")[0])
     return _made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
@@ -75,6 +75,8 @@ def handling(name: str, /, **settings: object) -> ConstraintHandling:
 
 
 def _made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
+    if not isinstance(name, str):
+        raise SearchError(f"the name of a {kind} must be a text, got {name!r}")
     if name not in factories:
         raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
     factory = factories[name]

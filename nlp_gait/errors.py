@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from numbers import Integral
+
+LONGEST_VALUE = 80  # characters of a value in a message
 
 
 class GaitError(Exception):
@@ -54,10 +57,46 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
         name: what the user gave.
         known: all allowed names.
     """
+    if not isinstance(name, str):
+        return UnknownNameError(f"the name of a {kind} must be a text, got {shown(name)}")
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
     return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
+
+
+def check_name(kind: str, name: object) -> None:
+    """Raise InputError unless what should name a problem, a solver or the like is a text."""
+    if not isinstance(name, str):
+        raise InputError(f"the name of a {kind} must be a text, got {shown(name)}")
+
+
+def checked_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:
+    """A whole number within limits, NumPy's too; True and False are none.
+
+    Args:
+        name: of the argument, for the message.
+        value: as it was given.
+        at_least: smallest that is allowed.
+        at_most: largest; None for no limit.
+
+    Raises:
+        InputError: it is something else.
+    """
+    whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if whole is None or whole < at_least or (at_most is not None and whole > at_most):
+        limit = "" if at_most is None else f" and <= {at_most}"
+        raise InputError(f"{name} must be a whole number >= {at_least}{limit}, got {shown(value)}")
+    return whole
+
+
+def shown(value: object) -> str:
+    """A value in a message: short, and whatever it is."""
+    try:
+        text = repr(value)
+    except Exception:  # somebody else's class; or a whole number too long to print
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
 
 
 def kind_name(kind: type) -> str:

@@ -203,12 +203,36 @@ def _shortened(text: str) -> str:
     return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
 
 
+@contextmanager
+def temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
+    """Folder for a while, removed at the end.
+
+    Raises:
+        GaitError: of that class: the system has no folder for temporary files with room in it.
+    """
+    with refusing("no folder for temporary files", error, "free some disk space, or name another folder in TMPDIR"):
+        folder = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
+    with folder as name:
+        yield Path(name)
+
+
+def check_name(path: Path) -> None:
+    """Refuse a path that records, reports and messages could not name.
+
+    Raises:
+        OutputError: it is no valid UTF-8.
+    """
+    if any("\ud800" <= sign <= "\udfff" for sign in str(path)):
+        raise OutputError(f"cannot write to {str(path)!r}: its name is no valid UTF-8; choose another name")
+
+
 def writable_folder(path: Path) -> Path:
     """Make a folder, and prove now that files can be written there rather than after the work.
 
     Raises:
-        OutputError: it cannot be made or written to.
+        OutputError: it cannot be made or written to, or its name is no valid UTF-8.
     """
+    check_name(path)
     with refusing(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         path.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=path).close()

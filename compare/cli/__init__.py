@@ -16,6 +16,7 @@ import typer
 
 import nlp_gait
 from compare.cli.animate import animate
+from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.exchange.bench import bench
@@ -78,4 +79,4 @@ for panel, functions in PANELS.items():
 
 def main() -> None:
     """Entry point of the console script."""
-    app()
+    run_app(app)

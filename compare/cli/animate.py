@@ -9,6 +9,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
+from compare.cli.interrupts import interruptible
 from compare.cli.options import StoredGait
 
 SHEET = ".png"
@@ -30,16 +31,18 @@ def animate(
     """
     from compare.drawing.animation import contact_sheet, frames
     from compare.drawing.skeletons import skeleton_of
-    from nlp_gait.simulation.film.video import check_video_path, write_video
+    from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
+    loaded = stored.load()
     target = output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:
         check_video_path(target)
-    loaded = stored.load()
     skeleton = skeleton_of(loaded, frames_per_s / speed)
-    if target.suffix.lower() == SHEET:
-        contact_sheet(skeleton, target, poses)
-    else:
-        played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
-        write_video(target, frames(skeleton), (len(skeleton.t) - 1) / played_s)
+    with interruptible():
+        if target.suffix.lower() == SHEET:
+            contact_sheet(skeleton, target, poses)
+        else:
+            played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
+            check_frames(played_s, frames_per_s)
+            write_video(target, frames(skeleton), (len(skeleton.t) - 1) / played_s)
     print_written(target)

@@ -6,23 +6,27 @@ command are; a command that has a parameter of that type gets every field as an 
 
 from __future__ import annotations
 
+import codecs
 import errno
 import functools
 import inspect
+import io
 import os
 import sys
+import unicodedata
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, TypeVar, get_type_hints
 
 import typer
 
-from compare.cli.common import end_interrupted, fail
+from compare.cli.common import end_interrupted, fail, say_error
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError
 
 R = TypeVar("R")
 
+PLAIN = "nlp-gait-plain"  # how characters are written that an output's encoding does not have
 # Errors of the system where a file cannot grow.
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
@@ -43,15 +47,10 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
         except (GaitError, SearchError) as error:
             fail(str(error))
         except KeyboardInterrupt as interrupt:
-            end_interrupted(str(interrupt) or "interrupted")
-        except BrokenPipeError:  # the reader of our output has gone, for example `| head`
-            _close_output()
-            raise typer.Exit(1) from None
+            end_interrupted(str(interrupt) or "interrupted; files that were written are whole")
         except OSError as error:
-            if error.errno not in NO_ROOM:
-                raise
-            _close_output()
-            fail(f"cannot write the output: {error.strerror}")
+            _say(error)
+            raise typer.Exit(1) from None
 
     options: list[inspect.Parameter] = []
     for parameter in parameters:
@@ -72,6 +71,55 @@ def _options(group: Any) -> Iterator[inspect.Parameter]:
         )
 
 
-def _close_output() -> None:
-    """Drop what is left in the buffers, so that the interpreter does not fail on it at its end."""
+def run_app(app: Callable[[], object]) -> None:
+    """Run the command line with outputs that take whatever it prints; help that cannot be written is said too."""
+    _open_outputs()
+    try:
+        app()
+    except OSError as error:
+        _say(error)
+        sys.exit(1)
+
+
+def _say(error: OSError) -> None:
+    """The sentence for output that could not be written; none where its reader has gone, as with ``| head``.
+
+    Raises:
+        OSError: it is another one.
+    """
+    if error.errno not in (*NO_ROOM, errno.EPIPE):
+        raise error
+    # What is left in the buffers is dropped, so that the interpreter does not fail on it at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if error.errno != errno.EPIPE:
+        say_error(f"cannot write the output: {error.strerror}")
+
+
+def _open_outputs() -> None:
+    """Outputs that are open and write every character, as plainly as their encoding needs.
+
+    A closed standard output is refused: the next file opened would take its place, and whatever is printed would go there. A
+    closed standard error is opened on nothing.
+    """
+    if sys.stderr is None:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        if nothing != 2:
+            os.dup2(nothing, 2)
+        sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
+    if sys.stdout is None:
+        sys.stdout = sys.stderr  # for the interpreter's end
+        say_error("standard output is closed; send it to a file or to /dev/null")
+        sys.exit(1)
+    codecs.register_error(PLAIN, _plain)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=PLAIN)
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """The nearest ASCII of what cannot be encoded, as a space for a narrow one; else its escape."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    near = (unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() for sign in text)
+    return "".join(found or ascii(sign)[1:-1] for found, sign in zip(near, text, strict=True)), error.end

@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import without_nan, writable_folder
+from nlp_gait.files import check_name, without_nan, writable_folder
 
 T = TypeVar("T")
 
@@ -65,10 +65,15 @@ def end_interrupted(sentence: str) -> NoReturn:
 
 def fail(message: str, status: int = 1) -> NoReturn:
     """End with a status and one sentence."""
+    say_error(message)
+    raise typer.Exit(status)
+
+
+def say_error(message: str) -> None:
+    """The sentence of an error on stderr."""
     said = " ".join(message.split())
     shown = said if len(said) <= LONGEST_SENTENCE else f"{said[:LONGEST_SENTENCE]} ..."
     stderr.print(f"nlp-gait: {shown}", soft_wrap=True)
-    raise typer.Exit(status)
 
 
 def say(sentence: str) -> None:
@@ -106,7 +111,10 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         for i in group:
             need = min(needs[i], room)
             justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"
-            table.add_column(header[i], justify=justify, overflow="fold", min_width=need)
+            flexible = any(len(row[i]) > LONGEST_CELL for row in rows)
+            table.add_column(
+                header[i], justify=justify, overflow="fold", min_width=need, width=None if flexible else need
+            )
         for row in rows:
             table.add_row(*(row[i] for i in group))
         stdout.print(table)
@@ -187,6 +195,7 @@ class _Log:
 
 def output_file(path: Path) -> Path:
     """Path that can be written to, checked before the work."""
+    check_name(path)
     writable_folder(path.parent)
     try:
         if path.is_dir():

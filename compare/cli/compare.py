@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say, stdout
+from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, stderr, stdout
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
 from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
@@ -123,6 +123,22 @@ def compare(
         print_plays(plays)
 
     print_result(as_json, data, written, tables)
+    end_if_none_left(records)
+
+
+def end_if_none_left(records: Sequence[RunRecord]) -> None:
+    """Say on stderr whose runs failed, and end with status 1 if a solver has no run left on some problem."""
+    from compare.analysis.failures import failures_of
+
+    nothing_left = []
+    for failure in failures_of(records):
+        if failure.failed == failure.runs:
+            nothing_left.append(failure.solver)
+        stderr.print(f"nlp-gait: {failure.in_words}", soft_wrap=True)
+    if nothing_left:
+        fail(
+            f"without any result: {', '.join(nothing_left)}; mend the reason, and delete the failed records to run them again"
+        )
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:
@@ -148,6 +164,7 @@ HOW_TO_READ = (
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
+    from compare.analysis.failures import failures_of
     from compare.analysis.table import HEADER, cells, summarise
 
     for comparison in compare_problems(records):
@@ -158,6 +175,10 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
             [HEADER[i] for i in order],
             [[row[i] for i in order] for row in rows],
         )
+        failures = failures_of([record for solver in comparison.solvers for record in solver.records])
+        if failures:
+            cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
+            print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
     stdout.print(HOW_TO_READ)
 
 

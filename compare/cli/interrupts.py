@@ -26,6 +26,8 @@ def until_interrupted(work: Callable[[], R], nothing: str = "nothing was written
         if not interrupt.partial:
             end_interrupted("; ".join(filter(None, (interrupt.sentence, nothing))))
         return cast(R, interrupt.partial), interrupt.sentence
+    except KeyboardInterrupt:
+        end_interrupted("interrupted before there was a result; nothing was written")
 
 
 @contextmanager

@@ -45,8 +45,24 @@ def deferred_interrupts() -> Iterator[Callable[[], bool]]:
         if presses > 1:
             raise KeyboardInterrupt
 
+    note.defers = True  # type: ignore[attr-defined]
     with _handler(note):
         yield lambda: presses > 0
+
+
+@contextmanager
+def held_interrupts() -> Iterator[None]:
+    """Ctrl-C waits until the end of what is inside, which takes a moment; pressed again, it does not wait.
+
+    Inside ``deferred_interrupts`` it waits for the end of that.
+    """
+    if getattr(signal.getsignal(signal.SIGINT), "defers", False):
+        yield
+        return
+    with deferred_interrupts() as pressed:
+        yield
+        if pressed():
+            raise KeyboardInterrupt
 
 
 @contextmanager

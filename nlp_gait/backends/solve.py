@@ -11,12 +11,13 @@ from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, checked_count, shown
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 
 # A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
+MOST_STARTS = 100_000
 
 
 def solve(
@@ -49,9 +50,11 @@ def solve(
         InputError: no start, x0 or a fixed value that is not allowed, or a solver that does not run here.
         Interrupted: Ctrl-C; carries the solution from the starts until then, the one in progress where it was.
     """
-    if starts < 1:
-        raise InputError(f"starts must be at least 1, got {starts}")
-    problem = (load(problem) if isinstance(problem, str) else problem).fix(**(fix or {}))
+    starts = checked_count("starts", starts, at_most=MOST_STARTS)
+    seed = checked_count("seed", seed, at_least=0)
+    problem = load(problem) if isinstance(problem, str) else problem
+    _check_kinds(problem, fix, solver, progress)
+    problem = problem.fix(**(fix or {}))
     points = _start_points(problem, starts, seed, x0)
     ready = (solver or IpoptSettings()).ready_for(problem, starts)
     outcomes: list[Outcome] = []
@@ -67,6 +70,21 @@ def solve(
         sentence = f"interrupted in start {len(outcomes)} of {starts}"
         raise Interrupted(sentence, replace(solution, status=f"{sentence}; {solution.status}"))
     return solution
+
+
+def _check_kinds(problem: object, fix: object, solver: object, progress: object) -> None:
+    """Raise InputError where an argument is of another kind."""
+    if not isinstance(problem, GaitProblem):
+        raise InputError(f"problem must be a problem from load, or the name of one, got {shown(problem)}")
+    if fix is not None and not (isinstance(fix, Mapping) and all(isinstance(name, str) for name in fix)):
+        raise InputError(f"fix must be values by variable name, got {shown(fix)}")
+    makes_runs = all(callable(getattr(solver, method, None)) for method in ("run", "ready_for"))
+    if solver is not None and (isinstance(solver, type) or not makes_runs):
+        raise InputError(
+            f"solver must be one with its settings, as nlp_gait.solver('ipopt') or IpoptSettings() make it, got {shown(solver)}"
+        )
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function of one start's outcome, got {shown(progress)}")
 
 
 def _start_points(

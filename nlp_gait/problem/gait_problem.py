@@ -28,6 +28,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 T = TypeVar("T")
+LARGEST = 1e100  # of a parameter; the square of a larger one is no number any more
 # Changes what a problem assembles.
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
 # A point lies on a bound that it misses by this share of the variable's default range.
@@ -203,6 +204,8 @@ class GaitProblem:
             parameter = self._parameter(name)
             if not is_number(value):
                 raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
+            if abs(value) > LARGEST:
+                raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
                 raise InputError(
                     f"parameter {name!r} must be within [{parameter.minimum}, {parameter.maximum}] {parameter.unit}, got {value}"
@@ -319,7 +322,7 @@ class GaitProblem:
 
     def variable_index(self, name: str) -> int:
         """Position of a variable in x; raises UnknownNameError."""
-        if name not in self.names:
+        if not isinstance(name, str) or name not in self.names:
             raise unknown(f"variable of {self.name}", name, self.names)
         return self.names.index(name)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.errors import InputError, check_name, kind_name, unknown
 from nlp_gait.problem.checks import check_mathematics
 from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.problem.locking import one_at_a_time
@@ -34,6 +35,7 @@ PROBLEMS = {
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.
 LARGEST_COUNT = 10_000
+GRID = ("intervals", "samples_per_interval")  # options whose product is as limited as each is
 
 Maker = Callable[..., GaitProblem]
 
@@ -168,6 +170,7 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
     known, allowed = inspect.signature(make).parameters, _choices(make)
+    counts = {name: _plain(options.get(name, known[name].default)) for name in GRID if name in known}
     for option, given in options.items():
         value = _plain(given)
         if option not in known:
@@ -178,6 +181,12 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
+        if (
+            option in GRID
+            and math.prod(max(1, count) for count in counts.values() if type(count) is int) > LARGEST_COUNT
+        ):
+            product = " x ".join(f"{name} {counts[name]}" for name in GRID if name in known)
+            raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
 
@@ -204,4 +213,5 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
         UnknownNameError: no such problem or option.
         InputError: a value that the option does not allow, or code of one's own that fails.
     """
+    check_name("problem", name)
     return problem_maker(name)(**options)

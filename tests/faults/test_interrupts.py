@@ -37,13 +37,13 @@ def press_after(
     """Ctrl-C during a certain call of a method."""
     method, count = getattr(owner, name), 0
 
-    def counted(*arguments: Any) -> Any:
+    def counted(*arguments: Any, **named: Any) -> Any:
         nonlocal count
         count += 1
         if count == calls:
             before()
             signal.raise_signal(signal.SIGINT)
-        return method(*arguments)
+        return method(*arguments, **named)
 
     monkeypatch.setattr(owner, name, counted)
 
@@ -217,3 +217,54 @@ def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
     assert process.returncode == 130 and messages == "nlp-gait: interrupted after 0 of 1 runs\n"
     state = subprocess.run(["ps", "-o", "stat=", "-p", marker.read_text().strip()], capture_output=True, text=True)
     assert state.stdout.strip() in ("", "Z")  # a Z has ended, and nobody has asked for its status
+
+
+def a_gait(folder: Path) -> Path:
+    """A result in the middle of the bounds."""
+    problem = nlp_gait.load("walk12")
+    path = folder / "gait.json"
+    x = problem.by_name((problem.lower + problem.upper) / 2)
+    path.write_text(json.dumps({"problem": "walk12", "x": x}))
+    return path
+
+
+@pytest.mark.parametrize("ending", ["gif", "png"])
+@pytest.mark.parametrize("calls", [1, 7, 40])
+def test_animate_while_a_picture_is_drawn(
+    calls: int, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Within Matplotlib's compiled code an exception of the handler would become "Invalid affine transformation matrix".
+    from matplotlib.backends.backend_agg import RendererAgg
+
+    def pressed_inside(self: Any, *arguments: Any, path: Any = RendererAgg.draw_path) -> None:
+        nonlocal drawn
+        drawn += 1
+        if drawn == calls:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                raise ValueError("Invalid affine transformation matrix") from None
+        path(self, *arguments)
+
+    drawn = 0
+    monkeypatch.setattr(RendererAgg, "draw_path", pressed_inside)
+    gait = a_gait(tmp_path)
+    done = run("animate", str(gait), "--out", str(tmp_path / f"film.{ending}"))
+    assert done.stderr == "nlp-gait: interrupted; nothing was written\n" and drawn >= calls
+    assert list(tmp_path.iterdir()) == [gait]
+
+
+def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
+    from nlp_gait.problem import GaitProblem
+
+    with monkeypatch.context() as patch:
+        press_after(patch, GaitProblem, "fix", 2)  # the first one checks what was asked
+        assert run(*asked).stderr == "nlp-gait: interrupted before there was a result; nothing was written\n"
+    assert list(tmp_path.iterdir()) == []
+    from matplotlib.figure import Figure
+
+    press_after(monkeypatch, Figure, "savefig", 1)
+    done = run(*asked)
+    assert done.stderr == f"nlp-gait: interrupted at the end; what was found is in {tmp_path}\n"
+    assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1

@@ -153,8 +153,8 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
         ({"initial": np.zeros((11, 2))}, "R <= 10"),
         ({"initial": np.full((1, 2), 9.0)}, r"initial row 0, variable 0: 9\.0 is outside"),
         ({"initial": np.full((1, 2), np.nan)}, "outside the bounds"),
-        ({"initial": np.full((1, 2), 0.5j)}, "initial must be numbers"),
-        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial must be numbers"),
+        ({"initial": np.full((1, 2), 0.5j)}, "initial must be rows of numbers"),
+        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial must be rows of numbers"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, object], message: str) -> None:

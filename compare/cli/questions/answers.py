@@ -10,6 +10,7 @@ import typer
 
 from compare.cli.common import end_interrupted, print_result, print_table, stdout
 from compare.cli.options import RESULTS, AsJson
+from nlp_gait.backends.interrupts import deferred_interrupts
 from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
@@ -38,12 +39,13 @@ class Output:
             OutputError: a file cannot be written; the answer is printed all the same.
         """
         written: list[Path] = []
-        try:
-            written = answer.write(self.out)
-        finally:
-            print_result(self.as_json, answer.data, written, lambda: _print(answer))
-        if stopped:
-            end_interrupted(f"{stopped}; what was found is in {self.out}")
+        with deferred_interrupts() as pressed:  # it takes a moment; pressed again, Ctrl-C does not wait
+            try:
+                written = answer.write(self.out)
+            finally:
+                print_result(self.as_json, answer.data, written, lambda: _print(answer))
+        if stopped or pressed():
+            end_interrupted(f"{stopped or 'interrupted at the end'}; what was found is in {self.out}")
 
 
 def _print(answer: Answer) -> None:

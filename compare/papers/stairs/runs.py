@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, get_args
 
@@ -12,7 +12,7 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.runs import Runs, best, point, searches, starts
 from compare.papers.stairs.motion import swing_leg
-from compare.papers.stairs.paper import ANTS, EVAPORATION, ITERATIONS, TABLE_4
+from compare.papers.stairs.paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
 from compare.study.definition import fingerprint
 from compare.study.record import RunRecord
@@ -54,6 +54,7 @@ class Effort:
         cases: of Table IV.
         plan_starts: of IPOPT on the plan of least energy.
         jerk_starts: on that of least peak jerk.
+        hip_starts: on the plan of least energy with the paper's hip height.
         ideal_starts: on the ideal.
         runs: of each search algorithm.
         plan_evaluations: of a search for a plan.
@@ -69,6 +70,7 @@ class Effort:
     cases: tuple[int, ...] = tuple(TABLE_4)
     plan_starts: int = 20
     jerk_starts: int = 5
+    hip_starts: int = 6
     ideal_starts: int = 3
     runs: int = 3
     plan_evaluations: int = 10_000
@@ -89,7 +91,7 @@ class Effort:
     @property
     def steps(self) -> int:
         """Runs, other steps of each case, the network, and the report."""
-        gradient = self.plan_starts + self.jerk_starts + self.ideal_starts + 1
+        gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
         case = gradient + 2 * len(ALGORITHMS) * self.runs + PER_CASE
         others = sum(1 + _other_starts(self, rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2
@@ -100,6 +102,13 @@ def plan_spec(effort: Effort, case: int, minimise: str = "energy") -> ProblemSpe
     label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
     options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
     return ProblemSpec(name="stairs-plan", options=options, values=stair_of(case), label=label)
+
+
+def hip_spec(effort: Effort, case: int) -> ProblemSpec:
+    """Planner of a case with the paper's hip height."""
+    fixed = {f"hip_height_m.{end}": TABLE_3["hip_height_m"] for end in ("lower", "upper")}
+    spec = plan_spec(effort, case)
+    return replace(spec, values={**spec.values, **fixed}, label=f"hip-{case}")
 
 
 def ideal_spec(effort: Effort, case: int) -> ProblemSpec:
@@ -133,6 +142,7 @@ def first_tasks(effort: Effort) -> Iterator[Task]:
         yield from starts(ideal_spec(effort, case), effort.ideal_starts, seed=case)
         yield from starts(plan_spec(effort, case), effort.plan_starts)
         yield from starts(plan_spec(effort, case, "jerk"), effort.jerk_starts)
+        yield from starts(hip_spec(effort, case), effort.hip_starts)
         for name, algorithm in ALGORITHMS.items():
             yield from searches(plan_spec(effort, case), name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
@@ -255,7 +265,7 @@ def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[s
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
 
 
-def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float]:
+def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float | None]:
     """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
     arrays = ideal.load().signals(np.array(x)).arrays
     _, followed = replay(arrays, FEEDBACK)
@@ -265,7 +275,7 @@ def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float]:
         "feedback_end_rad": float(np.abs(followed[-1]).max()),
         "open_loop_t1_rad": float(off[time <= PAPER_TIMES[0]][-1]),
         "open_loop_t2_rad": float(off[time <= PAPER_TIMES[1]][-1]),
-        "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]),
+        "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]) if off[-1] > LOST_RAD else None,
         "open_loop_end_rad": float(np.abs(fallen[-1]).max()),
     }
 

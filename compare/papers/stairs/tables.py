@@ -84,6 +84,7 @@ def all_tables(findings: Findings) -> dict[str, Rows]:
         "plans": [row for case in findings.cases for row in _plans(findings, case)],
         "table4": _table_4(findings),
         "tracks": [row for case in findings.cases for row in _tracks(findings, case)],
+        "fixed-hip": [_fixed_hip(findings, case) for case in findings.cases],
         "ideal": [_ideal(findings, case) for case in findings.cases],
         "jerk": [_jerk(findings, case) for case in findings.cases],
         "other-stairs": _other(findings),
@@ -170,6 +171,13 @@ def _jerk(findings: Findings, case: int) -> Sequence[Value]:
     """Plan of least peak jerk."""
     verdict = findings.best("jerk", case).verdict
     return [case, TABLE_4[case].jerk, verdict.objective, verdict.indexes["energy_J"]]
+
+
+def _fixed_hip(findings: Findings, case: int) -> Sequence[Value]:
+    """Plans with the paper's hip height."""
+    runs, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
+    feasible = sum(run.verdict.feasible for run in runs)
+    return [case, f"{feasible} of {len(runs)}", "; ".join(verdict.violated[:3]) or "nothing"]
 
 
 def _differences(findings: Findings, case: int) -> Sequence[Value]:

@@ -20,7 +20,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
 
-MOST_POINTS = 10_000  # of an axis
+MOST_POINTS = 10_000  # of an axis, and of the whole grid
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,12 +104,13 @@ def sweep(
 
     Raises:
         UnknownNameError: an axis is neither a variable nor a parameter; no such algorithm.
-        InputError: a value outside what is allowed, or an axis twice.
+        InputError: a value outside what is allowed, an axis twice, or a grid of too many points.
         Interrupted: Ctrl-C; carries the points that were tried until then.
     """
     names = [axis.name for axis in axes]
     if len(set(names)) < len(names):
         raise InputError(f"each axis must be named once, got {', '.join(names)}")
+    check_size(axes)
     walk = [dict(zip(names, at, strict=True)) for at in _snake(axes)]
     problem = spec.load()
     specs = [replace(spec, values=dict(placed(problem, at).values)) for at in walk]  # all checked before the work
@@ -130,6 +131,16 @@ def sweep(
     if sentence:
         raise Interrupted(sentence, grid)
     return grid
+
+
+def check_size(axes: Sequence[Axis]) -> None:
+    """Raise InputError if the axes span more points than a sweep takes."""
+    points = math.prod(len(axis.values) for axis in axes)
+    if points > MOST_POINTS:
+        spans = " x ".join(f"{len(axis.values)} of {axis.name}" for axis in axes)
+        raise InputError(
+            f"a sweep takes at most {MOST_POINTS} points in all, got {spans} = {points}; take fewer of each"
+        )
 
 
 def count_solves(axes: Sequence[Axis], algorithm: str) -> int:

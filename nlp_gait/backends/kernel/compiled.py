@@ -16,7 +16,7 @@ from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.interpreted import InterpretedKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import CompilerError, InputError, checked_count, shown
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.numbers import real_numbers
 
@@ -25,6 +25,7 @@ LOG = logging.getLogger("nlp_gait")
 CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
+MOST_THREADS = 1024
 # A second thread takes part once it has this much to do; handing over the work costs about 0.05 ms.
 LEAST_THREAD_TIME_S = 3e-4
 
@@ -161,13 +162,17 @@ def compile_objective(
         InputError: a thread or lane count that is not allowed, or a problem that is not searchable.
         CompilerError: ``require_compiler``, and there is no compiler or it fails.
     """
+    if not isinstance(problem, GaitProblem):
+        raise InputError(f"problem must be a problem from load, got {shown(problem)}")
+    if not isinstance(require_compiler, bool):
+        raise InputError(f"require_compiler must be True or False, got {shown(require_compiler)}")
     if not problem.searchable:
         raise InputError(
             f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can meet; use solve"
         )
-    if threads is not None and threads < 1:
-        raise InputError(f"threads must be at least 1, got {threads}")
-    if lanes is not None and lanes not in LANE_COUNTS:
+    if threads is not None:
+        threads = checked_count("threads", threads, at_most=MOST_THREADS)
+    if lanes is not None and checked_count("lanes", lanes) not in LANE_COUNTS:
         raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
     kernel = kernel_of(problem)
     count = native_lanes() if lanes is None else lanes

@@ -78,6 +78,9 @@ def find_compiler() -> Compiler:
 @functools.lru_cache(maxsize=8)
 def _find(cxx: str, cc: str, path: str) -> Compiler:
     tried: list[str] = []
+    for name, text in (("CXX", cxx), ("CC", cc)):
+        if _words(text) == ():
+            tried.append(f"{name}={text!r}: not a command line")
     for command in _candidates(cxx, cc):
         if shutil.which(command[0], path=path) is None:
             tried.append(f"{command[0]}: not found")
@@ -90,11 +93,22 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
 
 
 def _candidates(cxx: str, cc: str) -> list[tuple[str, ...]]:
-    named = [tuple(shlex.split(variable)) for variable in (cxx, cc) if variable.strip()]
+    named = [words for variable in (cxx, cc) if (words := _words(variable))]
     found: list[tuple[str, ...]] = [(name,) for name in COMMON_NAMES]
     if find_spec("ziglang") is not None:
         found.append((sys.executable, "-m", "ziglang", "cc"))
     return named + found
+
+
+def _words(text: str) -> tuple[str, ...] | None:
+    """Words of a command line; none where its quotes are not closed or it names no program, None if there is no text."""
+    if not text.strip():
+        return None
+    try:
+        words = tuple(shlex.split(text))
+    except ValueError:
+        return ()
+    return words if words and words[0] else ()
 
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
 from nlp_gait.errors import CompilerError
+from nlp_gait.files import refusing, temporary_folder
 
 LOG = logging.getLogger("nlp_gait")
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
@@ -52,8 +53,8 @@ def load_library(
         loaded = _load(library, symbols)
         if loaded is not None:
             return loaded, library
-    with tempfile.TemporaryDirectory(prefix="nlp-gait-build-") as workshop:
-        written, built = Path(workshop) / "source.cpp", Path(workshop) / f"library{SUFFIX}"
+    with temporary_folder("nlp-gait-build-", CompilerError) as workshop:
+        written, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
         try:
             written.write_text(source, encoding="utf-8")
         except OSError as error:
@@ -94,8 +95,10 @@ def cache_folder() -> Path:
     process takes its place.
     """
     named = os.environ.get(FOLDER_VARIABLE)
-    base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "nlp-gait"
+    base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "nlp-gait"
     try:
+        if base.parts[0] == "~":
+            base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
         reason = _distrust(base, stat.S_ISDIR)
     except (OSError, RuntimeError) as error:
@@ -130,7 +133,8 @@ def _warn_once(message: str) -> None:
 @cache
 def _private_folder() -> Path:
     """Folder that only this process uses, made when it is needed and removed at the end."""
-    folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
+    with refusing("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
+        folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
     atexit.register(_removed_by, os.getpid(), folder)
     return folder
 

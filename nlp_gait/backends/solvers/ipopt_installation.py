@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 
 from nlp_gait.errors import InputError
+from nlp_gait.files import temporary_folder
 
 # Options of every IPOPT here: it prints nothing, and ignores an ``ipopt.opt`` that happens to lie in the working folder.
 QUIET: Mapping[str, Any] = {
@@ -36,10 +35,11 @@ def linear_solver(wanted: str | None = None) -> str:
 
     Raises:
         InputError: the wanted one does not run here.
+        OutputError: there is no room for the log.
     """
     x = ca.MX.sym("x")
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "ipopt.log"
+    with temporary_folder("nlp-gait-ipopt-") as folder:
+        log = folder / "ipopt.log"
         options: dict[str, Any] = {
             **QUIET,
             "ipopt.output_file": str(log),

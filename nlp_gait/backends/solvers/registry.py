@@ -11,7 +11,7 @@ from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError, check_name, unknown
 from nlp_gait.files import refusing
 
 # A solver joins by a line here.
@@ -38,6 +38,7 @@ def solver(name: str, /, **settings: Any) -> Solver:
 
 def setting_names(name: str) -> tuple[str, ...]:
     """Names of a solver's settings; raises UnknownNameError."""
+    check_name("solver", name)
     if name not in SOLVERS:
         raise unknown("NLP solver", name, SOLVERS)
     return tuple(field.name for field in fields(SOLVERS[name]))  # type: ignore[arg-type]

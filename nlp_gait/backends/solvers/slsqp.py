@@ -72,7 +72,7 @@ class Slsqp(Solver):
                 ],
                 options={"maxiter": self.evaluations, "ftol": TOLERANCE},
             )
-            status, converged, iterations = str(result.message), bool(result.success), int(result.nit)
+            status, converged, iterations = str(result.message), bool(result.success), int(result.get("nit", 0))
         except _Ended as ended:
             status, converged, iterations = str(ended), False, functions.gradients
         time_s = time.perf_counter() - functions.started

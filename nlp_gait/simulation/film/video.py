@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.files import new_file
 
+MOST_FRAMES = 3000
 SUFFIXES = (".gif", ".mp4")
 COLOURS = 128  # of a GIF; fewer lose small marks
 
@@ -33,6 +35,20 @@ def check_video_path(path: Path) -> Path:
                 f"MP4 needs imageio-ffmpeg ({error}); install it with pip install 'nlp-gait[video]', or write a .gif"
             ) from error
     return path
+
+
+def check_frames(played_s: float, frames_per_s: float) -> None:
+    """Refuse a film of so many frames that nobody waits for it.
+
+    Raises:
+        InputError: with what makes it shorter.
+    """
+    count = math.ceil(played_s * frames_per_s)
+    if count > MOST_FRAMES:
+        raise InputError(
+            f"a film takes at most {MOST_FRAMES} frames, got {played_s:g} s at {frames_per_s:g} frames a second = {count}; raise "
+            "--speed or lower --fps"
+        )
 
 
 def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:

@@ -140,7 +140,7 @@ def test_refuses_what_is_not_numbers() -> None:
 
 
 def test_refuses_impossible_settings() -> None:
-    with pytest.raises(InputError, match="threads must be at least 1, got 0"):
+    with pytest.raises(InputError, match="threads must be a whole number >= 1 and <= 1024, got 0"):
         compile_objective(problem_named("nao-ssp"), threads=0)
     with pytest.raises(InputError, match="lanes must be 1, 2, 4 or 8, got 3"):
         compile_objective(problem_named("nao-ssp"), lanes=3)

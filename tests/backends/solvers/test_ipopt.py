@@ -196,7 +196,7 @@ def test_settings_that_ipopt_would_refuse_late_are_refused_early(settings: dict[
 
 def test_wrong_input_is_refused_before_any_work() -> None:
     problem = toy(corner)
-    with pytest.raises(InputError, match="starts must be at least 1, got 0"):
+    with pytest.raises(InputError, match="starts must be a whole number >= 1 and <= 100000, got 0"):
         solve(problem, starts=0)
     with pytest.raises(InputError, match=r"x of toy must have 2 values \(x, y\), got shape \(3,\)"):
         solve(problem, x0=[1.0, 2.0, 3.0])

@@ -18,6 +18,7 @@ SMALL = Effort(
     cases=(2,),
     plan_starts=1,
     jerk_starts=1,
+    hip_starts=1,
     ideal_starts=1,
     runs=2,
     plan_evaluations=200,
@@ -46,7 +47,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
 
 def test_progress_is_told_as_often_as_promised(done: tuple[Path, list[str]]) -> None:
     assert len(done[1]) == len(set(done[1])) == SMALL.steps
-    assert stairs.STEPS == 3 * (20 + 5 + 3 + 1 + 2 * 4 * 3 + 5) + 4 * 9 + 4 + 2
+    assert stairs.STEPS == 3 * (20 + 5 + 6 + 3 + 1 + 2 * 4 * 3 + 5) + 4 * 9 + 4 + 2
 
 
 def test_the_report_holds_every_table_and_figure(done: tuple[Path, list[str]]) -> None:
@@ -58,7 +59,7 @@ def test_the_report_holds_every_table_and_figure(done: tuple[Path, list[str]]) -
     assert all((out / f"{name}.{kind}").stat().st_size > 1000 for name in figures for kind in ("png", "svg"))
     assert (out / "report.html").read_text().count("<svg") == len(figures)
     assert {path.stem for path in out.glob("*.csv")} == {
-        *("table3", "table4", "plans", "tracks", "printed-scheme", "ideal", "replay", "jerk"),
+        *("table3", "table4", "plans", "fixed-hip", "tracks", "printed-scheme", "ideal", "replay", "jerk"),
         *("other-stairs", "network", "learned", "differences"),
     }
     assert all(rows(path) for path in out.glob("*.csv"))
@@ -92,7 +93,7 @@ def test_other_steps_say_what_the_paper_leaves_out(done: tuple[Path, list[str]])
     (learned,) = rows(out / "learned.csv")
     assert float(learned["cost, network"]) == pytest.approx(float(learned["cost, closed form"]), rel=0.1)
     network = {row["rule and rate"]: row for row in rows(out / "network.csv")}
-    assert network["adam"]["poses to 1e-6 m^2"] == "3 of 3"
+    assert network["adam"]["poses to 1e-06 m^2"] == "3 of 3"
     (replay,) = rows(out / "replay.csv")
     assert float(replay["with feedback: error at the end [rad]"]) < float(replay["at the end [rad]"])
 

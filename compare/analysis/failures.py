@@ -1,0 +1,47 @@
+"""Runs that failed before they had a point, by solver, with the reason of the first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from compare.study.record import RunRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """Failed runs of one solver on one problem.
+
+    Attributes:
+        problem: title.
+        solver: title.
+        failed: how many runs have no point.
+        runs: of all.
+        reason: status of the first.
+    """
+
+    problem: str
+    solver: str
+    failed: int
+    runs: int
+    reason: str
+
+    @property
+    def in_words(self) -> str:
+        """One sentence."""
+        return (
+            f"{self.problem}, {self.solver}: {self.failed} of {self.runs} runs have no result; the first {self.reason}"
+        )
+
+
+def failures_of(records: Sequence[RunRecord]) -> list[Failure]:
+    """Solvers with failed runs, in the order of their records."""
+    found = []
+    for problem, solver in dict.fromkeys((record.problem, record.algorithm) for record in records):
+        own = [record for record in records if (record.problem, record.algorithm) == (problem, solver)]
+        failed = [record for record in own if not record.x]
+        if failed:
+            found.append(
+                Failure(problem=problem, solver=solver, failed=len(failed), runs=len(own), reason=failed[0].status)
+            )
+    return found

@@ -1,0 +1,114 @@
+"""Runs that fail in a comparison: said on stderr, with the reason in the table, and status 1 where a solver has no run left."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from metaheuristics import ParticleSwarm
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, _private_folder, _warn_once, cache_folder
+from tests.faults.processes import ROOT
+
+RUN = CliRunner()
+STUDY = (
+    "compare",
+    "walk12",
+    "--algorithms",
+    "pso,ga",
+    "--runs",
+    "2",
+    "--starts",
+    "0",
+    "--evaluations",
+    "100",
+    "--jobs",
+    "1",
+)
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
+    """The first runs of PSO fail."""
+    start, done = ParticleSwarm.start, 0
+
+    def counted(self: ParticleSwarm, *arguments: Any) -> Any:
+        nonlocal done
+        done += 1
+        if done <= calls:
+            raise RuntimeError("no home")
+        return start(self, *arguments)
+
+    monkeypatch.setattr(ParticleSwarm, "start", counted)
+
+
+def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing(monkeypatch, 2)
+    done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
+    assert done.exit_code == 1, done.output
+    first, last = done.stderr.splitlines()
+    assert first == "nlp-gait: walk12, pso: 2 of 2 runs have no result; the first failed: RuntimeError: no home"
+    assert last.startswith("nlp-gait: without any result: pso; mend the reason")
+    printed = " ".join(done.stdout.split())
+    assert "Failed runs" in printed and "pso 2/2 failed: RuntimeError: no home" in printed
+    assert "RuntimeError: no home" in (tmp_path / "report.md").read_text()
+    again = RUN.invoke(app, ["compare", "--resume", "--out", str(tmp_path), "--json"])
+    assert again.exit_code == 1 and json.loads(again.stdout)["problems"]["walk12"]
+
+
+def test_a_solver_with_a_run_left_is_a_comparison_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, 1)
+    done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "walk12, pso: 1 of 2 runs have no result" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_comparison_without_failures_says_nothing(tmp_path: Path) -> None:
+    done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
+    assert (done.exit_code, done.stderr) == (0, "") and "Failed runs" not in done.stdout
+
+
+def test_a_user_without_a_home_compiles_in_a_temporary_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name in (FOLDER_VARIABLE, "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.chdir(tmp_path)
+    _warn_once.cache_clear()
+    folder = cache_folder()
+    assert folder == _private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
+    assert "Could not determine home directory." in caplog.text
+
+
+@pytest.mark.slow
+def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
+    # The user's entry is gone for this process only; reading it fails as it does for a number without one.
+    sitecustomize = tmp_path / "sitecustomize.py"
+    sitecustomize.write_text(
+        "import pwd\ndef missing(*_):\n    raise KeyError('getpwuid(): uid not found')\npwd.getpwuid = missing\n"
+    )
+    kept = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME", FOLDER_VARIABLE)}
+    done = subprocess.run(
+        [sys.executable, "-m", "nlp_gait", *STUDY, "--out", str(tmp_path / "study")],
+        cwd=ROOT,
+        env={**kept, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Failed runs" not in done.stdout and "Traceback" not in done.stderr
+    assert "compiled code is kept for this process only" in done.stderr

@@ -1,0 +1,118 @@
+"""Outputs that are closed, full, of another encoding, or named in bytes that are no text: a result or one sentence."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from compare.cli.command import PLAIN, run_app
+from nlp_gait import load, solve, solver
+from nlp_gait.backends.kernel.compiler import _find, find_compiler
+from tests.faults.processes import ROOT, in_own_mounts
+
+FULL = Path("/dev/full")
+SEARCH = "search walk12 --algorithm pso --runs 1 --evaluations 1000"
+
+
+def shell(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A line of sh in which ``$gait`` is the command line."""
+    return subprocess.run(
+        ["sh", "-c", f'gait="{sys.executable} -P -m nlp_gait"; {script}'],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        errors="surrogateescape",
+        timeout=120,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])
+def test_numbers_are_printed_in_every_encoding(encoding: str) -> None:
+    done = shell(f"$gait {SEARCH}", PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, "") and " 1 000 " in done.stdout
+
+
+def test_what_an_encoding_lacks_is_written_as_its_nearest_ascii(capsys: pytest.CaptureFixture[str]) -> None:
+    run_app(lambda: None)
+    assert "1\u202f000 m\u00b2 \u03bb".encode("ascii", PLAIN) == b"1 000 m2 \\u03bb"
+
+
+@pytest.mark.slow
+def test_a_closed_output_is_refused_before_anything_is_written_into_a_file_in_its_place() -> None:
+    done = shell("$gait list >&-")
+    assert done.returncode == 1 and done.stderr.startswith("nlp-gait: standard output is closed; ")
+    assert done.stderr.count("\n") == 1
+    closed = shell("$gait list nao-ssp 2>&-")
+    assert closed.returncode == 0 and "swing_height_m" in closed.stdout
+    assert shell("$gait list nosuch 2>&-").returncode == 1
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("asked", ["--help", "solve --help", "--version"])
+def test_help_that_cannot_be_written_is_said(asked: str) -> None:
+    done = shell(f"$gait {asked} >/dev/full")
+    assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "compare walk12 --runs 1 --starts 1 --evaluations 100 --out",
+        "solve walk12 --starts 1 --out",
+        "search walk12 --runs 1 --evaluations 100 --out",
+        "sweep walk12 --over foot_lift_m=0.01,0.02 --out",
+        "evaluate walk12 --x 0.1,0.1,0.01,0.01 --signals",
+    ],
+)
+def test_a_name_that_is_no_text_is_refused_before_the_work(arguments: str, tmp_path: Path) -> None:
+    done = shell(f"$gait {arguments} \"$(printf '{tmp_path}/f\\377')\"")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+    assert "its name is no valid UTF-8; choose another name" in done.stderr
+    assert list(tmp_path.iterdir()) == [] and done.stdout == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])
+def test_a_folder_in_place_of_a_result_is_said(path: str) -> None:
+    done = shell(f"$gait animate {path}; $gait export {path} --format csv; $gait simulate {path}")
+    assert done.stderr.count("\n") == 3 and done.stderr.count("cannot be read") == 3, done.stderr
+
+
+@pytest.mark.slow
+def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
+    fill = 'mount -t tmpfs -o size=4k none "$place"; head -c 4096 /dev/zero > "$place/x"; '
+    script = (
+        'mkdir "$2/cache"; mount --bind "$2/cache" /mnt; '
+        f"for place in /tmp /var/tmp /dev/shm; do {fill} done; [ ! -d /usr/tmp ] || {{ place=/usr/tmp; {fill} }}; "
+        "export TMPDIR=/tmp XDG_CACHE_HOME=/mnt PYTHONPATH=$PWD; cd /dev/shm; "
+        '"$1" -P -m nlp_gait solve walk12 --starts 1'
+    )
+    done = in_own_mounts(script, str(tmp_path))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith("nlp-gait: no folder for temporary files: ") and "TMPDIR" in done.stderr
+
+
+@pytest.mark.parametrize("named", ['g++ "', '""', "'", "g++ \\"])
+def test_a_compiler_that_is_no_command_line_is_passed_over(named: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.delenv("CXX", raising=False)
+    usual = find_compiler().command
+    monkeypatch.setenv("CXX", named)
+    assert find_compiler().command == usual
+    _find.cache_clear()
+
+
+def test_slsqp_with_every_variable_fixed_ends_at_that_point() -> None:
+    problem = load("walk12")
+    x = problem.by_name((problem.lower + problem.upper) / 2)
+    found = solve(problem, fix=x, solver=solver("slsqp"))
+    assert dict(found.x) == pytest.approx(x) and found.iterations == 0

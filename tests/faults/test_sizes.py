@@ -1,0 +1,56 @@
+"""Absurd sizes that each part allows but whose product nobody can compute: refused by name, before memory or time is spent."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from compare.questions.sweep.study import MOST_POINTS, parse_axis, sweep
+from compare.study.task import ProblemSpec
+from nlp_gait import load
+from nlp_gait.errors import InputError
+from nlp_gait.export.formats import FORMATS, write_as
+from nlp_gait.problem.registry import LARGEST_COUNT
+from nlp_gait.problem.result import load_result
+from nlp_gait.problem.sampling import LONGEST_S, SHORTEST_S, sampled
+from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
+
+
+def test_a_sweep_is_as_large_as_its_grid() -> None:
+    axes = [parse_axis(f"{name}=0.05:0.13:101") for name in ("step_length_m", "frontal_shift_m")]
+    expected = rf"at most {MOST_POINTS} points in all, got 101 of step_length_m x 101 of frontal_shift_m = 10201"
+    with pytest.raises(InputError, match=expected):
+        sweep(ProblemSpec(name="walk12"), axes)
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-ssp-free", "nao-cycle"])
+def test_a_grid_is_as_large_as_its_samples(name: str) -> None:
+    with pytest.raises(InputError, match=f"at most {LARGEST_COUNT} intervals in all, got intervals "):
+        load(name, intervals=LARGEST_COUNT // 10, samples_per_interval=12)
+    with pytest.raises(InputError, match="samples_per_interval"):
+        load(name, samples_per_interval=LARGEST_COUNT)  # with the intervals that it has by itself
+
+
+@pytest.mark.parametrize("duration_s", [1e8, 1e308, -5.0, 0.0, 1e-300, 1.01 * LONGEST_S])
+def test_a_gait_without_a_duration_is_not_drawn_played_or_exported(duration_s: float, tmp_path: Path) -> None:
+    problem = load("nao-ssp")
+    x = {**problem.by_name((problem.lower + problem.upper) / 2), "single_support_time_s": duration_s}
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps({"problem": "nao-ssp", "x": x}))
+    result = load_result(path)
+    expected = re.escape(f"but it lasts {duration_s:g} s")
+    with pytest.raises(InputError, match=rf"for {SHORTEST_S:g} to {LONGEST_S:g} s .* {expected}"):
+        sampled(result, 0.02)
+    for format_, ending in FORMATS.items():
+        with pytest.raises(InputError, match="time must run forward"):
+            write_as(format_, tmp_path / f"gait{ending}", result, 40)
+    assert [file.name for file in tmp_path.iterdir()] == ["result.json"]
+
+
+def test_a_film_has_no_more_frames_than_somebody_waits_for() -> None:
+    check_frames(60.0, MOST_FRAMES / 60.0)
+    with pytest.raises(InputError, match=f"at most {MOST_FRAMES} frames, got 60 s at 50.1 frames a second = 3006"):
+        check_frames(60.0, 50.1)
