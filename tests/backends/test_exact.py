@@ -33,9 +33,9 @@ def test_a_candidate_outside_the_bounds_violates_them_in_units_of_their_range() 
     assert exact_model(toy(corner)).row_units == ("m", "m", "m")
 
 
-def test_a_two_sided_row_counts_both_ways_and_a_boundless_one_not_at_all() -> None:
+def test_a_two_sided_row_counts_both_ways() -> None:
     def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return x, (row(x, lower=-limit, upper=limit), row(100 * y))
+        return x, (row(x, lower=-limit, upper=limit),)
 
     for x, violation in ((0.7, 2.0), (-0.6, 1.0), (0.2, 0.0)):
         assert evaluate(toy(mathematics), (x, 1.0)).violation == pytest.approx(violation)
