@@ -95,6 +95,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     if stdout.width <= STACKED_WIDTH and len(header) > 2:
         _print_stacked(title, header, rows)
         return
+    header, rows = [harmless(name) for name in header], [[harmless(text) for text in row] for row in rows]
     needs = [_needed(name, [row[i] for row in rows]) for i, name in enumerate(header)]
     groups: list[list[int]] = [[0]]
     room = stdout.width - needs[0] - GAP - 1
@@ -106,8 +107,8 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         groups[-1].append(i)
         left -= needs[i] + GAP
     for k, group in enumerate(groups):
-        heading = title if k == 0 else f"{title}, continued"
-        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
+        stdout.print(title if k == 0 else f"{title}, continued")
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
         for i in group:
             need = min(needs[i], room)
             justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"

@@ -204,7 +204,7 @@ class GaitProblem:
             parameter = self._parameter(name)
             if not is_number(value):
                 raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
-            if abs(value) > LARGEST:
+            if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
                 raise InputError(
