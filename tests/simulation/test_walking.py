@@ -29,6 +29,11 @@ from nlp_gait.simulation.walking import measure_walk  # noqa: E402
 # The least energy per metre, 19.149 J/m, to five digits; hip at lift-off, arms, hip at touch-down, arms, swing, times, step.
 CHEAPEST = (0.0019, 0.02108, 0.31, 0.09951, 0.09805, -0.01255, 0.0, 0.0)
 CHEAPEST += (0.04492, 0.0234, 0.30827, 0.09796, -0.05736, 0.02148, 0.0, 0.0, 0.015, 0.4, 0.56565, 0.07619)
+# Cheapest cycles at two speeds [m/s], in the same order without the step, which follows from speed and times.
+SLOW = (0.006195, 0.029353, 0.31, 0.015317, 0.046576, -0.009914, 0.0, 0.0)
+SLOW += (0.033941, 0.029151, 0.308712, 0.01054, -0.046196, 0.008558, 0.0, 0.0, 0.015, 0.4, 2.0)
+FAST = (-0.001632, 0.017537, 0.31, 0.127409, 0.119005, -0.01045, 0.0, 0.0)
+FAST += (0.046154, 0.020749, 0.308092, 0.108634, -0.063984, 0.024616, 0.0, 0.0, 0.015, 0.4, 0.400378)
 # The cycle's own numbers are continuous to rounding, and so are those of a walk.
 CONTINUITY = 1e-8
 # Samples 1 ms apart and third derivatives of 1e3 rad/s^3: 1e-9 * 1e3 / 12, with a margin.
@@ -96,6 +101,18 @@ def test_ten_steps_are_walked_without_a_fall(cycle: Result) -> None:
     assert 0.0 < found.measurements.slip_m < 0.003
     assert found.model_J_per_m == pytest.approx(19.15, rel=0.01)
     assert found.engine_J_per_planned_m == pytest.approx(found.model_J_per_m, rel=0.02)
+
+
+@pytest.mark.parametrize(("speed_m_s", "x", "planned_J_per_m"), [(0.03, SLOW, 20.75), (0.1, FAST, 19.12)])
+def test_at_any_speed_the_engine_needs_the_planned_energy(
+    speed_m_s: float, x: tuple[float, ...], planned_J_per_m: float
+) -> None:
+    problem = nlp_gait.load("nao-cycle", objective="power").with_values(speed_m_s=speed_m_s)
+    plan = plan_of(Result(problem=problem, x=problem.check_x(x)), 4)
+    found = measure_walk(plan, play(plan), Drive(), 4)
+    assert found.model_J_per_m == pytest.approx(planned_J_per_m, rel=0.001)
+    assert found.engine_J_per_planned_m == pytest.approx(found.model_J_per_m, rel=0.02)
+    assert found.walked_m is not None and found.walked_m > 0.99 * found.planned_m
 
 
 def test_held_set_points_cost_energy_and_way(cycle: Result) -> None:
