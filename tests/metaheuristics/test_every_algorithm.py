@@ -214,20 +214,20 @@ DISC = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [name for name in ALL if name != "random"])  # the floor, which does not converge
 @pytest.mark.parametrize("n", [1, 4])
 def test_sphere_converges(name: str, n: int) -> None:
     assert minimize(sphere(n), ALL[name], evaluations=5000, seed=1).objective < SPHERE[name]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [name for name in ALL if name != "random"])  # the floor, which does not converge
 def test_rosenbrock_converges(name: str) -> None:
     assert minimize(rosenbrock(), ALL[name], evaluations=5000, seed=1).objective < ROSENBROCK[name]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [name for name in ALL if name != "random"])  # the floor, which does not converge
 @pytest.mark.parametrize("handling", [Deb(), EpsilonLevel()], ids=lambda h: h.name)
 def test_constrained_optimum_is_found(name: str, handling: Deb | EpsilonLevel) -> None:
     result = minimize(disc(), ALL[name], evaluations=5000, seed=1, handling=handling)

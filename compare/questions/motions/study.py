@@ -104,7 +104,7 @@ def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int)
         problem,
         starts=task.starts + 1,
         seed=seed,
-        x0=x0,
+        x0=None if x0 is None else np.clip(x0, problem.lower, problem.upper),
         solver=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
     )
     x = problem.check_x(solution.x)

@@ -85,7 +85,8 @@ def test_prices_are_the_fronts_slopes() -> None:
     for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
         beside = competing_objective(name, problem)
         free = beside.freed(problem)
-        below, here, above = (nlp_gait.solve(beside.limited(free, at + k * step), starts=1, x0=X) for k in (-1, 0, 1))
+        limited = [beside.limited(free, at + k * step) for k in (-1, 0, 1)]
+        below, here, above = (nlp_gait.solve(p, starts=1, x0=np.clip(X, p.lower, p.upper)) for p in limited)
         assert below.objective < here.objective < above.objective
         slope = (above.objective - below.objective) / (2 * step)
         assert beside.price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
