@@ -89,12 +89,14 @@ def test_a_folder_in_place_of_a_result_is_said(path: str) -> None:
 
 @pytest.mark.slow
 def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
+    inside = Path(sys.executable).is_relative_to(ROOT)
+    program = Path("/media") / Path(sys.executable).relative_to(ROOT) if inside else sys.executable
     fill = 'mount -t tmpfs -o size=4k none "$place"; head -c 4096 /dev/zero > "$place/x"; '
     script = (
-        'mkdir "$2/cache"; mount --bind "$2/cache" /mnt; '
+        'mkdir "$2/cache"; mount --bind "$2/cache" /mnt; mount --bind "$PWD" /media; '  # which may lie in /tmp
         f"for place in /tmp /var/tmp /dev/shm; do {fill} done; [ ! -d /usr/tmp ] || {{ place=/usr/tmp; {fill} }}; "
-        "export TMPDIR=/tmp XDG_CACHE_HOME=/mnt PYTHONPATH=$PWD; cd /dev/shm; "
-        '"$1" -P -m nlp_gait solve walk12 --starts 1'
+        "export TMPDIR=/tmp XDG_CACHE_HOME=/mnt PYTHONPATH=/media; cd /dev/shm; "
+        f'"{program}" -P -m nlp_gait solve walk12 --starts 1'
     )
     done = in_own_mounts(script, str(tmp_path))
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
