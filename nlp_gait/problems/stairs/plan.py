@@ -64,7 +64,7 @@ VARIABLES = (
 )
 # Start points scatter about a plan that is plausible on common stairs (normal, in units of the ranges): from uniform ones
 # half of all runs of IPOPT end at unreachable poses.
-PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.8, 0.35, 0.2)
+PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.4, 0.35, 0.2)
 SCATTER = 0.1
 # Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
 # square of the intervals in a phase is kept in reserve [m]; a millimetre on the usual grid.
@@ -142,7 +142,6 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         start=_start,
-        hessian="limited-memory",
         grid=Grid(intervals=intervals, refined_by="intervals"),
         motion=motion,
         skeleton=skeleton,
