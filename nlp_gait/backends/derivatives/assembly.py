@@ -14,10 +14,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.plan import ONE, Block, Call, Plan, Row
-from nlp_gait.backends.derivatives.sample import SampleDerivatives, sample_derivatives
-from nlp_gait.backends.derivatives.structure import Stage, Structure, nonzeros
-from nlp_gait.problem import Array
+from nlp_gait.backends.derivatives.plan import ONE, Block, Call, Integers, Plan, Row
+from nlp_gait.backends.derivatives.sample import sample_derivatives
+from nlp_gait.backends.derivatives.structure import Stage, Structure, nonzeros, scalars
 
 VALUES, FIRST, SECOND = range(3)
 
@@ -46,7 +45,7 @@ class NlpPlan:
     weights: int
     gradient: int
     jacobian: ca.Sparsity
-    jacobian_places: Array
+    jacobian_places: Integers
     hessian: ca.Sparsity
     hessian_place: int
 
@@ -61,7 +60,7 @@ class _Glue(NamedTuple):
     """
 
     rows: SX
-    places: Array
+    places: Integers
     entries: list[list[tuple[int, int]]]
 
 
@@ -85,11 +84,11 @@ class _Assembler:
         self.n = n = structure.w.shape[0]
         self.y = ca.vertcat(structure.w, *(stage.outputs for stage in structure.stages))
         self.w, self.p = plan.room(n), plan.room(structure.p.shape[0])
-        # Place of the value and derivative of each y; -1 and none for outputs of samples that are not used.
+        # Place of the value and derivative of each y; -1 and empty for outputs of samples that are not used.
         self.value_places = np.full(self.y.shape[0], -1)
         self.value_places[:n] = self.w + np.arange(n)
-        self.derivatives: list[Row | None] = [Row(np.array([j]), np.array([ONE])) for j in range(n)]
-        self.derivatives += [None] * (self.y.shape[0] - n)
+        self.derivatives = [Row(np.array([j]), np.array([ONE])) for j in range(n)]
+        self.derivatives += [Row(np.zeros(0, int), np.zeros(0, int))] * (self.y.shape[0] - n)
         self.used = self._used()
         self.samples: list[_Samples] = []
 
@@ -137,12 +136,12 @@ class _Assembler:
             hessian_place=hessian.place if hessian else 0,
         )
 
-    def glue(self, rows: SX, places: Array) -> _Glue:
+    def glue(self, rows: SX, places: Integers) -> _Glue:
         """Rows that are evaluated to places, and their derivatives with respect to y."""
         self.evaluate(VALUES, rows, places)
         J = ca.jacobian(rows, self.y)
         number, column = J.sparsity().get_triplet()
-        values = J.nonzeros()
+        values = scalars(J)
         factors = np.empty(len(values), int)
         varying = [k for k, value in enumerate(values) if not value.is_constant()]
         for k, value in enumerate(values):
@@ -155,9 +154,9 @@ class _Assembler:
             entries[i].append((j, factor))
         return _Glue(rows, places, entries)
 
-    def evaluate(self, phase: int, outputs: SX, targets: Array, *more: tuple[SX, Array]) -> None:
+    def evaluate(self, phase: int, outputs: SX, targets: Integers, *more: tuple[SX, Integers]) -> None:
         """Expressions of y, p and more symbols; constants go into the initial values."""
-        listed = outputs.elements() if outputs.shape[0] else []
+        listed = scalars(ca.densify(outputs))
         varying = [k for k, each in enumerate(listed) if not each.is_constant()]
         for k, each in enumerate(listed):
             if each.is_constant():
@@ -167,12 +166,12 @@ class _Assembler:
         places = [self.value_places, self.p + np.arange(p.shape[0]), *(place for _, place in more)]
         self.plan.evaluate(phase, inputs, places, ca.vertcat(SX(0, 1), *(listed[k] for k in varying)), targets[varying])
 
-    def columns(self, entries: list[tuple[int, int]]) -> Array:
+    def columns(self, entries: list[tuple[int, int]]) -> Integers:
         """Variables that a row of glue depends on, ascending."""
         parts = [self.derivatives[j].columns for j, _ in entries]
         return np.unique(np.concatenate(parts)) if parts else np.zeros(0, int)
 
-    def _used(self) -> Array:
+    def _used(self) -> Integers:
         """(y,) whether any glue reads it."""
         rows = ca.vertcat(*(stage.inputs for stage in self.structure.stages), self.structure.rows)
         function = ca.Function("all", [self.y, self.structure.p], [rows])
@@ -216,11 +215,13 @@ class _Samples:
         if len(active) and len(used):
             self._output_rows(assembler)
 
-    def directions(self) -> Array:
+    def directions(self) -> Integers:
         """Of each sample."""
-        return np.array([len(each) for each in self.columns]) if self.by_column else np.full(self.count, len(self.active))
+        return (
+            np.array([len(each) for each in self.columns]) if self.by_column else np.full(self.count, len(self.active))
+        )
 
-    def _input_rows(self, assembler: _Assembler, patterns: list[list[Array]]) -> list[list[Row]]:
+    def _input_rows(self, assembler: _Assembler, patterns: list[list[Integers]]) -> list[list[Row]]:
         """Derivatives of active inputs with respect to the variables."""
         plan, ma = assembler.plan, len(self.active)
         rows: list[list[Row]] = []
@@ -259,7 +260,9 @@ class _Samples:
         if found.directional:
             place = plan.room(count * nv * self.width)
             directions = (
-                Block(self.d, ma * self.width, ma, self.width, 1) if self.by_column else Block(unit(plan, ma), 0, ma, ma, 1)
+                Block(self.d, ma * self.width, ma, self.width, 1)
+                if self.by_column
+                else Block(unit(plan, ma), 0, ma, ma, 1)
             )
             write = Block(place, nv * self.width, nv, self.width, 1)
             plan.call(FIRST, Call(number, count, self.directions(), (self.read, directions), (write,)))
@@ -325,7 +328,7 @@ class _Hessian:
                 numbers = samples.before + o + samples.outputs * np.arange(samples.count)
                 self.bar_places[numbers] = bar + place + nv * np.arange(samples.count)
         marker = len(plan.steps[SECOND])
-        contributions: list[tuple[Array, Array, Row, int, int]] = []
+        contributions: list[tuple[Integers, Integers, Row, int, int]] = []
         self._glue(last, weights + np.arange(last.rows.shape[0]), contributions)
         for samples in reversed(assembler.samples):
             if len(samples.active) and len(samples.used):
@@ -339,14 +342,18 @@ class _Hessian:
             assembler.n, assembler.n, (keys % assembler.n).tolist(), (keys // assembler.n).tolist()
         )
 
-    def _glue(self, glue: _Glue, weights: Array, contributions: list[tuple[Array, Array, Row, int, int]]) -> None:
+    def _glue(
+        self, glue: _Glue, weights: Integers, contributions: list[tuple[Integers, Integers, Row, int, int]]
+    ) -> None:
         """Weights of the samples' outputs that glue reads, and its own second derivatives."""
         assembler, plan = self.assembler, self.plan
         symbols = SX.sym("weights", glue.rows.shape[0])
         for weight, entries in zip(weights.tolist(), glue.entries, strict=True):
             for j, factor in entries:
                 if j >= assembler.n:
-                    plan.add_product(SECOND, Row(np.zeros(1), np.array([weight])), self.bar_places[[j]], factor, ONE)
+                    plan.add_product(
+                        SECOND, Row(np.zeros(1, int), np.array([weight])), self.bar_places[[j]], factor, ONE
+                    )
         curved = [i for i, entries in enumerate(glue.entries) if any(f not in plan.initial for _, f in entries)]
         if not curved:
             return
@@ -361,7 +368,9 @@ class _Hessian:
             for row, other in [rows] if i == j else [rows, rows[::-1]]:
                 _outer(row, other, place, contributions)
 
-    def _samples(self, samples: _Samples, bar: int, contributions: list[tuple[Array, Array, Row, int, int]]) -> None:
+    def _samples(
+        self, samples: _Samples, bar: int, contributions: list[tuple[Integers, Integers, Row, int, int]]
+    ) -> None:
         plan, found, count = self.plan, samples.derivatives, samples.count
         ma, nv = len(samples.active), len(samples.used)
         number = plan.function(found.second)
@@ -408,7 +417,7 @@ class _Hessian:
         self._glue(glue, places[rows], contributions)
 
 
-def _outer(row: Row, other: Row, factor: int, contributions: list[tuple[Array, Array, Row, int, int]]) -> None:
+def _outer(row: Row, other: Row, factor: int, contributions: list[tuple[Integers, Integers, Row, int, int]]) -> None:
     """Products of each entry d of a row with the entries c <= d of another, times a factor."""
     for column, place in zip(row.columns.tolist(), row.places.tolist(), strict=True):
         end = int(np.searchsorted(other.columns, column, side="right"))

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from nlp_gait.backends.derivatives.operations import CODES, instructions
-from nlp_gait.problem import Array
 
+Integers = np.ndarray[Any, np.dtype[np.int64]]
 ONE = 0  # place of the number 1
 RESET, TAPE, RUNS, PRODUCTS, CALL = range(5)
 
@@ -25,8 +25,8 @@ RESET, TAPE, RUNS, PRODUCTS, CALL = range(5)
 class Row(NamedTuple):
     """Derivative of a scalar with respect to the variables: (k,) their numbers, ascending, and places of the values."""
 
-    columns: Array
-    places: Array
+    columns: Integers
+    places: Integers
 
 
 class Block(NamedTuple):
@@ -44,14 +44,14 @@ class Call(NamedTuple):
 
     Attributes:
         function: number of the function.
-        count: samples.
-        directions: of each sample (count,), or None where it takes none.
+        samples: their number.
+        directions: of each sample (samples,), or None where it takes none.
         inputs: in their order; likewise ``outputs``.
     """
 
     function: int
-    count: int
-    directions: Array | None
+    samples: int
+    directions: Integers | None
     inputs: tuple[Block, ...]
     outputs: tuple[Block, ...]
 
@@ -110,7 +110,9 @@ class Plan:
         self.functions.append(function)
         return len(self.functions) - 1
 
-    def evaluate(self, phase: int, inputs: Sequence[SX], places: Sequence[Array], outputs: SX, targets: Array) -> None:
+    def evaluate(
+        self, phase: int, inputs: Sequence[SX], places: Sequence[Integers], outputs: SX, targets: Integers
+    ) -> None:
         """Scalar expressions.
 
         Args:
@@ -149,7 +151,7 @@ class Plan:
             self.tape[k] = operation, target, first, second
         self._step(phase, TAPE, begin, len(self.tape))
 
-    def add(self, phase: int, row: Row, targets: Array, factor: int) -> bool:
+    def add(self, phase: int, row: Row, targets: Integers, factor: int) -> bool:
         """Add factor times a row to targets; True if that is done at run time, False if it went into the initial values."""
         fixed = row.places == ONE
         if factor in self.initial and fixed.all() and self._is_constant(factor):
@@ -161,7 +163,7 @@ class Plan:
         self._step(phase, RUNS, begin, len(self.runs))
         return True
 
-    def add_product(self, phase: int, row: Row, targets: Array, first: int, second: int) -> None:
+    def add_product(self, phase: int, row: Row, targets: Integers, first: int, second: int) -> None:
         """Add the product of two factors with a row to targets."""
         if ONE in (first, second):
             begin = len(self.runs)
@@ -186,12 +188,12 @@ class Plan:
         steps.append((kind, begin, end))
 
 
-def _segments(targets: Array, sources: Array) -> list[tuple[int, int, int]]:
+def _segments(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
     """Longest parts of two lists of places in which both count upwards by one: target, source, length."""
+    if not len(targets):
+        return []
     if len(targets) == 1:
         return [(int(targets[0]), int(sources[0]), 1)]
     ends = np.flatnonzero((np.diff(targets) != 1) | (np.diff(sources) != 1)) + 1
     begins = [0, *ends.tolist()]
-    return [
-        (int(targets[i]), int(sources[i]), j - i) for i, j in zip(begins, [*begins[1:], len(targets)], strict=True)
-    ]
+    return [(int(targets[i]), int(sources[i]), j - i) for i, j in zip(begins, [*begins[1:], len(targets)], strict=True)]

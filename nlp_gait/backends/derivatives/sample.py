@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 from casadi import SX
 
+from nlp_gait.backends.derivatives.plan import Integers
 from nlp_gait.backends.derivatives.structure import nonzeros
-from nlp_gait.problem import Array
 
 # Longest function of which all derivatives are written out, if that is cheaper than one direction after the other.
 LONGEST_WRITTEN_OUT = 2000
@@ -39,7 +38,9 @@ class SampleDerivatives:
     second: ca.Function
 
 
-def sample_derivatives(function: ca.Function, active: Array, used: Array, count: int, directions: int) -> SampleDerivatives:
+def sample_derivatives(
+    function: ca.Function, active: Integers, used: Integers, count: int, directions: int
+) -> SampleDerivatives:
     """Derivatives of a function in the form that is cheapest.
 
     Args:
@@ -70,7 +71,9 @@ def sample_derivatives(function: ca.Function, active: Array, used: Array, count:
             return SampleDerivatives(
                 value=value, jacobian=jacobian, hessian=hessian, directional=False, first=all_first, second=all_second
             )
-    return SampleDerivatives(value=value, jacobian=jacobian, hessian=hessian, directional=True, first=first, second=second)
+    return SampleDerivatives(
+        value=value, jacobian=jacobian, hessian=hessian, directional=True, first=first, second=second
+    )
 
 
 def _shared(outputs: list[SX]) -> list[SX]:

@@ -16,7 +16,7 @@ UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sin
 BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
 
 
-def nlp_source(found: NlpPlan, *, second: bool) -> str:
+def nlp_source(found: NlpPlan) -> str:
     """C++ of an NLP's functions with CasADi's interface; the lane count is the macro LANES."""
     plan = found.plan
     m, n = found.jacobian.shape
@@ -39,7 +39,7 @@ def nlp_source(found: NlpPlan, *, second: bool) -> str:
         "VALUE_STEPS": len(plan.steps[VALUES]),
         "FIRST_STEPS": len(plan.steps[FIRST]),
         "SECOND_STEPS": len(plan.steps[SECOND]),
-        "HAS_SECOND": int(second),
+        "HAS_SECOND": int(bool(plan.steps[SECOND])),
     }
     cases = " ".join(
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
@@ -62,11 +62,11 @@ def nlp_source(found: NlpPlan, *, second: bool) -> str:
             _table("int", "jacobian_place", found.jacobian_places.tolist()),
             _table("long long int", "jacobian_sparsity", _compact(found.jacobian)),
             _table("long long int", "hessian_sparsity", _compact(found.hessian)),
-            _table("int", "tape", plan.tape, 4),
-            _table("int", "runs", plan.runs, 4),
-            _table("int", "products", plan.products, 5),
+            _rows("tape", 4, plan.tape),
+            _rows("runs", 4, plan.runs),
+            _rows("products", 5, plan.products),
             *(
-                _table("int", name, plan.steps[phase], 3)
+                _rows(name, 3, plan.steps[phase])
                 for phase, name in ((VALUES, "value_steps"), (FIRST, "first_steps"), (SECOND, "second_steps"))
             ),
             _calls(found),
@@ -77,11 +77,18 @@ def nlp_source(found: NlpPlan, *, second: bool) -> str:
     )
 
 
-def _table(kind: str, name: str, values: Iterable[object], width: int = 0) -> str:
-    """A constant array, of rows of numbers where a width is given."""
-    if width:
-        text = ",\n".join("{%s}" % ",".join(map(str, row)) for row in values)  # type: ignore[arg-type]
-        return f"static const {kind} {name}[][{width}] = {{{text or '{0}'}}};"
+def _rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
+    """A constant array of rows of integers."""
+    text = ",\n".join(_braces(row) for row in rows)
+    return f"static const int {name}[][{width}] = {{{text or '{0}'}}};"
+
+
+def _braces(row: Iterable[object]) -> str:
+    return f"{{{','.join(map(str, row))}}}"
+
+
+def _table(kind: str, name: str, values: Iterable[object]) -> str:
+    """A constant array."""
     return f"static const {kind} {name}[] = {{{','.join(map(str, values)) or '0'}}};"
 
 
@@ -97,13 +104,13 @@ def _calls(found: NlpPlan) -> str:
     ]
     rows = []
     for i, call in enumerate(found.plan.calls):
-        lines.append(_table("Block", f"blocks_{i}", ["{%d,%d,%d,%d,%d}" % block for block in call.inputs + call.outputs]))
+        lines.append(_table("Block", f"blocks_{i}", [_braces(block) for block in call.inputs + call.outputs]))
         if call.directions is not None:
             lines.append(_table("int", f"directions_{i}", call.directions.tolist()))
         directions = "nullptr" if call.directions is None else f"directions_{i}"
         split, end = len(call.inputs), len(call.inputs + call.outputs)
         rows.append(
-            f"{{function_{call.function},{call.count},{directions},blocks_{i},blocks_{i}+{split},blocks_{i}+{end}}}"
+            f"{{function_{call.function},{call.samples},{directions},blocks_{i},blocks_{i}+{split},blocks_{i}+{end}}}"
         )
     lines.append(f"static const Call calls[] = {{{','.join(rows) or '{}'}}};")
     return "\n".join(lines)

@@ -1,21 +1,22 @@
 """An NLP taken apart: functions of one sample that are mapped, and the cheap expressions between them (the glue).
 
-    y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
+y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem import Array
+from nlp_gait.errors import CompilerError
 
 
-class NotMapped(Exception):
+class NotMapped(CompilerError):
     """A graph that holds what cannot be taken apart; the message says what."""
 
 
@@ -99,6 +100,11 @@ def nonzeros(value: SX) -> SX:
     return found if found.shape[1] == 1 else found.T
 
 
+def scalars(value: SX) -> list[SX]:
+    """Structural nonzeros, one by one."""
+    return cast(list[SX], value.nonzeros())
+
+
 def _scalar(function: ca.Function) -> ca.Function:
     """A function with vectors of the nonzeros of all inputs and of all outputs, of scalar operations."""
     try:
@@ -117,7 +123,7 @@ def _scalar(function: ca.Function) -> ca.Function:
 def _by_sample(matrices: list[SX], count: int) -> SX:
     """Nonzeros of matrices with one block of columns a sample, as one vector with one part a sample."""
     parts = [nonzeros(matrix) for matrix in matrices]
-    order: list[Array] = []
+    order = []
     before = 0
     for part in parts:
         order.append(before + np.arange(part.shape[0]).reshape(count, -1))
