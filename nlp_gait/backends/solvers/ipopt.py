@@ -5,20 +5,15 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import casadi as ca
+import numpy as np
 
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.solvers.derivatives import (
-    WORTHWHILE_SOLVES,
-    compiled_nlp,
-    derivatives_of,
-    one_direction_at_a_time,
-)
+from nlp_gait.backends.solvers.derivatives import CompiledNlp, derivatives_of, worthwhile
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
@@ -95,10 +90,11 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
-        compiled = worthwhile if self.compiled is None else self.compiled
-        chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+        hessian = self.hessian or problem.hessian
+        chosen = replace(self, hessian=hessian, compiled=bool(self.compiled))
         try:
+            if self.compiled is None:
+                chosen = replace(chosen, compiled=worthwhile(problem, solves, second=hessian == "exact"))
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
@@ -120,6 +116,7 @@ class Ipopt(StagedSolver):
 
     name: ClassVar[str] = IpoptSettings.name
     words = STATUS_WORDS
+    _native: CompiledNlp | None
 
     def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
         self.model = model = nlp_model(problem)
@@ -140,13 +137,12 @@ class Ipopt(StagedSolver):
             **({"ipopt.mumps_pivot_order": PIVOT_ORDER} if self.linear_solver.lower() == "mumps" else {}),
         }
         self.compiled = bool(settings.compiled)
-        one_by_one = self.compiled and problem.long_derivatives
-        with one_direction_at_a_time() if one_by_one else nullcontext():
-            nlp, self._of_ipopt = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
+        nlp, self._native = model.nlp, None
         if self.compiled:
-            nlp, ready = compiled_nlp(self._of_ipopt, model.nlp, optimise=one_by_one)
-            options |= ready
-            self._of_ipopt = ca.nlpsol("cold", "ipopt", nlp, options)
+            at = np.append(problem.p, model.widths[0])
+            self._native = CompiledNlp(model.nlp, at, second=settings.hessian == "exact")
+            nlp, options = self._native.nlp, options | self._native.options
+        self._of_ipopt = ca.nlpsol("cold", "ipopt", nlp, options)
         warm_options: dict[str, Any] = {
             **options,
             **derivatives_of(self._of_ipopt),
@@ -162,6 +158,8 @@ class Ipopt(StagedSolver):
         self.create_s = time.perf_counter() - started
 
     def functions(self) -> dict[str, ca.Function]:
-        """Functions of the NLP and their derivatives that IPOPT calls, by CasADi's names, compiled or not."""
+        """Functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""
+        if self._native is not None:
+            return dict(self._native.functions)
         names = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
         return {name: self._of_ipopt.get_function(name) for name in names if self._of_ipopt.has_function(name)}
