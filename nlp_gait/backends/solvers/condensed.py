@@ -259,10 +259,10 @@ class _Buffered:
         self._kept = function, inputs, outputs
         self._buffer, self._trigger = function.buffer()
         for i, array in enumerate(inputs):
-            self._buffer.set_arg(i, memoryview(array.data))  # type: ignore[call-arg]  # the stub knows another form
+            self._buffer.set_arg(i, array.data)  # type: ignore[call-arg]  # the stub knows another form
         for i, output in enumerate(outputs):
             if output is not None:
-                self._buffer.set_res(i, memoryview(output.data))  # type: ignore[call-arg]
+                self._buffer.set_res(i, output.data)  # type: ignore[call-arg]
 
     def __call__(self) -> None:
         self._trigger()
