@@ -1,4 +1,4 @@
-"""kill -9 at random moments in what is kept step by step; studies have their own test, and ``benchmarks/kill_and_resume.py``."""
+"""kill -9 at random moments in what is kept step by step; more: ``python -m benchmarks.faults.kill_and_resume``."""
 
 from __future__ import annotations
 

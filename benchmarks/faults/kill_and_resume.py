@@ -1,6 +1,6 @@
 """A study killed with -9 at random moments and resumed each time must end as an undisturbed one, file by file.
 
-    python benchmarks/kill_and_resume.py [--kills 20] [--seed 0] [--out FOLDER]
+    python -m benchmarks.faults.kill_and_resume [--kills 20] [--seed 0] [--out FOLDER]
 
 Moments are uniform over the study's own duration, so that they fall into starting, running and writing alike. Prints how
 far each session came; exit status 1 if any record differs in anything but its times.
