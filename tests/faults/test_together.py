@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from benchmarks import together
+from benchmarks.faults import together
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import GaitProblem
