@@ -87,6 +87,12 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
+    def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
+        """See ``Solver``."""
+        worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
+        compiled = worthwhile if self.compiled is None else self.compiled
+        return replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
 
@@ -97,9 +103,7 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
-        compiled = worthwhile if self.compiled is None else self.compiled
-        chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+        chosen = self.settled(problem, solves)
         try:
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
