@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
+from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import CompilerError
 from nlp_gait.files import refusing, temporary_folder
 
@@ -84,14 +85,15 @@ def _found(key: str) -> list[Path]:
 def _stored(built: Path, key: str) -> Path:
     """Where a new library was put: the first folder that takes it, under its final name at once."""
     name = f"{key}-{_digest(built)}{SUFFIX}"
-    for make_folder in (cache_folder, _private_folder):
-        folder = make_folder()
+    for place in (cache_folder, _private_folder):
+        folder = place()
         try:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
                 copy = Path(landing) / name
                 shutil.copyfile(built, copy)
                 copy.chmod(0o600)  # whatever the user's mask is
-                os.replace(copy, folder / name)  # never written in place: another library of that name may be in use
+                flush(copy)
+                rename(copy, folder / name)  # never written in place: another library of that name may be in use
             return folder / name
         except OSError as error:
             _warn_once(
@@ -113,7 +115,7 @@ def cache_folder() -> Path:
     try:
         if base.parts[0] == "~":
             base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_folder(base, mode=0o700)
         reason = _distrust(base, stat.S_ISDIR)
     except (OSError, RuntimeError) as error:
         reason = str(error)

@@ -80,6 +80,10 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
+    def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
+        """See ``Solver``; compiled functions are the same ones, and stay open."""
+        return replace(self, hessian=self.hessian or problem.hessian)
+
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
 
@@ -90,11 +94,10 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        hessian = self.hessian or problem.hessian
-        chosen = replace(self, hessian=hessian, compiled=bool(self.compiled))
+        chosen = replace(self.settled(problem, solves), compiled=bool(self.compiled))
         try:
             if self.compiled is None:
-                chosen = replace(chosen, compiled=worthwhile(problem, solves, second=hessian == "exact"))
+                chosen = replace(chosen, compiled=worthwhile(problem, solves, second=chosen.hessian == "exact"))
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
