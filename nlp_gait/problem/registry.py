@@ -25,7 +25,7 @@ PROBLEMS = {
     "nao-dsp": "nlp_gait.problems.nao.double_support:nao_dsp",
     "nao-ssp-free": "nlp_gait.problems.nao.single_support_free:nao_ssp_free",
     "nao-dsp-free": "nlp_gait.problems.nao.double_support_free:nao_dsp_free",
-    "nao-cycle": "nlp_gait.problems.nao.cycle:nao_cycle",
+    "nao-cycle": "nlp_gait.problems.nao.cycle.problem:nao_cycle",
     "walk12": "nlp_gait.problems.walk12.problem:walk12",
     "stairs-plan": "nlp_gait.problems.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.problems.stairs.track:stairs_track",
