@@ -17,6 +17,7 @@ from compare.study.runner import Run, run_task
 from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.disk import rename
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
 
@@ -131,7 +132,7 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
             earlier = read_record(path)
             if key_of(earlier.definition) != key_of(record.definition):
                 with refusing(f"cannot write to {str(path.parent)!r}", OutputError):
-                    path.replace(_keyed(path, earlier.definition))
+                    rename(path, _keyed(path, earlier.definition))
     write_json(path, record.to_json())
     return path
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import fail, progress_bar
+from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import CycleOptions, DriveOptions, Seed
 from compare.cli.questions.answers import Output
@@ -34,11 +34,12 @@ def walk(
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
     The problem is nao-cycle with the power as its objective; each point starts from its neighbours. Played is in open loop unless
-    a feedback is named.
+    a feedback is named. Called again after a kill or Ctrl-C, it continues where it stopped.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
+    from compare.questions.kept import Finished
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLE, optimal_gaits, played
@@ -51,18 +52,20 @@ def walk(
         mujoco()  # if it is missing, say so before the work
     axis = parse_axis(over)
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
+    finished = Finished(output.out, say)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(
-            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
+            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, finished=finished, progress=advance),
+            folder=output.out,
         )
     if steps and not stopped:
         try:
             with progress_bar("walks", len(gaits)) as advance:
                 for i, gait in enumerate(gaits):
-                    gaits[i] = played(spec, gait, steps, drive)
+                    gaits[i] = played(spec, gait, steps, drive, finished)
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
-    output.take(walk_answer(spec, gaits), stopped)
+    output.take(walk_answer(spec, gaits), stopped, finished)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)
