@@ -34,6 +34,11 @@ BYTE_ORDER_MARK = "\ufeff"
 LEFTOVER_AGE_S = 60.0
 
 
+def file_safe(name: str) -> str:
+    """Name of a problem or solver as part of a file's name."""
+    return "".join(sign if sign.isalnum() or sign in "-_+." else "." for sign in name)
+
+
 def read_bytes(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> bytes:

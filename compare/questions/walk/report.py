@@ -18,7 +18,7 @@ from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.problem import GaitProblem, Result, finely_sampled
-from nlp_gait.problem.steps import walk
+from nlp_gait.problem.motion.steps import walk
 from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.walking import Walk
 
@@ -131,7 +131,7 @@ def _error(walked: Walk) -> str:
     """Of the model."""
     if walked.engine_J_per_planned_m is None:
         return "-"
-    return f"{100.0 * (walked.engine_J_per_planned_m / walked.model_J_per_m - 1.0):+.2f} %"
+    return f"{100.0 * (walked.engine_J_per_planned_m / walked.model_J_per_m - 1.0):+z.2f} %"
 
 
 def _way(walked: Walk) -> str:

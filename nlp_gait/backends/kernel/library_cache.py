@@ -32,15 +32,20 @@ SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
 def load_library(
-    source: str, compiler: Compiler, flags: Sequence[str], symbols: Sequence[str]
+    source: str,
+    compiler: Compiler,
+    flags: Sequence[str],
+    symbols: Sequence[str],
+    written: Callable[[], str] | None = None,
 ) -> tuple[ctypes.CDLL, Path]:
     """Library of a C++ source, from the cache if a good one is there, else built now.
 
     Args:
-        source: C++.
+        source: C++; or all that it depends on, where another function writes it.
         compiler: that builds it.
         flags: of the compiler.
         symbols: functions that the library must have.
+        written: that function, which is called only if there is no good library.
 
     Returns:
         The loaded library and its file.
@@ -49,23 +54,32 @@ def load_library(
         CompilerError: the compiler fails, or what it built cannot be loaded.
     """
     key = _key(source, compiler, flags)
-    folders = [cache_folder(), *_private_folder_made()]
-    for library in [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]:
+    for library in _found(key):
         loaded = _load(library, symbols)
         if loaded is not None:
             return loaded, library
     with temporary_folder("nlp-gait-build-", CompilerError) as workshop:
-        written, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
+        file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
         try:
-            written.write_text(source, encoding="utf-8")
+            file.write_text(source if written is None else written(), encoding="utf-8")
         except OSError as error:
             raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
-        compiler.build(written, built, flags)
+        compiler.build(file, built, flags)
         library = _stored(built, key)
     loaded = _load(library, symbols)
     if loaded is None:
         raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
     return loaded, library
+
+
+def is_cached(source: str, compiler: Compiler, flags: Sequence[str]) -> bool:
+    """Whether there is a library of a source, for arguments of ``load_library``."""
+    return bool(_found(_key(source, compiler, flags)))
+
+
+def _found(key: str) -> list[Path]:
+    folders = [cache_folder(), *_private_folder_made()]
+    return [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]
 
 
 def _stored(built: Path, key: str) -> Path:

@@ -16,7 +16,7 @@ from nlp_gait.problems.biped.parts import Margins, rows
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS
-from nlp_gait.problems.nao.cycle_motion import LEAST_STEP, STEP, TIMES
+from nlp_gait.problems.nao.cycle.motion import LEAST_STEP, STEP, TIMES
 from nlp_gait.problems.nao.double_support import Box, double_support_mean_margins, margins_in, support_box
 from nlp_gait.problems.nao.legs import leg_geometry
 from nlp_gait.problems.nao.single_support import single_support_margins, single_support_mean_margins
@@ -99,12 +99,13 @@ class WalkingCycle:
         parts = {name: phase.assemble(_named_for(at, name), samples[name], ops) for name, phase in self.phases.items()}
         times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
-        energy = parts["ssp"].objective * times["ssp"] + parts["dsp"].objective * times["dsp"]
+        energy = sum(parts[name].indexes["power_W"] * times[name] for name in times)
+        goal = sum(parts[name].objective * times[name] for name in times) / period
         own = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
         indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
-            objective=energy / period if self.at_given_speed else energy / step,
+            objective=goal if self.at_given_speed else energy / step,
             constraints=(*own, *_jump_rows(jumps, at), *self._step_rows(at)),
             indexes={
                 "power_W": energy / period,
