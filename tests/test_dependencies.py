@@ -28,6 +28,7 @@ ROOMS = (
     "nlp_gait.export",
     "nlp_gait.gaitbench",
     "metaheuristics",
+    "compare.starting",
     "compare.judge",
     "compare.study",
     "compare.analysis",
@@ -40,7 +41,7 @@ ROOMS = (
     "compare.cli",
 )
 # The front doors of packages: what stands in them is for users, and the command line stands above all.
-DOORS = ("nlp_gait", "nlp_gait.__main__", "compare")
+DOORS = ("nlp_gait", "nlp_gait.__main__", "compare", "compare.__main__")
 FAMILIES = ("nao", "stairs", "walk12")
 MOST_ENTRIES = 16
 
