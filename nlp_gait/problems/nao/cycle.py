@@ -12,28 +12,23 @@ from typing import Literal
 
 import numpy as np
 
-from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, Objective, Variable, maker
+from nlp_gait.problems.biped.curves import grid_for
+from nlp_gait.problems.biped.cycle import WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle_motion import TIMES
+from nlp_gait.problems.biped.double_support import LOAD_DEGREE, Sharing, TorsoShare
+from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.phase import Phase
-from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.curves import grid_for
-from nlp_gait.problems.nao.cycle_motion import (
-    TIMES,
-    cycle_variables,
-    double_support_planner,
-    single_support_planner,
-)
-from nlp_gait.problems.nao.cycle_rows import (
-    WalkingCycle,
-    double_margins,
-    joined,
-    mean_margins,
-    single_margins,
-    start_at_speed,
-)
-from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
-from nlp_gait.problems.nao.motors import Motors
-from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
+from nlp_gait.problems.biped.problem import goal_of
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.cycle_motion import double_support_planner, nao_cycle_variables, single_support_planner
+from nlp_gait.problems.nao.cycle_rows import double_margins, mean_margins, single_margins
+from nlp_gait.problems.nao.double_support import standing
+from nlp_gait.problems.nao.motors import nao_motors
+from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
+from nlp_gait.robots import Robot
+from nlp_gait.robots.mirror import partner
 
 Goal = Literal["energy-per-metre", "power"]
 OBJECTIVES = {
@@ -69,8 +64,8 @@ def nao_cycle(
         load_degree: of the planned wrench over double support.
     """
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    real, at_given_speed = Motors.parsed(motors, nao(robot, rotational_inertia)), objective == "power"
-    sharing = load_sharing(real.model, torso_share, load_degree)
+    real, at_given_speed = nao_motors(motors, nao(robot, rotational_inertia)), objective == "power"
+    sharing = standing(real.model).sharing(torso_share, load_degree)
     cycle = walking_cycle(real, sharing, grid, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
 
@@ -98,12 +93,12 @@ def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_spee
 
     Args:
         motors: of a robot as ``nao`` makes it.
-        sharing: of load in double support, see ``double_support.load_sharing``.
+        sharing: of load in double support, see ``biped.double_support``.
         grid: of each phase.
         at_given_speed: the step length follows from the speed.
     """
     model = motors.model
-    *motion, step = cycle_variables(model)
+    *motion, step = nao_cycle_variables(model)
     variables, means = (*motion, *sharing.variables, step), mean_margins(model)
     double = sharing.planned(double_support_planner(model))
     halves = {
@@ -125,4 +120,18 @@ def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_spee
         )
         for name, (plan, loads, margins, more) in halves.items()
     }
-    return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=at_given_speed)
+    return nao_cycle_of(model, variables, phases, at_given_speed=at_given_speed)
+
+
+def nao_cycle_of(
+    model: Robot, variables: tuple[Variable, ...], phases: Mapping[str, Phase], *, at_given_speed: bool
+) -> WalkingCycle:
+    """A cycle of NAO from both phases; see ``WalkingCycle``."""
+    return WalkingCycle(
+        robot=model,
+        images=tuple(map(partner, JOINTS)),
+        gravity=GRAVITY,
+        variables=variables,
+        phases=phases,
+        at_given_speed=at_given_speed,
+    )

@@ -10,35 +10,22 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
+from nlp_gait.problems.biped.cycle import joined
+from nlp_gait.problems.biped.cycle_motion import STEP, TIMES
+from nlp_gait.problems.biped.double_support import double_support_margins, double_support_mean_margins, support_box
 from nlp_gait.problems.biped.parts import Part
 from nlp_gait.problems.biped.phase import Loader
+from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.cycle import OBJECTIVES
-from nlp_gait.problems.nao.cycle_motion import (
-    STEP,
-    TIMES,
-    cycle_variables,
-    double_support_planner,
-    single_support_planner,
-)
-from nlp_gait.problems.nao.cycle_rows import WalkingCycle, double_margins, joined, mean_margins, single_margins
-from nlp_gait.problems.nao.double_support import (
-    DURATION,
-    double_support_loads,
-    double_support_margins,
-    double_support_mean_margins,
-    support_box,
-)
+from nlp_gait.problems.nao.cycle import OBJECTIVES, nao_cycle_of
+from nlp_gait.problems.nao.cycle_motion import double_support_planner, nao_cycle_variables, single_support_planner
+from nlp_gait.problems.nao.cycle_rows import double_margins, mean_margins, single_margins
+from nlp_gait.problems.nao.double_support import DURATION, standing
 from nlp_gait.problems.nao.legs import hip_variables
 from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.recorded.motion import JointAngles, Motion, motion_of
 from nlp_gait.problems.nao.recorded.phase import HipLimits, RecordedPhase, StandingLimits, SwingLimits, mean_place
-from nlp_gait.problems.nao.single_support import (
-    OWN_VARIABLES,
-    single_support_loads,
-    single_support_margins,
-    single_support_mean_margins,
-)
+from nlp_gait.problems.nao.single_support import OWN_VARIABLES, single_support_loads, single_support_margins
 from nlp_gait.robots import Robot
 
 Gait = Literal["nao-ssp", "nao-dsp", "nao-cycle"]
@@ -160,7 +147,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
             SwingLimits(motion, lift),
         )
     else:
-        duration, loads = DURATION, double_support_loads(model, "printed", upright=())
+        duration, loads = DURATION, standing(model, upright=()).loads("printed")
         right = mean_place(motion)
         box = support_box(model, {"L": motion.support[:2], "R": (float(right[0]), float(right[1]))})
         own = (
@@ -188,7 +175,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
 
 def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem:
     """Problem of a cycle: both phases, and the rows that join them."""
-    known = {variable.name: variable for variable in cycle_variables(model)}
+    known = {variable.name: variable for variable in nao_cycle_variables(model)}
     variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
     means = mean_margins(model)
 
@@ -202,7 +189,7 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         "ssp": (at_ends, SwingLimits(parts["ssp"], OWN_VARIABLES[0])),
         "dsp": (StandingLimits(),),
     }
-    loads = {"ssp": single_support_loads(model, upright=()), "dsp": double_support_loads(model, "lever", upright=())}
+    loads = {"ssp": single_support_loads(model, upright=()), "dsp": standing(model, upright=()).loads("lever")}
     margins = {"ssp": single_margins(model), "dsp": double_margins(model)}
     phases = {
         name: _recorded_phase(
@@ -216,7 +203,7 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         )
         for name, motion in parts.items()
     }
-    cycle = WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=False)
+    cycle = nao_cycle_of(model, variables, phases, at_given_speed=False)
     return GaitProblem(
         name="recorded-cycle",
         title="A recorded gait of NAO, a walking cycle",
