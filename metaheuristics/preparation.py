@@ -113,7 +113,7 @@ def check_limits(
 def check_population(algorithm: Algorithm, name: str = "") -> None:
     """Raise SearchError unless an algorithm has at least one point."""
     population = getattr(algorithm, "population", None)
-    if not _whole(population) or population < 1:
+    if not isinstance(population, Integral) or isinstance(population, bool) or population < 1:
         raise SearchError(
             f"algorithm {name or called(algorithm)!r}: population must be a whole number >= 1, got {shown(population)}"
         )

@@ -143,7 +143,7 @@ def survives(tests: Sequence[str]) -> bool:
         try:
             import pytest
 
-            status = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests]))
+            status = int(pytest.main(["-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]))
         finally:
             os._exit(status)
     end = time.monotonic() + 20 * TIME_LIMIT_S  # of one that waits for ever
