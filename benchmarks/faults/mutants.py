@@ -130,7 +130,7 @@ def mutants(text: str) -> Iterator[tuple[int, str, str]]:
                     _put(node, name, i, child)
 
 
-def survives(tests: Sequence[str]) -> bool:
+def survives(tests: Sequence[str], marks: str) -> bool:
     """Whether the tests pass in a process of its own, in time."""
     child = os.fork()
     if child == 0:
@@ -143,7 +143,7 @@ def survives(tests: Sequence[str]) -> bool:
         try:
             import pytest
 
-            status = int(pytest.main(["-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]))
+            status = int(pytest.main(["-x", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", marks, *tests]))
         finally:
             os._exit(status)
     end = time.monotonic() + 20 * TIME_LIMIT_S  # of one that waits for ever
@@ -157,9 +157,11 @@ def survives(tests: Sequence[str]) -> bool:
     return False
 
 
-def tried(module: str, tests: Sequence[str], sample: int | None, seed: int, wanted: set[str] | None) -> tuple[int, int]:
+def tried(
+    module: str, tests: Sequence[str], marks: str, sample: int | None, seed: int, wanted: set[str] | None
+) -> tuple[int, int]:
     """How many mutants of a file or folder were tried, and how many survived; each of these is printed."""
-    if not survives(tests):
+    if not survives(tests, marks):
         raise SystemExit(f"{module}: the tests fail without any mutant")
     paths = sorted(Path(module).rglob("*.py")) if Path(module).is_dir() else [Path(module)]
     originals = {path: path.read_text(encoding="utf-8") for path in paths}
@@ -171,7 +173,7 @@ def tried(module: str, tests: Sequence[str], sample: int | None, seed: int, want
     survivors = 0
     for path, line, change, text in found:
         path.write_text(text, encoding="utf-8")
-        if survives(tests):
+        if survives(tests, marks):
             survivors += 1
             print(f"{path}:{line}: {change}", flush=True)
         path.write_text(originals[path], encoding="utf-8")
@@ -186,6 +188,7 @@ def main() -> None:
     parser.add_argument("--tests", nargs="+")
     parser.add_argument("--sample", type=int, help="mutants of each module, with the tests that belong to it")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
+    parser.add_argument("--fast", action="store_true", help="without the tests that are marked as slow")
     parser.add_argument("--again", type=Path, help="output of an earlier run: try its survivors only")
     arguments = parser.parse_args()
     if arguments.tests and arguments.modules:
@@ -206,7 +209,8 @@ def main() -> None:
         os.chdir(tree)
         sys.dont_write_bytecode = True
         sys.path[:0] = [str(tree)]
-        counts = [tried(m, tests, arguments.sample, arguments.seed, wanted) for m, tests in chosen.items()]
+        marks = "not slow" if arguments.fast else ""
+        counts = [tried(m, tests, marks, arguments.sample, arguments.seed, wanted) for m, tests in chosen.items()]
     total, survivors = (sum(column) for column in zip(*counts, strict=True))
     print(f"{total} mutants, {total - survivors} killed, {survivors} survived")
     if survivors:
