@@ -50,7 +50,9 @@ def iteration(rounds: int) -> list[Row]:
     ours = CompiledNlp(model.nlp, p).functions
     ways = {"ours": ours, "usually": usually, "optimised": optimised, "interpreted": interpreted}
     callers = {name: _caller(functions, w, p) for name, functions in ways.items()}
-    times = side_by_side(callers, max(rounds, 20), time.thread_time)  # many calls are shorter than a slice of a busy machine
+    times = side_by_side(
+        callers, max(rounds, 20), time.thread_time
+    )  # many calls are shorter than a slice of a busy machine
     micro = {name: float(np.median(values)) * 1e6 for name, values in times.items()}
     return [
         Row(

@@ -5,7 +5,6 @@ functions to search algorithms.
 """
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from nlp_gait.errors import GaitError
@@ -45,6 +44,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """What is imported or read when first used."""
     if name == "__version__":
+        from importlib.metadata import version
+
         return version("nlp-gait")
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
