@@ -42,7 +42,10 @@ CASES: dict[str, tuple[str, ...]] = {
         "{out}",
     ),
     "search": ("search", *WALKS, "--algorithm", "de", "--jobs", "1", "--out", "{out}"),
-    "bench": ("bench", "random", "--instance", "gaitbench-1/walk12-n4-fast", "--runs", "4", "--out", "{out}"),
+    "bench": (
+        *("bench", "--algorithm", "random", "--label", "mine", "--instances", "walk12-w015", "--runs", "4"),
+        *("--jobs", "1", "--out", "{out}"),
+    ),
     "sweep": ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:12", "--starts", "3", "--out", "{out}"),
     "sweep by a search": (
         *("sweep", "walk12", "--over", "foot_lift_m=0.01:0.03:6", "--algorithm", "pso", "--evaluations", "2000"),
@@ -62,12 +65,12 @@ CASES: dict[str, tuple[str, ...]] = {
     ),
     "prices": ("prices", "walk12", "--starts", "2", "--out", "{out}"),
     "solve": ("solve", "walk12", "--starts", "40", "--out", "{out}/best.json"),
-    "evaluate": ("evaluate", "--result", "{gait}", "--signals", "{out}/signals.npz"),
+    "evaluate": ("evaluate", "walk12", "--x", "0.1,0.1,0.2,1", "--signals", "{out}/signals.npz"),
     "export": ("export", "{gait}", "--format", "json", "--out", "{out}/gait.json"),
     "animate": ("animate", "{gait}", "--out", "{out}/gait.gif", "--fps", "10"),
-    "export-objective": ("export-objective", "gaitbench-1/walk12-n4-fast", "--out", "{out}"),
+    "export-objective": ("export-objective", "walk12-w015", "--to", "{out}"),
 }
-TIMES = ("time_s", "cpu_s", "result_sha256", "sessions", "files")
+TIMES = ("time_s", "build_s", "compile_s", "objective_s", "cpu_s", "result_sha256", "sessions", "files")
 
 
 def begin(arguments: list[str]) -> subprocess.Popen[bytes]:
