@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 # A room imports from itself and from rooms before it only.
 ROOMS = (
     "nlp_gait.errors",
+    "nlp_gait.disk",
     "nlp_gait.files",
     "nlp_gait.columns",
     "nlp_gait.decoding",

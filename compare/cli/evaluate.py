@@ -118,7 +118,7 @@ def _print_gait(judged: JudgedGait) -> None:
     print_table(
         "Beside the optimum at the same step and time",
         ("index", "this gait", "optimum"),
-        [(name, f"{value:.6f}", "-" if math.isnan(best) else f"{best:.6f}") for name, value, best in judged.rows()],
+        [(name, f"{value:z.6f}", "-" if math.isnan(best) else f"{best:z.6f}") for name, value, best in judged.rows()],
     )
     _print_violations(judged.evaluation)
     if judged.engine is not None:
@@ -182,7 +182,7 @@ def _print(evaluation: Evaluation) -> None:
     objective = evaluation.objective
     stdout.print(f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}")
     dense = evaluation.dense or {}
-    rows = [(name, f"{value:.6f}", with_unit(dense.get(name), "1")) for name, value in evaluation.indexes.items()]
+    rows = [(name, f"{value:z.6f}", with_unit(dense.get(name), "1")) for name, value in evaluation.indexes.items()]
     grid = f"{evaluation.dense_intervals} intervals" if evaluation.dense else "no dense grid"
     print_table("Indexes", ("index", "own samples", grid), rows)
     _print_violations(evaluation)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import progress_bar
+from compare.cli.common import progress_bar, say
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AsJson, NamedProblem, Seed
 from compare.cli.questions.answers import Output
@@ -48,6 +48,7 @@ def certainty(
             tolerance=tolerance,
             time_limit_s=time_limit,
             seed=seed,
+            anew=say,
             progress=advance,
         )
     output.take(certainty_answer(study))

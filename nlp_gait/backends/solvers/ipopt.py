@@ -14,12 +14,7 @@ import numpy as np
 
 from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import WIDTHS, nlp_model
-from nlp_gait.backends.solvers.derivatives import (
-    WORTHWHILE_SOLVES,
-    compiled_nlp,
-    derivatives_of,
-    one_direction_at_a_time,
-)
+from nlp_gait.backends.solvers.derivatives import CompiledNlp, derivatives_of, worthwhile
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
@@ -87,6 +82,10 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
+    def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
+        """See ``Solver``; compiled functions are the same ones, and stay open."""
+        return replace(self, hessian=self.hessian or problem.hessian)
+
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
 
@@ -97,10 +96,10 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        worthwhile = problem.long_derivatives or solves >= WORTHWHILE_SOLVES
-        compiled = worthwhile if self.compiled is None else self.compiled
-        chosen = replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+        chosen = replace(self.settled(problem, solves), compiled=bool(self.compiled))
         try:
+            if self.compiled is None:
+                chosen = replace(chosen, compiled=worthwhile(problem, solves, second=chosen.hessian == "exact"))
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
@@ -147,13 +146,12 @@ class Ipopt(Solver):
             **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
         }
         self.compiled = bool(settings.compiled)
-        one_by_one = self.compiled and problem.long_derivatives
-        with one_direction_at_a_time() if one_by_one else nullcontext():
-            nlp, self._cold = model.nlp, ca.nlpsol("cold", "ipopt", model.nlp, options)
+        nlp = model.nlp
         if self.compiled:
-            nlp, ready = compiled_nlp(self._cold, model.nlp, optimise=one_by_one)
-            options |= ready
-            self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
+            at = np.append(problem.p, model.widths[0])
+            native = CompiledNlp(model.nlp, at, second=settings.hessian == "exact")
+            nlp, options = native.nlp, options | native.options
+        self._cold = ca.nlpsol("cold", "ipopt", nlp, options)
         warm_options: dict[str, Any] = {
             **options,
             **derivatives_of(self._cold),

@@ -102,12 +102,13 @@ class WalkingCycle:
         parts = {name: phase.assemble(_named_for(at, name), samples[name], ops) for name, phase in self.phases.items()}
         times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
-        energy = parts["ssp"].objective * times["ssp"] + parts["dsp"].objective * times["dsp"]
+        energy = sum(parts[name].indexes["power_W"] * times[name] for name in times)
+        goal = sum(parts[name].objective * times[name] for name in times) / period
         own = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
         indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
-            objective=energy / period if self.at_given_speed else energy / step,
+            objective=goal if self.at_given_speed else energy / step,
             constraints=(*own, *self._jump_rows(jumps, at), *self._step_rows(at)),
             indexes={
                 "power_W": energy / period,

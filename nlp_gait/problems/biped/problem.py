@@ -10,12 +10,12 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Assembly, GaitProblem, Parameter, Point
-from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal
+from nlp_gait.problems.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-Criterion = Literal["power", "jerk", "torque-smoothness"]
+Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
 
 
 def goal_of(criterion: Criterion, motors: Motors, heat: Parameter = HEAT_LOSS) -> Goal:
@@ -27,10 +27,10 @@ def goal_of(criterion: Criterion, motors: Motors, heat: Parameter = HEAT_LOSS) -
     if criterion != "power" and motors.draw is not None:
         raise InputError(
             f"motors={','.join(motors.features)!r} changes the power, but the objective is "
-            f"{SMOOTHNESS[criterion].objective.name}; leave out what changes it"
+            f"{INSTEAD[criterion].objective.name}; leave out what changes it"
         )
     if criterion != "power":
-        return replace(SMOOTHNESS[criterion], heat=heat)
+        return replace(INSTEAD[criterion], heat=heat)
     return Goal(heat=heat) if motors.draw is None else Goal(heat=heat, draw=motors.draw)
 
 

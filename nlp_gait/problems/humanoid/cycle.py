@@ -41,11 +41,8 @@ from nlp_gait.problems.humanoid.single_support import sole_margins
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
 
-Goal = Literal["energy-per-metre", "power"]
-OBJECTIVES = {
-    "energy-per-metre": Objective(name="energy_per_metre", unit="J/m"),
-    "power": Objective(name="power", unit="W"),
-}
+CycleGoal = Literal["energy-per-metre", "power", "torque"]
+ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 SPEED_M_S = 0.03  # NAO's
 
@@ -54,7 +51,7 @@ SPEED_M_S = 0.03  # NAO's
 def humanoid_cycle(
     *,
     robot: str = "nao-v5",
-    objective: Goal = "energy-per-metre",
+    objective: CycleGoal = "energy-per-metre",
     intervals: int = 10,
     torso_share: Share = "lever",
     samples_per_interval: int = 0,
@@ -64,15 +61,17 @@ def humanoid_cycle(
 ) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one; for the options see ``problems.humanoid``.
 
-    ``objective=power`` is that at the speed ``speed_m_s``, a parameter: the step length follows from it.
+    ``objective=power``, and ``torque`` for squared torques, are those at the speed ``speed_m_s``, a parameter: the step length
+    follows from it.
     """
     body = humanoid(robot)
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    real, at_given_speed = humanoid_motors(motors, body), objective == "power"
+    real, at_given_speed = humanoid_motors(motors, body), objective != "energy-per-metre"
     sharing = standing(body, real.model).sharing(torso_share, load_degree)
     *motion, step = _variables(body)
     variables = (*motion, *sharing.variables, step)
     means = _mean_margins(body)
+    goal = goal_of("torque" if objective == "torque" else "power", real, body.heat)
     halves = {
         "ssp": (_single_planner(body), loads_on_left(real.model, GRAVITY, body.upright_feet), _single(body), ()),
         "dsp": (sharing.planned(_double_planner(body)), sharing.loads, _double_margins(body), sharing.parts),
@@ -88,12 +87,12 @@ def humanoid_cycle(
             loads=loads,
             grid=grid,
             parts=(*parts_of(body, margins, means[name], drive_limits=drive_limits), *real.parts, *more),
-            goal=goal_of("power", real, body.heat),
+            goal=goal,
         )
         for name, (plan, loads, margins, more) in halves.items()
     }
     cycle = _cycle(body, real, variables, phases, at_given_speed)
-    return _problem(body, cycle, sharing, OBJECTIVES[objective], at_given_speed)
+    return _problem(body, cycle, sharing, goal.objective if at_given_speed else ENERGY_PER_METRE, at_given_speed)
 
 
 def _cycle(

@@ -8,8 +8,9 @@ import pytest
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.biped.double_support import LOAD_DEGREE
+from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.nao.body import GRAVITY, nao
-from nlp_gait.problems.nao.cycle import walking_cycle
+from nlp_gait.problems.nao.cycle.problem import walking_cycle
 from nlp_gait.problems.nao.double_support import standing
 from nlp_gait.problems.nao.motors import nao_motors
 from nlp_gait.robots import load_robot
@@ -77,7 +78,8 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     real = nao_motors("", nao("nao-v5", rotational_inertia=True))
     sharing = standing(real.model).sharing(problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
     assert problem.grid is not None
-    cycle = walking_cycle(real, sharing, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    at_given_speed = problem.options["objective"] == "power"
+    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=at_given_speed)
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

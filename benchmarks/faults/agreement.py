@@ -1,6 +1,6 @@
 """How far compiled and interpreted values are apart: every searchable problem, every lane count that this CPU has.
 
-    python benchmarks/agreement.py [--candidates 4000] [--problems nao-ssp,walk12]
+    python -m benchmarks.faults.agreement [--candidates 4000] [--problems nao-ssp,walk12]
 
 Half of the candidates lie within the bounds, half up to a range's width outside. Differences of the objective are relative;
 those of the violation are absolute, in units of the rows' scales, or relative if it is above 1.

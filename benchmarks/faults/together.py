@@ -1,6 +1,6 @@
 """Solves in threads and in forked processes against the same solves one after the other: not a bit may differ.
 
-    python benchmarks/together.py [--problem nao-ssp] [--threads 8] [--processes 4] [--solves 50]
+    python -m benchmarks.faults.together [--problem nao-ssp] [--threads 8] [--processes 4] [--solves 50]
 
 Each thread and each process does all solves, each from another start point; the threads share one problem, and the forked
 processes have it from their parent, which has compiled and solved before.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from nlp_gait.problem.assembly import NumericPoint
-from nlp_gait.problem.signals import Columns, Signals, in_space
+from nlp_gait.problem.motion.signals import Columns, Signals, in_space
 from nlp_gait.robots import Robot
 
 # Beside q, qd and tau of the robot's joints: what the engine is given of a motion; the floor, or its lowest part, is at z = 0.

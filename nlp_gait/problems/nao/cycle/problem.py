@@ -17,12 +17,13 @@ from nlp_gait.problems.biped.curves import grid_for
 from nlp_gait.problems.biped.cycle import WalkingCycle, joined, start_at_speed
 from nlp_gait.problems.biped.cycle_motion import TIMES
 from nlp_gait.problems.biped.double_support import LOAD_DEGREE, Sharing, TorsoShare
+from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import goal_of
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.cycle_motion import double_support_planner, nao_cycle_variables, single_support_planner
-from nlp_gait.problems.nao.cycle_rows import double_margins, mean_margins, single_margins
+from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
+from nlp_gait.problems.nao.cycle.rows import double_margins, mean_margins, single_margins
 from nlp_gait.problems.nao.double_support import standing
 from nlp_gait.problems.nao.motors import nao_motors
 from nlp_gait.problems.nao.problem import paper_parts, with_robot
@@ -30,18 +31,15 @@ from nlp_gait.problems.nao.single_support import single_support_loads
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import partner
 
-Goal = Literal["energy-per-metre", "power"]
-OBJECTIVES = {
-    "energy-per-metre": Objective(name="energy_per_metre", unit="J/m"),
-    "power": Objective(name="power", unit="W"),
-}
+CycleGoal = Literal["energy-per-metre", "power", "torque"]
+ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 
 
 @maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
 def nao_cycle(
     *,
     robot: str = "nao-v5",
-    objective: Goal = "energy-per-metre",
+    objective: CycleGoal = "energy-per-metre",
     intervals: int = 10,
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "lever",
@@ -53,8 +51,9 @@ def nao_cycle(
 
     Args:
         robot: name or file.
-        objective: ``"energy-per-metre"`` leaves the speed free; ``"power"`` is that at the speed ``speed_m_s``, a parameter: the
-            step length is then no variable but speed times the time of the cycle.
+        objective: ``"energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
+            torques, are those at the speed ``speed_m_s``, a parameter: the step length is then no variable but speed times the
+            time of the cycle.
         intervals: of each phase.
         rotational_inertia: False takes every link as a point mass.
         torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
@@ -64,9 +63,11 @@ def nao_cycle(
         load_degree: of the planned wrench over double support.
     """
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    real, at_given_speed = nao_motors(motors, nao(robot, rotational_inertia)), objective == "power"
+    real, at_given_speed = nao_motors(motors, nao(robot, rotational_inertia)), objective != "energy-per-metre"
     sharing = standing(real.model).sharing(torso_share, load_degree)
-    cycle = walking_cycle(real, sharing, grid, at_given_speed=at_given_speed)
+    goal = goal_of("torque" if objective == "torque" else "power", real)
+    cycle = walking_cycle(real, sharing, grid, goal, at_given_speed=at_given_speed)
+    least = goal.objective if at_given_speed else ENERGY_PER_METRE
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -74,10 +75,10 @@ def nao_cycle(
 
     problem = GaitProblem(
         name="nao-cycle",
-        title=f"NAO, walking cycle: least {OBJECTIVES[objective].name.replace('_', ' ')}",
+        title=f"NAO, walking cycle: least {least.name.replace('_', ' ')}",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=OBJECTIVES[objective],
+        objective=least,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),
@@ -88,13 +89,14 @@ def nao_cycle(
     return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
 
-def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_speed: bool) -> WalkingCycle:
+def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:
     """Both phases of the cycle.
 
     Args:
         motors: of a robot as ``nao`` makes it.
         sharing: of load in double support, see ``biped.double_support``.
         grid: of each phase.
+        goal: of each phase; the cycle's is their mean over time, or energy per metre.
         at_given_speed: the step length follows from the speed.
     """
     model = motors.model
@@ -116,7 +118,7 @@ def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, *, at_given_spee
             loads=loads,
             grid=grid,
             parts=(*paper_parts(model, margins, means[name]), *motors.parts, *more),
-            goal=goal_of("power", motors),
+            goal=goal,
         )
         for name, (plan, loads, margins, more) in halves.items()
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem.motion.signals import Array
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 

@@ -1,6 +1,6 @@
 """Fuzz every file reader and the command line, and print a table of how the inputs ended.
 
-    python -m benchmarks.fuzz [--inputs 10000] [--lines 10000] [--seed 0] [--only NAME] [--out FOLDER]
+    python -m benchmarks.faults.fuzz [--inputs 10000] [--lines 10000] [--seed 0] [--only NAME] [--out FOLDER]
 
 An input is accepted for what it says, refused in one sentence, or a defect: a traceback, a hang, or an answer to something that
 it does not say. Defects are written to the folder, each with what is wrong; exit status 1 if there is one. Put what is found

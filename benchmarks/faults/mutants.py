@@ -1,6 +1,6 @@
 """Mutation testing: small errors put into the code one at a time; a test that stands for that code must find each.
 
-    python benchmarks/mutants.py compare/analysis/statistics --tests tests/compare/analysis
+    python -m benchmarks.faults.mutants compare/analysis/statistics --tests tests/compare/analysis
 
 Works in a copy of the tree. Prints every survivor with its line; exit status 1 if there is one. Some survivors are equivalent
 to the original, which only a reader can tell.
@@ -20,7 +20,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 TIME_LIMIT_S = 60.0
 OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,),
