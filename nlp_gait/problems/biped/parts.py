@@ -123,11 +123,11 @@ class Closure(Part):
         self._legs = tuple(legs)
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with an upper bound, under the exact interpretation alone."""
-        if not ops.exact:
-            return Contribution()
-        names = labels(self._legs, range(samples.steps + 1))
-        return Contribution(rows=(rows("closure", "m", ca.vec(samples.miss), upper=MX(CLOSURE_M), labels=names),))
+        """Rows with an upper bound; a solver, which must have the same rows in the same places, sees them far below it."""
+        columns = samples.steps + 1
+        miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(self._legs) * columns)
+        names = labels(self._legs, range(columns))
+        return Contribution(rows=(rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names),))
 
 
 class DriveLimits(Part):

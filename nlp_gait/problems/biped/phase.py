@@ -170,14 +170,12 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._kinematics(Exact(), {}), at)
+        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._exact_kinematics, at)
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
         torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
         wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
-        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
-        held = np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
         rows = [self.joints.index(name) for name in self.moving]
 
         def full(moved: Any, others: Array) -> Array:
@@ -191,7 +189,7 @@ class Phase:
         halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
             "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            "q": full(q, held),
+            "q": full(q, self._held),
             "qd": full(qd, still_rates),
             "qdd": full(qdd, still_rates),
             "tau": _numbers(torque),
@@ -212,6 +210,16 @@ class Phase:
         """Joints whose angle changes over the phase."""
         joints = self._symbolic_plan(Exact())[1].joints
         return tuple(name for name in self.joints if not joints[name].velocity.is_zero())
+
+    @cached_property
+    def _held(self) -> Array:
+        """(J,) angles of the joints that stand still, zero for the others [rad]."""
+        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
+        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
+
+    @cached_property
+    def _exact_kinematics(self) -> ca.Function:
+        return self._kinematics(Exact(), {})
 
     @property
     def names(self) -> tuple[str, ...]:
