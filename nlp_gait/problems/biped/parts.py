@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem import Constraint, InstantPoint, Parameter, Point
+from nlp_gait.problem import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.problem.assembly import parameters as table
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.samples import Samples, Trace
@@ -57,11 +57,17 @@ class Part(ABC):
 
 
 def rows(
-    name: str, unit: str, value: MX, lower: MX | None = None, upper: MX | None = None, labels: Sequence[str] = ()
+    name: str,
+    unit: str,
+    value: MX,
+    lower: MX | None = None,
+    upper: MX | None = None,
+    labels: Sequence[str] = (),
+    over: Over | None = None,
 ) -> Constraint:
     """Rows of a part, in which a violation counts as every other in its unit."""
     return Constraint(
-        name=name, labels=tuple(labels), unit=unit, scale=SCALES[unit], value=value, lower=lower, upper=upper
+        name=name, labels=tuple(labels), unit=unit, scale=SCALES[unit], value=value, lower=lower, upper=upper, over=over
     )
 
 
@@ -87,7 +93,7 @@ class JointLimits(Part):
         limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
         names = labels(self._planned, range(n))
-        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names),))
+        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, "instant"),))
 
 
 class Reach(Part):
@@ -101,7 +107,7 @@ class Reach(Part):
         """Two-sided rows."""
         limit = 1 - at[REACH_MARGIN]
         names = labels(("left leg", "right leg"), range(samples.steps + 1))
-        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names),))
+        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, "instant"),))
 
 
 class TorqueChange(Part):
@@ -118,7 +124,7 @@ class TorqueChange(Part):
         limit = at["torque_change_limit_Nm"]
         names = labels(samples.joints, range(change.shape[1]))
         return Contribution(
-            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names),),
+            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval"),),
             indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
         )
 
@@ -148,10 +154,13 @@ class BalanceMargins(Part):
         means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
         each = [
-            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names)
+            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
             for axis, margin in margins.items()
         ]
-        mean = [rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"]) for axis, value in means.items()]
+        mean = [
+            rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
+            for axis, value in means.items()
+        ]
         return Contribution(
             rows=(*each, *mean),
             indexes={
@@ -188,7 +197,7 @@ def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> 
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
     )
-    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)))
+    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), "instant")
 
 
 class FootClearance(Part):
@@ -207,7 +216,7 @@ class FootClearance(Part):
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows with a lower bound, and the equation of the middle."""
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
-        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)])
+        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         halfway = self._halfway(at)
         return Contribution(rows=(above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])))
 
@@ -232,6 +241,6 @@ def halfway_rows(
         corners: names of the points.
     """
     return (
-        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0)),
-        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners),
+        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
+        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),
     )

@@ -79,6 +79,7 @@ def phase_problem(
         motion=phase.signals,
         start=start,
         durations=(phase.duration,),
+        stretches=phase.stretch(),
         searchable=searchable,
         long_derivatives=long_derivatives,
     )
