@@ -1,0 +1,136 @@
+"""A proven bound as a file, and its check: random paths from all of the box to where a piece of it is dropped, followed again."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from compare.questions.certainty import boxes, branch_and_bound
+from compare.questions.certainty.boxes import BoxBounds, halves
+from compare.questions.certainty.branch_and_bound import Certificate, target_of, whole
+from compare.study.definition import problem_part, sha256_of
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.kernel import affine
+from nlp_gait.decoding import decoded
+from nlp_gait.errors import InputError
+from nlp_gait.files import read_json, refusing
+from nlp_gait.problem import GaitProblem, load
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+
+SCHEMA = 1
+PATHS = 200
+DEEPEST_PATH = 150
+# Of an objective that is computed again on another machine, relative.
+SAME_VALUE = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertificateFile:
+    """A certificate with what it is of.
+
+    Attributes:
+        schema: of the file.
+        problem: name, options, parameters, and the hash of its mathematics.
+        code_sha256: of the code that bounds and halves.
+        certificate: itself.
+    """
+
+    schema: Literal[1] = 1
+    problem: Mapping[str, Any]
+    code_sha256: str
+    certificate: Certificate
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What following random paths found.
+
+    Attributes:
+        paths: followed to a piece that is dropped.
+        deepest: halvings on the longest.
+        boxes: estimate of the boxes in the whole tree from these paths (Knuth 1975).
+        same_code: the file was made by this code; with another one, the paths are proofs of today's.
+    """
+
+    paths: int
+    deepest: int
+    boxes: float
+    same_code: bool
+
+
+def certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:
+    """The certificate of a problem, for a file."""
+    return CertificateFile(problem=problem_part(problem), code_sha256=_code(), certificate=certificate)
+
+
+def read_certificate(path: Path) -> CertificateFile:
+    """Raises InputError where the file is no certificate."""
+    raw = read_json(path, "certificate")
+    with refusing(f"certificate {str(path)!r} is damaged", InputError):
+        return decoded(CertificateFile, raw)
+
+
+def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
+    """Follow random paths again, each half of a box as likely as the other.
+
+    Args:
+        file: of a closed proof.
+        paths: to follow.
+        seed: of the choice.
+
+    Raises:
+        InputError: the proof is not closed, the problem is another one today, the incumbent is not feasible or has another
+            objective, or a path does not end.
+    """
+    proof = file.certificate
+    problem = _problem(file.problem)
+    at = exact_model(problem).at(np.array(proof.x), problem.p)
+    objective = problem.objective.sign * at.cost
+    if not proof.closed:
+        raise InputError("the certificate is of a proof that has not ended: there is nothing to check but its bound")
+    if not at.violation <= FEASIBILITY_TOLERANCE:
+        raise InputError(f"the certificate's incumbent is infeasible: total violation {at.violation:.3g}")
+    if not abs(objective - proof.objective) <= SAME_VALUE * abs(objective):
+        raise InputError(f"the certificate's objective is {proof.objective}, but its incumbent has {objective}")
+    target = target_of(at.cost, proof.tolerance)
+    if not problem.objective.sign * proof.bound <= target + SAME_VALUE * abs(target):
+        raise InputError(f"the certificate's bound {proof.bound} says more than its tolerance {proof.tolerance}")
+    bounds, rng = BoxBounds(problem), np.random.default_rng(seed)
+    open_, sizes = np.repeat(whole(problem), paths, axis=0), np.zeros(paths)
+    path = np.arange(paths)
+    for depth in range(DEEPEST_PATH):
+        sizes[path] += 2.0**depth
+        found = bounds.assess(open_, target)
+        path = path[found.origin]
+        if not len(path):
+            return Check(paths=paths, deepest=depth, boxes=float(sizes.mean()), same_code=file.code_sha256 == _code())
+        both = halves(found.boxes, found.cut)
+        side = rng.integers(0, 2, len(path))
+        open_ = both[np.arange(len(path)) + side * len(path)]
+    raise InputError(f"{len(path)} of {paths} paths do not end after {DEEPEST_PATH} halvings: the bound is not proven")
+
+
+def _problem(description: Mapping[str, Any]) -> GaitProblem:
+    with refusing("the certificate's problem cannot be made", InputError):
+        problem = load(description["name"], **description["options"]).with_values(**description["parameters"])
+    if problem_part(problem) != dict(description):
+        raise InputError(f"problem {problem.name!r} is another one today than in the certificate; prove it anew")
+    return problem
+
+
+def _code() -> str:
+    """Hash of all that decides what happens to a box."""
+    native = files("nlp_gait.backends.kernel") / "native"
+    texts = [inspect.getsource(module) for module in (affine, boxes, branch_and_bound)]
+    texts += [(native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp")]
+    return sha256_of(texts)
