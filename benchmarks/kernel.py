@@ -11,12 +11,12 @@ from casadi import MX, SX, Function, vertcat, vertsplit
 
 import nlp_gait
 from benchmarks.by_hand import ARM_SWING, ByHand, pinocchio_model
+from benchmarks.casadi_code import compiled_functions
 from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
-from nlp_gait.backends.solvers.derivatives import compiled_functions
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
 from nlp_gait.robots import Robot
@@ -44,7 +44,7 @@ def paths(rounds: int) -> list[Row]:
     few = X[: BATCH // share]
     columns, parameters = few.T.copy(), np.repeat(problem.p[:, None], len(few), axis=1)
     interpreted = machine.map(len(few))
-    (generated,) = compiled_functions([machine], optimise=True)
+    (generated,) = compiled_functions([machine])
     compiled = generated.map(len(few))
     times = side_by_side(
         {

@@ -145,14 +145,23 @@ def checked_points(asked: object, lower: Array, upper: Array) -> Array:
         raise SearchError(f"ask must return points (P, {len(lower)}); it returned no numbers: {error}") from error
     if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
         raise SearchError(f"ask must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}")
-    outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
-    if outside.any():
-        row, column = np.argwhere(outside)[0].tolist()
+    outside = _first_outside(points, lower, upper)
+    if outside is not None:
+        row, column = outside
         raise SearchError(
             f"ask returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
             f"{lower[column]}..{upper[column]}: clip the points"
         )
     return points
+
+
+def _first_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] | None:
+    """Row and column of the first value of points (P, n) that lies outside the bounds (n,); None if none does."""
+    outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
+    if not outside.any():
+        return None
+    row, column = np.argwhere(outside)[0].tolist()
+    return row, column
 
 
 def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
@@ -210,9 +219,9 @@ def starting_points(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "
                 f"algorithm; got {rows.shape}"
             )
-        outside = ~((rows >= lower) & (rows <= upper))  # NaN is outside too
-        if outside.any():
-            row, column = np.argwhere(outside)[0].tolist()
+        outside = _first_outside(rows, lower, upper)
+        if outside is not None:
+            row, column = outside
             raise SearchError(
                 f"initial row {row}, variable {column}: {rows[row, column]} is outside the bounds "
                 f"{lower[column]}..{upper[column]}; clip the points or widen the bounds"

@@ -1,8 +1,8 @@
 """Files of data: read strictly, written whole or not at all.
 
 Only regular files of valid UTF-8 are read. JSON must not repeat a key, nor hold a number that is beyond 64 bits or not finite,
-nor text that cannot be written again. A file is written under another name and renamed in one step: a link of its name is
-replaced, never followed.
+nor text that cannot be written again. A file is written under another name, flushed to the disk, and renamed in one step: a
+link of its name is replaced, never followed. Then its folder is flushed: what is written is still there after a power cut.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 
 LARGEST_FILE = 64 * 2**20  # bytes; a study's record has some 10 kB, a result with thousands of variables some MB
@@ -31,6 +32,11 @@ SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
 # Writing one file takes far less; an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
+
+
+def file_safe(name: str) -> str:
+    """Name of a problem or solver as part of a file's name."""
+    return "".join(sign if sign.isalnum() or sign in "-_+." else "." for sign in name)
 
 
 def read_bytes(
@@ -133,6 +139,8 @@ def write_json(path: Path, data: Any) -> None:
 def new_file(path: Path) -> Iterator[Path]:
     """Empty file beside ``path``, made by this process under a hidden name in ``.tmp``, that takes its name at the end.
 
+    After that, a power cut leaves the new file whole, and before it, the older one or none.
+
     Raises:
         OutputError: no room, no permission, no folder.
     """
@@ -146,7 +154,8 @@ def new_file(path: Path) -> Iterator[Path]:
             os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             temporary = unused
             yield temporary
-            temporary.replace(path)
+            flush(temporary)
+            rename(temporary, path)
     finally:
         if temporary is not None:
             with contextlib.suppress(OSError):
@@ -234,7 +243,7 @@ def writable_folder(path: Path) -> Path:
     """
     check_name(path)
     with refusing(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         tempfile.TemporaryFile(dir=path).close()
     return path
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from compare.study.workers import default_jobs
 from nlp_gait.problem import GaitProblem, registry
 from nlp_gait.robots.loading import is_robot_file
 
@@ -21,6 +22,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
 SLOW_FOLDERS = tuple(Path(__file__).parent / "compare" / name for name in ("cli", "papers", "questions"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Processors that this process may use; where it may not use all, the operating system's count is too large."""
+    return default_jobs()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

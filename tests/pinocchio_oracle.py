@@ -65,6 +65,32 @@ def floating_model(robot: Robot, share: float = 1.0, prefix: str = "") -> pin.Mo
     return model
 
 
+def move_base(model: pin.Model, data: pin.Data, foot: int, place: Array, motion: tuple[Array, Array, Array]) -> Array:
+    """Pose, velocity and acceleration of the base, written into a motion (q, v, a), from a foot that stands still.
+
+    Args:
+        model: with a free-flyer.
+        data: of the model; holds the kinematics of the whole motion afterwards.
+        foot: index of the joint above the foot, which has the world's axes.
+        place: (3,) of that joint [m].
+        motion: its joints' entries are given.
+
+    Returns:
+        (6, nv) the foot's Jacobian.
+    """
+    q, v, a = motion
+    pin.forwardKinematics(model, data, q)
+    base = pin.SE3(np.eye(3), place) * data.oMi[foot].inverse()
+    q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+    pin.computeJointJacobians(model, data, q)
+    jacobian: Array = pin.getJointJacobian(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
+    v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
+    pin.forwardKinematics(model, data, q, v, a)
+    drift = pin.getAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED).vector
+    a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+    return jacobian
+
+
 def stand(
     model: pin.Model,
     ankle_joint: str,
@@ -84,18 +110,7 @@ def stand(
         q0[joint.idx_q] = q.get(name, 0.0)
         v0[joint.idx_v] = qd.get(name, 0.0)
         a0[joint.idx_v] = qdd.get(name, 0.0)
-    foot = model.getJointId(ankle_joint)
-
-    # Base pose, velocity and acceleration from the foot that stands still.
-    pin.forwardKinematics(model, data, q0)
-    base = pin.SE3(np.eye(3), ankle) * data.oMi[foot].inverse()
-    q0[:3], q0[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
-    pin.computeJointJacobians(model, data, q0)
-    jacobian = pin.getJointJacobian(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
-    v0[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v0[6:])
-    pin.forwardKinematics(model, data, q0, v0, a0)
-    drift = pin.getAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED).vector
-    a0[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+    jacobian = move_base(model, data, model.getJointId(ankle_joint), ankle, (q0, v0, a0))
 
     # The six base rows give the wrench on the foot; its share of the joint rows is the rest.
     generalised = pin.rnea(model, data, q0, v0, a0)
@@ -111,7 +126,7 @@ def stand(
         zmp=np.array([-moment[1], moment[0]]) / force[2],
         ground_load=float(force[2]),
         com=np.array(com),
-        torso=np.array(base.translation),
+        torso=np.array(q0[:3]),
     )
 
 
@@ -130,16 +145,8 @@ def left_over(robot: Robot, signals: Signals, sample: int, gravity: float, stanc
         entry = model.joints[model.getJointId(joint)]
         q[entry.idx_q], v[entry.idx_v], a[entry.idx_v], tau[entry.idx_v] = values
     stands, foot = model.getJointId(f"{stance}AnkleRoll"), {"L": "left", "R": "right"}[stance]
-    pin.forwardKinematics(model, data, q)
     height = np.array([0.0, 0.0, robot.feet[foot].ankle_height_m])
-    base = pin.SE3(np.eye(3), signals.arrays[f"{foot}_foot"][sample] + height) * data.oMi[stands].inverse()
-    q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
-    pin.computeJointJacobians(model, data, q)
-    jacobian = pin.getJointJacobian(model, data, stands, pin.LOCAL_WORLD_ALIGNED)
-    v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
-    pin.forwardKinematics(model, data, q, v, a)
-    drift = pin.getAcceleration(model, data, stands, pin.LOCAL_WORLD_ALIGNED).vector
-    a[:6] = -np.linalg.solve(jacobian[:, :6], drift)
+    move_base(model, data, stands, signals.arrays[f"{foot}_foot"][sample] + height, (q, v, a))
     forces = pin.StdVec_Force()
     for _ in range(model.njoints):
         forces.append(pin.Force.Zero())

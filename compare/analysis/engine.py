@@ -113,7 +113,7 @@ def engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
             played.algorithm,
             with_unit(played.model, played.unit, DIGITS),
             with_unit(played.engine, played.unit, DIGITS),
-            "-" if played.engine is None else f"{100.0 * (played.engine / played.model - 1.0):+.2f} %",
+            "-" if played.engine is None else f"{100.0 * (played.engine / played.model - 1.0):+z.2f} %",
             _rank(model, i),
             "-" if played.engine is None else _rank(engine, i),
             _fate(played),

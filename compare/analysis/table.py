@@ -133,7 +133,7 @@ def percent(share: float | None) -> str:
         return "-"
     if abs(share) < ROUNDING:
         return "0.0000 %"
-    return f"{100 * share:.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
+    return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
 def count(number: float) -> str:

@@ -5,16 +5,24 @@ from __future__ import annotations
 import math
 
 
+def number(value: float, digits: str) -> str:
+    """A number in a format; what is rounded to zero has no sign."""
+    if isinstance(value, int):
+        return format(value, digits)
+    sign = digits[0] if digits[:1] in ("+", "-", " ") else ""
+    return f"{value:{sign}z{digits.removeprefix(sign)}}"
+
+
 def with_unit(value: float | None, unit: str, digits: str = ".6f") -> str:
     """For example ``0.845868 W``; a dash for None."""
     if value is None:
         return "-"
-    return f"{value:{digits}}" + ("" if unit == "1" else f" {unit}")
+    return number(value, digits) + ("" if unit == "1" else f" {unit}")
 
 
 def seconds(value: float, digits: str = ".3f") -> str:
     """For example ``0.013 s``; a dash for NaN, a time that nobody knows."""
-    return "-" if math.isnan(value) else f"{value:{digits}} s"
+    return "-" if math.isnan(value) else f"{number(value, digits)} s"
 
 
 def heading(words: str, unit: str) -> str:

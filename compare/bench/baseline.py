@@ -16,6 +16,7 @@ from typing import Any
 
 from compare.study.definition import without_hashes
 from compare.study.record import History, RunRecord, Times, Verdict
+from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, without_nan
 
@@ -37,7 +38,7 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
         entry["runs"].append(_packed(record))
     text = json.dumps(without_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
     path = folder / f"{instance}.json.gz"
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with new_file(path) as temporary:
         temporary.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
     return path

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, stderr, stdout
+from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, say_error, stdout
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
 from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
@@ -134,7 +134,7 @@ def end_if_none_left(records: Sequence[RunRecord]) -> None:
     for failure in failures_of(records):
         if failure.failed == failure.runs:
             nothing_left.append(failure.solver)
-        stderr.print(f"nlp-gait: {failure.in_words}", soft_wrap=True)
+        say_error(failure.in_words)
     if nothing_left:
         fail(
             f"without any result: {', '.join(nothing_left)}; mend the reason, and delete the failed records to run them again"

@@ -118,7 +118,7 @@ def _print_gait(judged: JudgedGait) -> None:
     print_table(
         "Beside the optimum at the same step and time",
         ("index", "this gait", "optimum"),
-        [(name, f"{value:.6f}", "-" if math.isnan(best) else f"{best:.6f}") for name, value, best in judged.rows()],
+        [(name, f"{value:z.6f}", "-" if math.isnan(best) else f"{best:z.6f}") for name, value, best in judged.rows()],
     )
     _print_violations(judged.evaluation)
     if judged.engine is not None:
@@ -189,7 +189,7 @@ def _print(evaluation: Evaluation) -> None:
     rows = [
         (
             name,
-            f"{value:.6f}",
+            f"{value:z.6f}",
             with_unit(dense.get(name), "1"),
             "{:.6f} to {:.6f}".format(*means[name]) if name in means else "-",
         )

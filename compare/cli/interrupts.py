@@ -13,21 +13,34 @@ from nlp_gait.backends.interrupts import Interrupted
 R = TypeVar("R")
 
 
-def until_interrupted(work: Callable[[], R], nothing: str = "nothing was written") -> tuple[R, str]:
+def until_interrupted(
+    work: Callable[[], R], nothing: str = "nothing was written", folder: Path | None = None
+) -> tuple[R, str]:
     """What some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
 
     Args:
         work: raises ``Interrupted`` with the part that was found.
         nothing: what to add to the sentence if nothing was found; the command ends with it.
+        folder: in which finished steps are kept; None if the work has none.
     """
+
+    def kept() -> str:
+        return nothing if folder is None else kept_in(folder)
+
     try:
         return work(), ""
     except Interrupted as interrupt:
         if not interrupt.partial:
-            end_interrupted("; ".join(filter(None, (interrupt.sentence, nothing))))
+            end_interrupted("; ".join(filter(None, (interrupt.sentence, kept()))))
         return cast(R, interrupt.partial), interrupt.sentence
     except KeyboardInterrupt:
-        end_interrupted("interrupted before there was a result; nothing was written")
+        end_interrupted(f"interrupted before there was a result; {kept() or 'nothing was written'}")
+
+
+def kept_in(folder: Path) -> str:
+    """What is finished in a folder, and how to go on from it."""
+    finished = sum(1 for files in ("steps/*.json", "records/*/*.json") for _ in folder.glob(files))
+    return f"{finished} finished steps are kept in {folder}; the same command continues"
 
 
 @contextmanager
@@ -36,7 +49,4 @@ def interruptible(folder: Path | None = None) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        if folder is None:
-            end_interrupted("interrupted; nothing was written")
-        finished = sum(1 for files in ("steps/*.json", "records/*/*.json") for _ in folder.glob(files))
-        end_interrupted(f"interrupted; {finished} finished steps are kept in {folder}; the same command continues")
+        end_interrupted(f"interrupted; {'nothing was written' if folder is None else kept_in(folder)}")

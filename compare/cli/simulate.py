@@ -69,13 +69,13 @@ def simulate(
     from nlp_gait.problem.result import load_result
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.film.film import picture_size
-    from nlp_gait.simulation.film.video import check_video_path
+    from nlp_gait.simulation.film.video import check_frames, check_video_path
     from nlp_gait.simulation.film.viewer import shown
     from nlp_gait.simulation.load_sharing import Sharing
     from nlp_gait.simulation.load_sharing import share_loads as anew
     from nlp_gait.simulation.mjcf import plan_model
     from nlp_gait.simulation.plan import plan_of
-    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.playback import SETTLE_TIME, play
     from nlp_gait.simulation.robustness import robustness as sweep
 
     mujoco(pictures=film.video is not None)
@@ -92,6 +92,9 @@ def simulate(
     plans = [plan_of(gait, steps) for _, gait in gaits]
     if share_loads:
         plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
+    if film.video is not None:
+        for each in plans:
+            check_frames((each.duration_s + SETTLE_TIME) / film.speed, film.frames_per_s)
     plan, players = plans[0], [partial(play, plan, conditions, drive, sole) for plan in plans]
     if target is not None:
         titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]
@@ -171,7 +174,7 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
     stdout.print(f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees")
     powers = [
-        (name, *(f"{part:.3f}" for part in (power.mechanical_W, power.heat_W, power.total_W, power.signed_W)))
+        (name, *(f"{part:z.3f}" for part in (power.mechanical_W, power.heat_W, power.total_W, power.signed_W)))
         for name, power in (("model", report.predicted), ("engine", report.measured))
     ]
     print_table("Mean power [W]", ("", "mechanical", "heat", "total", "net mechanical"), powers)
@@ -214,7 +217,7 @@ def _print_course(walk: Walk) -> None:
         return
     stdout.print(
         f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "
-        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:.1f} degrees to the left; "
+        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:z.1f} degrees to the left; "
         f"{with_unit(walk.engine_J_per_planned_m, 'J', '.1f')} per planned metre (model: {walk.model_J_per_m:.1f} J), "
         f"{with_unit(walk.engine_J_per_m, 'J', '.1f')} per walked metre"
     )

@@ -22,7 +22,7 @@ from compare.cli.common import (
     stdout,
 )
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AsJson, NamedProblem, Seed, numbers_in
+from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, numbers_in
 from nlp_gait.problem.solution import Solution
 
 
@@ -42,6 +42,7 @@ def solve(
     linear_solver: Annotated[
         str | None, typer.Option(help="IPOPT's, for example ma57 if its library is there (default: mumps).")
     ] = None,
+    jobs: Jobs = None,
     out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -67,6 +68,7 @@ def solve(
                 seed=seed,
                 x0=first,
                 solver=chosen,
+                workers=jobs,
                 progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
             )
         )

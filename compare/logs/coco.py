@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
-from compare.analysis.comparison import Comparison, SolverRuns
-from compare.logs.trace import dimension, file_safe, traces
+from compare.analysis.comparison import Comparison
+from compare.logs.trace import Log, write_logs
 from nlp_gait.files import writable_folder, write_text
 
 PRECISION = 1e-8
@@ -18,35 +19,28 @@ HEADER = (
 
 
 def write_coco(comparisons: Sequence[Comparison], folder: Path, suite: str = "nlp-gait") -> list[Path]:
-    """Write ``<solver>/f<k>_<problem>.info`` and its data file for each solver and problem; arguments as ``write_ioh``."""
-    return [
-        path
-        for number, comparison in enumerate(comparisons, start=1)
-        for solver in comparison.solvers
-        for path in _write(folder / file_safe(solver.name), number, comparison, solver, suite)
-    ]
+    """Write ``<solver>/f<k>_<problem>.info`` and its data file for each solver and problem; see ``write_logs``."""
+    return write_logs(comparisons, folder, partial(_write, suite))
 
 
-def _write(folder: Path, number: int, comparison: Comparison, solver: SolverRuns, suite: str) -> tuple[Path, Path]:
-    n, stem = dimension(comparison), f"f{number}_{file_safe(comparison.problem)}"
-    runs = list(traces(solver))
-    data = Path(f"data_{stem}") / f"bbobexp_f{number}_DIM{n}.dat"
-    path = folder / data
+def _write(suite: str, log: Log) -> tuple[Path, Path]:
+    data = Path(f"data_{log.stem}") / f"bbobexp_f{log.number}_DIM{log.dimension}.dat"
+    path = log.folder / data
     writable_folder(path.parent)
     lines: list[str] = []
-    for run in runs:
+    for run in log.runs:
         lines.append(HEADER)
         lines += [f"{at} {at} {gap!r} {gap!r} {gap!r}" for at, gap in run.lines]
         if run.total > run.best[0]:  # COCO ends each run with its last evaluation
             lines.append(f"{run.total} {run.total} {run.best[1]!r} {run.best[1]!r} {run.best[1]!r}")
     write_text(path, "\n".join(lines) + "\n")
-    info = folder / f"{stem}.info"
-    ends = ", ".join(f"{run.run + 1}:{run.total}|{run.best[1]:.6e}" for run in runs)
+    info = log.folder / f"{log.stem}.info"
+    ends = ", ".join(f"{run.run + 1}:{run.total}|{run.best[1]:.6e}" for run in log.runs)
     write_text(
         info,
-        f"suite = '{suite}', funcId = {number}, DIM = {n}, Precision = {PRECISION:.3e}, algId = '{solver.name}', "
-        f"coco_version = '', logger = 'bbob', data_format = 'bbob-new2'\n"
-        f"% {comparison.problem}: relative gap to the best known objective, written by nlp-gait\n"
+        f"suite = '{suite}', funcId = {log.number}, DIM = {log.dimension}, Precision = {PRECISION:.3e}, "
+        f"algId = '{log.solver}', coco_version = '', logger = 'bbob', data_format = 'bbob-new2'\n"
+        f"% {log.problem}: relative gap to the best known objective, written by nlp-gait\n"
         f"{data.as_posix()}, {ends}\n",
     )
     return info, path

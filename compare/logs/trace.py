@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.run_length import Curve
 from compare.study.record import RunRecord
+from nlp_gait.files import file_safe
 
 # Gap that is logged while nothing feasible was found: formats of unconstrained benchmarks have no word for it.
 NOTHING_FEASIBLE = 1e10
@@ -61,11 +63,65 @@ def trace_of(record: RunRecord, curve: Curve) -> Trace:
     return Trace(run=record.run, x=tuple(record.x.values()), lines=tuple(lines), total=total)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Log:
+    """Runs of one solver on one problem, to be written.
+
+    Attributes:
+        folder: of the solver.
+        stem: of the files' names.
+        number: of the problem, which is a function in these formats.
+        problem: label.
+        dimension: number of variables.
+        solver: label.
+        runs: all.
+    """
+
+    folder: Path
+    stem: str
+    number: int
+    problem: str
+    dimension: int
+    solver: str
+    runs: tuple[Trace, ...]
+
+
+# Writes a log, and returns its files.
+Writer = Callable[[Log], Sequence[Path]]
+
+
 def dimension(comparison: Comparison) -> int:
     """Number of variables, from the records that have a point; 1 if none has."""
     return int(np.max([len(record.x) for record in comparison.records], initial=1))
 
 
-def file_safe(name: str) -> str:
-    """Name of a problem or solver as part of a file's name."""
-    return "".join(sign if sign.isalnum() or sign in "-_+." else "." for sign in name)
+def write_logs(comparisons: Sequence[Comparison], folder: Path, write: Writer) -> list[Path]:
+    """Write the log of each solver on each problem into the solver's folder.
+
+    Args:
+        comparisons: one a problem; problem k is function k, from 1.
+        folder: gets a folder for each solver.
+        write: writes one log in its format.
+
+    Returns:
+        All files.
+
+    Raises:
+        OutputError: the folder cannot be written to.
+    """
+    return [
+        path
+        for number, comparison in enumerate(comparisons, start=1)
+        for solver in comparison.solvers
+        for path in write(
+            Log(
+                folder=folder / file_safe(solver.name),
+                stem=f"f{number}_{file_safe(comparison.problem)}",
+                number=number,
+                problem=comparison.problem,
+                dimension=dimension(comparison),
+                solver=solver.name,
+                runs=tuple(traces(solver)),
+            )
+        )
+    ]

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from compare.analysis.units import number
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
@@ -126,7 +128,7 @@ def _cell(value: Value, form: str) -> Cell:
         return Cell(text=value, key=_leading_number(value))
     if isinstance(value, bool):
         return Cell(text="yes" if value else "no")
-    return Cell(text=format(value, form), key=value if math.isfinite(value) else math.inf)
+    return Cell(text=number(value, form), key=value if math.isfinite(value) else math.inf)
 
 
 def _leading_number(text: str) -> float | None:

@@ -18,6 +18,7 @@ from compare.report.document import Figure, Section, text_table
 from compare.report.engine_section import engine_section
 from compare.study.engine import Played
 from compare.study.record import RunRecord
+from nlp_gait.files import file_safe
 from nlp_gait.problem.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
@@ -27,7 +28,7 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
     """Tables, figures and lists on one problem, and how its best gaits fared in the engine if they were played."""
     summaries = summarise(comparison)
     objective = comparison.objective
-    stem = file_stem(comparison.problem)
+    stem = file_safe(comparison.problem)
     figures = (
         Figure(
             name=f"{stem}-convergence",
@@ -61,11 +62,6 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
             *(section for section in where_needed if section is not None),
         ),
     )
-
-
-def file_stem(label: str) -> str:
-    """Label as the beginning of a file's name."""
-    return "".join(c if c.isalnum() or c in "-_+." else "." for c in label)
 
 
 def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
@@ -174,7 +170,7 @@ def _for_one_step(active: ActiveConstraint, unit: str) -> str:
     step = BY_UNIT.get(active.unit)
     if step is None:
         return "-"
-    return f"{active.price * step.size:+.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
+    return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
 def _published(comparison: Comparison) -> Section | None:

@@ -15,12 +15,13 @@ from compare.report.csv_files import write_csv_files
 from compare.report.document import Document, Figure, Section
 from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
-from compare.report.problem_section import file_stem, problem_section
+from compare.report.problem_section import problem_section
 from compare.report.writing import write_document
 from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
 from compare.study.study import read_records
+from nlp_gait.files import file_safe
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
@@ -48,7 +49,7 @@ def write_report(
     plays = kept_plays(folder, best_gaits(records))
     written = write_document(folder, document_of(records, manifest, weighting, plays))
     if as_csv:
-        written += write_csv_files(folder, records, {record.problem: file_stem(record.problem) for record in records})
+        written += write_csv_files(folder, records, {record.problem: file_safe(record.problem) for record in records})
     return written
 
 

@@ -19,7 +19,7 @@ from nlp_gait.problem import GaitProblem
 from nlp_gait.references import short_name, source_digest, source_sha256
 from nlp_gait.robots.loading import is_robot_file
 
-HASH, SOURCE = "sha256", "source_sha256"
+HASH, SOURCE, FORMULAS = "sha256", "source_sha256", "mathematics_sha256"
 SHOWN_DIGITS = 8  # of a hash
 MATHEMATICS = "the problem's mathematics or limits"
 WORDS: Mapping[tuple[str, ...], str] = {
@@ -28,6 +28,7 @@ WORDS: Mapping[tuple[str, ...], str] = {
     ("algorithm", SOURCE): "the algorithm's source",
     ("polishes", "key"): "the search that it polishes",
 }
+INPUT_WORDS = {FORMULAS: MATHEMATICS, "parameters": "values of the problem's parameters"}
 
 
 def sha256_of(data: Any, code: str = "") -> str:
@@ -45,14 +46,14 @@ def fingerprint(problem: GaitProblem) -> dict[str, Any]:
         "problem": problem.address,
         "options": dict(problem.options),
         "parameters": problem.p.tolist(),
-        "mathematics_sha256": problem.built("mathematics_sha256", mathematics),
+        FORMULAS: problem.built(FORMULAS, mathematics),
     }
 
 
 def problem_part(problem: GaitProblem) -> dict[str, Any]:
     """A problem in a definition: how to make it again, and the hash of what was made."""
     found = fingerprint(problem)
-    content = [found["mathematics_sha256"], found["parameters"], problem.names]
+    content = [found[FORMULAS], found["parameters"], problem.names]
     part = {
         "name": found["problem"],
         "options": found["options"],
@@ -117,6 +118,17 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
         for place, before, after in _changed(old, new)
     }
     return ", ".join(found.values())
+
+
+def input_differences(old: Any, new: Any) -> str:
+    """In words, what differs between two steps' inputs: ``starts 5 -> 10``; the mathematics only where nothing else does."""
+    before, after = dict(_leaves(old)), dict(_leaves(new))
+    places = [place for place in {**before, **after} if before.get(place) != after.get(place)]
+    causes = [place for place in places if place[-1] != FORMULAS]
+    return ", ".join(
+        INPUT_WORDS.get(place[-1]) or f"{place[-1]} {_shown(before.get(place))} -> {_shown(after.get(place))}"
+        for place in causes or places
+    )
 
 
 def edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, run_file
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
@@ -24,7 +24,7 @@ from nlp_gait.simulation.plan import Plan, plan_of
 from nlp_gait.simulation.playback import play
 from nlp_gait.simulation.walking import measure_walk
 
-FOLDER = "engine"
+FOLDER = "engine"  # in a study's, with a file for each record of it
 STEPS = 10  # of a cycle
 SCHEMA = 1
 REMEDY = "delete it to have the gait played anew"
@@ -106,7 +106,9 @@ def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
     Raises:
         InputError: a file is damaged.
     """
-    found = [(_read(_file(folder, record)), record) for record in records]
+    found = [
+        (_read(run_file(folder / FOLDER, record.problem, record.algorithm, record.run)), record) for record in records
+    ]
     return [played for played, record in found if played is not None and played.gait == _gait(record)]
 
 
@@ -115,7 +117,7 @@ def _played(folder: Path, record: RunRecord, result: Result, drive: Drive, versi
     steps = STEPS if repeats else None
     plan = plan_of(result, steps)
     made_of = f"{_digest(plan, drive)}, {version}"
-    path = _file(folder, record)
+    path = run_file(folder / FOLDER, record.problem, record.algorithm, record.run)
     kept = _read(path)
     if kept is not None and (kept.gait, kept.drive, kept.made_of) == (_gait(record), drive, made_of):
         return kept
@@ -165,12 +167,6 @@ def _digest(plan: Plan, drive: Drive) -> str:
     for name in ("t", "q", "tau"):
         digest.update(plan.signals.arrays[name].tobytes())
     return digest.hexdigest()
-
-
-def _file(folder: Path, record: RunRecord) -> Path:
-    """``<folder>/engine/<problem>/<solver>-<run>.json``."""
-    problem, solver = (title.replace(":", ".") for title in (record.problem, record.algorithm))
-    return folder / FOLDER / problem / f"{solver}-{record.run:04d}.json"
 
 
 def _read(path: Path) -> Played | None:

@@ -207,6 +207,12 @@ class _Definition:
     start: Mapping[str, float] | None = None
 
 
+def run_file(folder: Path, problem: str, solver: str, run: int) -> Path:
+    """``<folder>/<problem>/<solver>-<run>.json``, where what belongs to a run is kept; a colon becomes a full stop."""
+    problem, solver = (title.replace(":", ".") for title in (problem, solver))
+    return folder / problem / f"{solver}-{run:04d}.json"
+
+
 def read_record(path: Path) -> RunRecord:
     """Record from its file.
 

@@ -1,4 +1,4 @@
-"""Steps of a long reproduction, each kept as a file, so that an interrupted one continues where it stopped."""
+"""Steps of long work, each kept as a file, so that what was interrupted continues where it stopped."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
-from compare.study.definition import sha256_of
+from compare.study.definition import input_differences, sha256_of
 from compare.study.progress import Progress
 from compare.study.workers import default_jobs, side_by_side
 from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, writable_folder, write_json
+from nlp_gait.files import read_json, remove_leftovers, writable_folder, write_json
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,18 +26,28 @@ class Step:
     compute: Callable[[], Any]
 
 
+class Kept(NamedTuple):
+    """Result that was kept, which may be None itself."""
+
+    result: Any
+
+
 class Steps:
     """Runs steps, or takes their results from ``<out>/steps/<name>.json`` if they were made from equal inputs.
 
     Args:
-        out: folder of the reproduction.
+        out: folder of the work.
         progress: told the name of each step before it runs, and of each that need not run again.
         code: modules that compute the results; steps run again when their text has changed.
+        anew: told of each step that was made from other inputs, and of what has changed; None for ``progress``.
     """
 
-    def __init__(self, out: Path, progress: Progress, code: Sequence[ModuleType] = ()) -> None:
+    def __init__(
+        self, out: Path, progress: Progress, code: Sequence[ModuleType] = (), anew: Progress | None = None
+    ) -> None:
         self._folder = writable_folder(out / "steps")
-        self._progress = progress
+        remove_leftovers(self._folder)
+        self._progress, self._anew = progress, anew or progress
         self._code = "".join(inspect.getsource(module) for module in code)
 
     def __call__(self, name: str, inputs: Mapping[str, Any], compute: Callable[[], Any]) -> Any:
@@ -66,20 +76,42 @@ class Steps:
         """
         results: dict[int, Any] = {}
         for k, step in enumerate(steps):
-            if (kept := _kept(self._path(step), sha256_of(step.inputs, self._code))) is not None:
+            if (kept := self.kept(step.name, step.inputs)) is not None:
                 self._progress(f"{step.name}: kept from an earlier run")
-                results[k] = kept["result"]
+                results[k] = kept.result
         waiting = {k: step for k, step in enumerate(steps) if k not in results}
         for k, computed in _computed(waiting, min(jobs or default_jobs(), len(waiting)), self._progress):
-            # As JSON gives it back, now and whenever it is read again.
-            step, result = steps[k], json.loads(json.dumps(computed, allow_nan=False))
-            digests = {"sha256": sha256_of(step.inputs, self._code), "result_sha256": sha256_of(result)}
-            write_json(self._path(step), {"inputs": step.inputs, "result": result, **digests})
-            results[k] = result
+            results[k] = self.keep(steps[k].name, steps[k].inputs, computed)
         return [results[k] for k in range(len(steps))]
 
-    def _path(self, step: Step) -> Path:
-        return self._folder / f"{step.name}.json"
+    def kept(self, name: str, inputs: Mapping[str, Any]) -> Kept | None:
+        """Result of a step that was made from equal inputs; None if there is none, and ``anew`` is told why."""
+        path = self._folder / f"{name}.json"
+        if not path.exists():
+            return None
+        try:
+            content = read_json(path, "step")
+        except InputError:
+            return None  # damaged: made again
+        if not isinstance(content, dict) or not content.keys() >= {"inputs", "result"}:
+            return None
+        if content.get("sha256") != sha256_of(inputs, self._code):
+            self._anew(
+                f"{name}: made again: {input_differences(content['inputs'], inputs) or 'the program has changed'}"
+            )
+            return None
+        return Kept(content["result"]) if content.get("result_sha256") == sha256_of(content["result"]) else None
+
+    def keep(self, name: str, inputs: Mapping[str, Any], computed: Any) -> Any:
+        """Keep the result of a step; returns it as JSON gives it back, now and whenever it is read again.
+
+        Raises:
+            OutputError: it cannot be kept.
+        """
+        result = json.loads(json.dumps(computed, allow_nan=False))
+        digests = {"sha256": sha256_of(inputs, self._code), "result_sha256": sha256_of(result)}
+        write_json(self._folder / f"{name}.json", {"inputs": inputs, "result": result, **digests})
+        return result
 
 
 def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
@@ -92,16 +124,3 @@ def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> It
     for number, result in side_by_side({number: step.compute for number, step in steps.items()}, workers):
         progress(steps[number].name)
         yield number, result
-
-
-def _kept(path: Path, digest: str) -> dict[str, Any] | None:
-    """Content of a step's file if it is whole and from these inputs."""
-    if not path.exists():
-        return None
-    try:
-        content = read_json(path, "step")
-    except InputError:
-        return None  # damaged: made again
-    if not isinstance(content, dict) or content.get("sha256") != digest or "result" not in content:
-        return None
-    return content if content.get("result_sha256") == sha256_of(content["result"]) else None

@@ -12,11 +12,12 @@ from typing import Any
 
 from compare.judge import evaluate
 from compare.study.definition import HASH, differences, key_of, without_hashes
-from compare.study.record import RunRecord, Verdict, read_record
+from compare.study.record import RunRecord, Verdict, read_record, run_file
 from compare.study.runner import Run, run_task
 from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.disk import rename
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
 
@@ -123,7 +124,7 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
     Raises:
         OutputError: the file cannot be written.
     """
-    path = _file(folder, record.problem, record.algorithm, record.run)
+    path = run_file(folder / RECORDS, record.problem, record.algorithm, record.run)
     if not path.parent.is_dir():
         writable_folder(path.parent)
     if path.exists():
@@ -131,7 +132,7 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
             earlier = read_record(path)
             if key_of(earlier.definition) != key_of(record.definition):
                 with refusing(f"cannot write to {str(path.parent)!r}", OutputError):
-                    path.replace(_keyed(path, earlier))
+                    rename(path, _keyed(path, earlier.definition))
     write_json(path, record.to_json())
     return path
 
@@ -156,16 +157,12 @@ def record_file(folder: Path, task: Task) -> Path:
 
     One of another definition that was there goes to ``<solver>-<run>.<key>.json``.
     """
-    return _file(folder, task.problem.title, task.title, task.run)
+    return run_file(folder / RECORDS, task.problem.title, task.title, task.run)
 
 
-def _file(folder: Path, problem: str, solver: str, run: int) -> Path:
-    problem, solver = (title.replace(":", ".") for title in (problem, solver))
-    return folder / RECORDS / problem / f"{solver}-{run:04d}.json"
-
-
-def _keyed(path: Path, record: RunRecord) -> Path:
-    return path.with_name(f"{path.stem}.{key_of(record.definition)[:KEY_DIGITS]}.json")
+def _keyed(path: Path, definition: Mapping[str, Any]) -> Path:
+    """Where a record of this definition is put when another one has its plain name."""
+    return path.with_name(f"{path.stem}.{key_of(definition)[:KEY_DIGITS]}.json")
 
 
 def read_records(folder: Path) -> list[RunRecord]:
@@ -179,14 +176,16 @@ def read_records(folder: Path) -> list[RunRecord]:
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
     records = [(path, _named_alike(path, read_record(path))) for path in paths]
-    records.sort(key=lambda item: item[0] != _file(folder, item[1].problem, item[1].algorithm, item[1].run))
+    records.sort(
+        key=lambda item: item[0] != run_file(folder / RECORDS, item[1].problem, item[1].algorithm, item[1].run)
+    )
     return [record for _, record in records]
 
 
 def _named_alike(path: Path, record: RunRecord) -> RunRecord:
     """The record, if it lies where a study puts it: a copy under another name would count twice."""
-    own = _file(path.parents[2], record.problem, record.algorithm, record.run)
-    if path not in (own, _keyed(own, record)):
+    own = run_file(path.parents[1], record.problem, record.algorithm, record.run)
+    if path not in (own, _keyed(own, record.definition)):
         raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
     if path != own and own.exists() and key_of(read_record(own).definition) == key_of(record.definition):
         raise InputError(f"record {str(path)!r} is also {own.parent.name}/{own.name}; delete one of them")
@@ -206,8 +205,7 @@ def _finished(study: Study) -> tuple[dict[int, RunRecord], dict[int, RunRecord]]
         if not path.exists():
             continue
         definition = task.definition()
-        keyed = path.with_name(f"{path.stem}.{key_of(definition)[:KEY_DIGITS]}.json")
-        for candidate in (path, keyed):
+        for candidate in (path, _keyed(path, definition)):
             if candidate.exists():
                 record = _named_alike(candidate, read_record(candidate))
                 if is_of(record, definition, task):

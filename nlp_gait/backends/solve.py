@@ -11,6 +11,7 @@ from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import InputError, checked_count, shown
 from nlp_gait.problem import Array, GaitProblem, load
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
@@ -18,6 +19,7 @@ from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outc
 # A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
 MOST_STARTS = 100_000
+MOST_WORKERS = 4096
 
 
 def solve(
@@ -29,6 +31,7 @@ def solve(
     fix: Mapping[str, float] | None = None,
     solver: Solver | None = None,
     progress: Callable[[Outcome], None] | None = None,
+    workers: int | None = None,
 ) -> Solution:
     """Best local optimum from several starts.
 
@@ -40,7 +43,9 @@ def solve(
             fixed. The remaining ``starts - 1`` are random.
         fix: variables held at a value.
         solver: with its settings; None for IPOPT with its defaults.
-        progress: called after each start.
+        progress: called after each start, in their order.
+        workers: processes among which the starts are divided; None for all processors where a process can be forked (Linux, in
+            the main thread), 1 for none beside this one. The solution does not depend on it, but for the times in it.
 
     Returns:
         The best start that converged and is feasible for the exact functions; if none did, the best feasible end point, and
@@ -51,6 +56,7 @@ def solve(
         Interrupted: Ctrl-C; carries the solution from the starts until then, the one in progress where it was.
     """
     starts = checked_count("starts", starts, at_most=MOST_STARTS)
+    workers = None if workers is None else checked_count("workers", workers, at_most=MOST_WORKERS)
     seed = checked_count("seed", seed, at_least=0)
     problem = load(problem) if isinstance(problem, str) else problem
     _check_kinds(problem, fix, solver, progress)
@@ -59,12 +65,10 @@ def solve(
     ready = (solver or IpoptSettings()).ready_for(problem, starts)
     outcomes: list[Outcome] = []
     with deferred_interrupts() as interrupted:
-        for point in points:
-            outcomes.append(ready.run(problem, point, interrupted))
+        for outcome in run_starts(ready, problem, points, interrupted, workers):
+            outcomes.append(outcome)
             if progress is not None:
-                progress(outcomes[-1])
-            if interrupted():
-                break
+                progress(outcome)
     solution = solution_of(problem, outcomes, seed)
     if interrupted():
         sentence = f"interrupted in start {len(outcomes)} of {starts}"

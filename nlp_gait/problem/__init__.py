@@ -13,12 +13,13 @@ from nlp_gait.problem.assembly import (
     Variable,
     parameters,
 )
-from nlp_gait.problem.gait_problem import GaitProblem, Grid
-from nlp_gait.problem.playback import Playback
+from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.motion.grid import Grid
+from nlp_gait.problem.motion.playback import Playback
+from nlp_gait.problem.motion.signals import Array, Columns, Signals, in_space
 from nlp_gait.problem.registry import load, maker, problem_names
 from nlp_gait.problem.result import Result, load_result
 from nlp_gait.problem.sampling import finely_sampled, sampled
-from nlp_gait.problem.signals import Array, Columns, Signals, in_space
 
 __all__ = [
     "Array",

@@ -20,6 +20,22 @@ Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "sa
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """Number that may change without rebuilding; ``minimum`` and ``maximum`` say what is allowed."""
+
+    name: str
+    unit: str
+    default: float
+    description: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse a default that is no number."""
+        _check_number(f"parameter {self.name!r}", "default", self.default)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
     """Decision variable with its default bounds, in ``unit``; no bound may be set beyond ``minimum`` and ``maximum``."""
 
@@ -41,21 +57,16 @@ class Variable:
                 f"{owner}: lower must be below upper, got {self.lower} and {self.upper}; hold a variable at a value by fixing it"
             )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """Number that may change without rebuilding; ``minimum`` and ``maximum`` say what is allowed."""
-
-    name: str
-    unit: str
-    default: float
-    description: str
-    minimum: float = -math.inf
-    maximum: float = math.inf
-
-    def __post_init__(self) -> None:
-        """Refuse a default that is no number."""
-        _check_number(f"parameter {self.name!r}", "default", self.default)
+    def bound(self, end: Literal["lower", "upper"]) -> Parameter:
+        """One of the bounds as a parameter, ``<variable>.lower`` or ``<variable>.upper``."""
+        return Parameter(
+            name=f"{self.name}.{end}",
+            unit=self.unit,
+            default=self.lower if end == "lower" else self.upper,
+            description=f"{end} bound of {self.name}",
+            minimum=self.minimum,
+            maximum=self.maximum,
+        )
 
 
 def _check_number(owner: str, field: str, value: object) -> None:

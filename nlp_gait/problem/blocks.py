@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.problem.assembly import Point, Variable
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem.motion.signals import Array
 
 
 @dataclass(frozen=True, kw_only=True)

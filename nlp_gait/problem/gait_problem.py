@@ -11,8 +11,8 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import Any, Literal, NamedTuple, TypeVar
+from functools import cached_property
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from casadi import DM, MX
@@ -20,10 +20,12 @@ from casadi import DM, MX
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
 from nlp_gait.problem.locking import CASADI, one_at_a_time
+from nlp_gait.problem.motion.grid import Grid
+from nlp_gait.problem.motion.playback import Playback
+from nlp_gait.problem.motion.signals import Array, Signals
+from nlp_gait.problem.motion.skeleton import Skeleton
 from nlp_gait.problem.numbers import is_number, real_numbers
-from nlp_gait.problem.playback import Playback
-from nlp_gait.problem.signals import Array, Signals
-from nlp_gait.problem.skeleton import Skeleton
+from nlp_gait.problem.origin import Origin, pickled
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -33,46 +35,6 @@ LARGEST = 1e100  # of a parameter; the square of a larger one is no number any m
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
 # A point lies on a bound that it misses by this share of the variable's default range.
 ROUNDING = 1e-6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Grid:
-    """Instants at which a problem evaluates its motion.
-
-    Attributes:
-        intervals: equal parts over which limits on changes hold.
-        samples_per_interval: above 1 for more samples than these limits need.
-        refined_by: option of the problem's maker that gives a denser grid when multiplied; None if the variables depend on
-            the grid, so that there is none.
-    """
-
-    intervals: int
-    samples_per_interval: int = 1
-    refined_by: Literal["intervals", "samples_per_interval"] | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what gives no grid."""
-        for name in ("intervals", "samples_per_interval"):
-            count = getattr(self, name)
-            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-                raise InputError(f"{name} must be a whole number >= 1, got {count!r}")
-
-    @property
-    def parts(self) -> int:
-        """Equal parts between the samples."""
-        return self.intervals * self.samples_per_interval
-
-
-class Origin(NamedTuple):
-    """How a problem is made again, in this process or in another one.
-
-    Attributes:
-        make: with keyword options.
-        options: all of them.
-    """
-
-    make: Callable[..., GaitProblem]
-    options: Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,19 +119,8 @@ class GaitProblem:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, the variables' bounds included, in the order of p."""
-        bounds = [
-            Parameter(
-                name=f"{v.name}.{end}",
-                unit=v.unit,
-                default=getattr(v, end),
-                description=f"{end} bound of {v.name}",
-                minimum=v.minimum,
-                maximum=v.maximum,
-            )
-            for end in ("lower", "upper")
-            for v in self.variables
-        ]
-        return (*self.own_parameters, *bounds)
+        lower, upper = ((v.bound("lower") for v in self.variables), (v.bound("upper") for v in self.variables))
+        return (*self.own_parameters, *lower, *upper)
 
     @cached_property
     def p(self) -> Array:
@@ -393,18 +344,8 @@ class GaitProblem:
         return self
 
     def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
-        """For pickle.
-
-        Raises:
-            InputError: no maker that other processes could find makes exactly this problem.
-        """
-        origin = self._origin
-        if origin is None or "<locals>" in getattr(origin.make, "__qualname__", ""):
-            raise InputError(
-                f"problem {self.name!r} cannot be pickled: it is not what a maker makes from options, or its maker is no "
-                "function at the top of a module; make it in the other process, or give it a maker there"
-            )
-        return remade, (origin.make, origin.options, dict(self.values), repr(self.robot))
+        """For pickle; InputError if no maker makes exactly this problem."""
+        return pickled(self, self._origin)
 
     def built(self, key: str, build: Callable[[], T]) -> T:
         """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
@@ -430,28 +371,6 @@ class GaitProblem:
                     f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
                     f"set {name} and {stem}.upper so that lower <= upper"
                 )
-
-
-def remade(
-    make: Callable[..., GaitProblem], options: Mapping[str, Any], values: Mapping[str, float], robot: str
-) -> GaitProblem:
-    """A problem that was pickled; copies of one problem share what is built, here too.
-
-    Raises:
-        InputError: the robot's file holds another robot than it did.
-    """
-    return _remade(make, tuple(sorted(options.items())), robot).with_values(**values)
-
-
-@one_at_a_time
-@lru_cache(maxsize=16)
-def _remade(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any], ...], robot: str) -> GaitProblem:
-    problem = make(**dict(options))
-    if repr(problem.robot) != robot:
-        raise InputError(
-            f"problem {problem.name!r}: its robot is another one than when it was pickled: its file has changed"
-        )
-    return problem
 
 
 def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -9,7 +9,7 @@ from typing import TypeGuard
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem.motion.signals import Array
 
 
 def is_number(value: object) -> TypeGuard[float]:

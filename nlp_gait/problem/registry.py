@@ -25,7 +25,7 @@ PROBLEMS = {
     "nao-dsp": "nlp_gait.problems.nao.double_support:nao_dsp",
     "nao-ssp-free": "nlp_gait.problems.nao.single_support_free:nao_ssp_free",
     "nao-dsp-free": "nlp_gait.problems.nao.double_support_free:nao_dsp_free",
-    "nao-cycle": "nlp_gait.problems.nao.cycle:nao_cycle",
+    "nao-cycle": "nlp_gait.problems.nao.cycle.problem:nao_cycle",
     "walk12": "nlp_gait.problems.walk12.problem:walk12",
     "stairs-plan": "nlp_gait.problems.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.problems.stairs.track:stairs_track",
@@ -170,7 +170,6 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         InputError: a value of another type, not among those allowed, or a count beyond what can be built.
     """
     known, allowed = inspect.signature(make).parameters, _choices(make)
-    counts = {name: _plain(options.get(name, known[name].default)) for name in GRID if name in known}
     for option, given in options.items():
         value = _plain(given)
         if option not in known:
@@ -181,14 +180,13 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
-        if (
-            option in GRID
-            and math.prod(max(1, count) for count in counts.values() if type(count) is int) > LARGEST_COUNT
-        ):
-            product = " x ".join(f"{name} {counts[name]}" for name in GRID if name in known)
-            raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
+    whole = [name for name, option in known.items() if type(option.default) is int]
+    counts = {name: _plain(options.get(name, known[name].default)) for name in GRID if name in whole}
+    if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:
+        product = " x ".join(f"{name} {count}" for name, count in counts.items())
+        raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
 
 
 def _plain(value: Any) -> Any:

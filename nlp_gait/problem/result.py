@@ -11,8 +11,8 @@ from nlp_gait.decoding import decoded
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import read_json
 from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.motion.signals import Array
 from nlp_gait.problem.registry import load
-from nlp_gait.problem.signals import Array
 from nlp_gait.problem.solution import Solution
 from nlp_gait.references import named_as
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from nlp_gait.errors import InputError
+from nlp_gait.problem.motion.signals import Array, Signals
 from nlp_gait.problem.result import Result
-from nlp_gait.problem.signals import Array, Signals
 
 SHORTEST_S, LONGEST_S = 0.001, 60.0  # of a gait; a step takes a second
 FINE_INTERVALS = 1000  # of a grid that splines run through: their error is below 1e-9 rad

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
-from nlp_gait.problem.signals import Array
+from nlp_gait.problem.motion.signals import Array
 
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6

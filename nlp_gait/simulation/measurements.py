@@ -18,7 +18,7 @@ from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.playback import LEAST_LOAD, Trace
 
 AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a servo counts as saturated
-LASTING = round(0.003 / TIME_STEP)  # [steps of the engine] of a load that is no brush
+LASTING = 0.003  # [s] of a load that is no brush
 MIDDLE = (0.2, 0.8)  # part of the phase that neither the start from unloaded servos nor the landing disturbs
 
 
@@ -127,11 +127,6 @@ class Measurements:
     beyond_limit: Mapping[str, float]
     joint_limits: tuple[str, ...]
 
-    @property
-    def power_error(self) -> float:
-        """Measured total power over the predicted one, minus one."""
-        return self.measured.total_W / self.predicted.total_W - 1.0
-
 
 def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
     """Numbers of one simulation."""
@@ -139,8 +134,8 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
     error = plan.at("q", trace.t[during]) - trace.q[during]
     torque, rate = trace.torque[during], trace.qd[during]
     limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
-    raw = np.linalg.norm(trace.pressure - plan.at("zmp", trace.t), axis=1)[during]
     pressure, planned = averaged_pressure(trace, drive.period_s), plan.at("zmp", trace.t)
+    raw = np.linalg.norm(trace.pressure - planned, axis=1)[during]
     deviation = np.linalg.norm(pressure - planned, axis=1)[during]
     in_feet = np.linalg.norm(pressure - planned - _feet_moved(plan, trace), axis=1)[during]
     landed = _touchdowns(plan, trace)
@@ -210,7 +205,7 @@ def _feet_moved(plan: Plan, trace: Trace) -> Array:
 
 
 def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
-    found = []
+    found, lasting = [], round(LASTING / TIME_STEP)
     for i, side in enumerate(SIDES):
         swings = np.diff(np.concatenate([[1.0], plan.bears(side, trace.t), [1.0]]))
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
@@ -218,7 +213,7 @@ def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
             middle = (int(lifted) + planned) // 2
             loaded = (trace.loads[middle:, i] > LEAST_LOAD).astype(float)
             # From here on the ground carries for a while: a toe that brushes an edge has not landed.
-            carried = np.flatnonzero(np.convolve(loaded, np.ones(LASTING), "valid") == LASTING)
+            carried = np.flatnonzero(np.convolve(loaded, np.ones(lasting), "valid") == lasting)
             if middle > 0 and carried.size:
                 first = middle + int(carried[0])
                 speed = max(0.0, float(trace.feet[first - 1, i, 2] - trace.feet[first, i, 2]) / TIME_STEP)

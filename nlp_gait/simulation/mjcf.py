@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 from xml.etree import ElementTree as Xml
 
-from nlp_gait.problem.playback import Tread
+from nlp_gait.problem.motion.playback import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, Signals, finely_sampled
 from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.playback import Tread
-from nlp_gait.problem.steps import walk
+from nlp_gait.problem.motion.playback import Tread
+from nlp_gait.problem.motion.steps import walk
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 
@@ -127,10 +127,6 @@ class Plan:
         """Planned rates of what has a spline at any times (T,): zero beyond the end."""
         within = np.clip(times, 0.0, self.duration_s)
         return np.asarray(self._splines[name](within, 1) * (times <= self.duration_s)[:, None])
-
-    def rate_at_start(self, name: str) -> Array:
-        """Planned velocity at time zero."""
-        return np.asarray(self._splines[name](0.0, 1))
 
     def shapes(self, sole: str) -> dict[str, list[Shape]]:
         """Shapes of the simulated robot's links."""

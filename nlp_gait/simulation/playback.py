@@ -139,10 +139,10 @@ def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tup
     model.opt.gravity[:] = conditions.gravity(plan.gravity)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
-    at = _Addresses(model, plan)
+    at, start = _Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
     place_root(data, plan)
-    data.qpos[at.angles], data.qvel[at.rates] = plan.at("q", np.zeros(1))[0], plan.rate_at_start("q")
+    data.qpos[at.angles], data.qvel[at.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
     engine.mj_forward(model, data)
     return model, data
 

@@ -25,7 +25,7 @@ def add_root_joints(element: Xml.Element, planar: bool) -> None:
 def place_root(data: Any, plan: Plan) -> None:
     """Set the root's planned pose and velocity at time zero; its coordinates are the engine's first."""
     start = np.zeros(1)
-    (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate_at_start("hip")
+    (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate("hip", start)[0]
     attitude, spin = plan.attitude(start)[0], plan.spin_at_start
     if plan.planar:
         data.qpos[:3] = x, z, 2.0 * np.arctan2(attitude[2], attitude[0])

@@ -9,6 +9,18 @@ from typing import Any
 from compare.study.record import History, RunRecord, Times, Verdict
 from nlp_gait.problem.solution import ActiveConstraint
 
+# A point of nao-dsp that can be played.
+DSP_X = {
+    "hip_height_m": 0.31,
+    "hip_vz_start_m_s": -0.0008,
+    "hip_vz_end_m_s": -0.0055,
+    "hip_vx_start_m_s": 0.052,
+    "hip_vx_end_m_s": 0.001,
+    "hip_vy_start_m_s": -0.0367,
+    "hip_vy_end_m_s": -0.0424,
+    "double_support_time_s": 0.4,
+}
+
 POWER = {"name": "power", "unit": "W", "sense": "minimise"}
 
 

@@ -72,6 +72,7 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
 ROUNDS = 5
+ONCE = ("never returns", "never returns at import", "prints megabytes")  # waiting for them again shows nothing new
 ENDED = ("evaluation budget used", "time limit reached")
 
 
@@ -96,6 +97,8 @@ def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
     solvers, ways = [SolverSpec(algorithm="pso")], {}
     for i in range(ROUNDS):
         for k, way in enumerate(WAYS):
+            if i and way in ONCE:
+                continue
             name = f"h{i}-{k}"
             ways[name] = way
             reference = f"{written(tmp_path, name, way)}:Algorithm"

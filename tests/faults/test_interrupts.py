@@ -18,6 +18,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import nlp_gait
+from compare import starting
 from compare.cli import app
 from compare.study.record import read_record
 from compare.study.steps import Steps
@@ -26,7 +27,7 @@ from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from tests.backends.toys import corner, toy
-from tests.faults.processes import start
+from tests.faults.processes import ROOT, start
 
 RUN = CliRunner()
 
@@ -63,7 +64,7 @@ def test_solve_within_a_later_start_keeps_the_best_of_the_earlier_ones(
     whole = nlp_gait.solve(nlp_gait.load("walk12"), starts=1)
     press_after(monkeypatch, IterationWatch, "eval", 3 * whole.starts[0].iterations)
     out = tmp_path / "best.json"
-    done = run("solve", "walk12", "--starts", "50", "--out", str(out))
+    done = run("solve", "walk12", "--starts", "50", "--jobs", "1", "--out", str(out))
     kept = json.loads(out.read_text())
     starts = len(kept["starts"])
     assert 2 <= starts < 50 and kept["success"] and kept["objective"] >= whole.objective - 1e-6
@@ -112,6 +113,7 @@ def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest
     table = (tmp_path / "walk12-sweep-step_length_m-ipopt.csv").read_text().splitlines()
     assert 2 < len(table) < 31
     assert f"after {len(table) - 1} of 30 points; these are in {tmp_path}, not all of them solved from" in done.stderr
+    assert done.stderr.endswith("both sides; the same command continues\n")
 
 
 @pytest.mark.slow
@@ -120,7 +122,10 @@ def test_sweep_by_a_search_writes_the_points_that_it_has(tmp_path: Path, monkeyp
     over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
     done = run("sweep", "walk12", *over, "--out", str(tmp_path))
     table = (tmp_path / "walk12-sweep-step_length_m-pso.csv").read_text().splitlines()
-    assert len(table) == 3 and f"after 2 of 30 points; these are in {tmp_path}\n" in done.stderr
+    assert (
+        len(table) == 3
+        and f"after 2 of 30 points; these are in {tmp_path}; the same command continues\n" in done.stderr
+    )
 
 
 def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -260,11 +265,64 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
 
     with monkeypatch.context() as patch:
         press_after(patch, GaitProblem, "fix", 2)  # the first one checks what was asked
-        assert run(*asked).stderr == "nlp-gait: interrupted before there was a result; nothing was written\n"
-    assert list(tmp_path.iterdir()) == []
+        assert run(*asked).stderr == (
+            f"nlp-gait: interrupted before there was a result; 0 finished steps are kept in {tmp_path}; the same command "
+            "continues\n"
+        )
+    assert not list(tmp_path.glob("*.*"))
     from matplotlib.figure import Figure
 
     press_after(monkeypatch, Figure, "savefig", 1)
     done = run(*asked)
-    assert done.stderr == f"nlp-gait: interrupted at the end; what was found is in {tmp_path}\n"
+    assert (
+        done.stderr
+        == f"nlp-gait: interrupted at the end; what was found is in {tmp_path}; the same command continues\n"
+    )
     assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1
+
+
+PRESSED_AT_IMPORT = """
+import signal, sys
+
+class Presses:
+    name = sys.argv.pop(1)
+
+    def find_spec(self, name, *rest):
+        if name == self.name:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Presses())
+from compare.__main__ import main
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", ["typer", "casadi", "nlp_gait.backends.kernel.compiled"])
+def test_while_modules_are_imported(module: str) -> None:
+    """Before the command has begun, and within it."""
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSED_AT_IMPORT, module, "search", "walk12", "--runs", "1"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+    )
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.startswith("nlp-gait: interrupted") and done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+def test_ctrl_c_ends_the_process_outside_of_a_command_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[object] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    monkeypatch.setattr(os, "write", lambda *what: ended.append(what))
+    before = signal.signal(signal.SIGINT, starting._end)
+    try:
+        with pytest.raises(KeyboardInterrupt), starting.raised_interrupts():
+            signal.raise_signal(signal.SIGINT)
+        assert ended == []
+        signal.raise_signal(signal.SIGINT)
+        assert ended == [(2, b"nlp-gait: interrupted\n"), 130]
+    finally:
+        signal.signal(signal.SIGINT, before)

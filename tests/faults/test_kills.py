@@ -1,19 +1,25 @@
-"""kill -9 at random moments in what is kept step by step; studies have their own test, and ``benchmarks/kill_and_resume.py``."""
+"""kill -9 at random moments in what is kept step by step; more: ``python -m benchmarks.faults.kill_and_resume``."""
 
 from __future__ import annotations
 
 import json
 import random
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from compare.cli import app
 from compare.study.steps import Steps
+from tests.compare.questions.test_resuming import without_times
 from tests.faults.processes import ROOT, start
 
+RUN = CliRunner()
+STEM = "walk12-sweep-step_length_m-ipopt"
 PROGRAM = """
 import sys, time
 from pathlib import Path
@@ -50,6 +56,30 @@ def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path)
     results = [steps(f"step-{n}", {"number": n}, lambda n=n: [n] * 20_000) for n in range(20)]
     assert results == [[n] * 20_000 for n in range(20)]
     assert sum("kept from an earlier run" in note for note in notes) == finished > 0
+
+
+@pytest.mark.slow
+def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path) -> None:
+    command = ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:6", "--starts", "2")
+    RUN.invoke(app, [*command, "--out", str(tmp_path / "undisturbed")])
+    killed, steps = tmp_path / "killed", tmp_path / "killed" / "steps"
+    for number, wanted in ((signal.SIGKILL, 3), (signal.SIGINT, 6)):
+        process = start(*command, "--out", str(killed))
+        while process.poll() is None and len(list(steps.glob("solve-*.json"))) < wanted:
+            time.sleep(0.001)
+        process.send_signal(number)
+        _, messages = process.communicate(timeout=60)
+        assert process.returncode == (-9 if number == signal.SIGKILL else 130), messages
+    *_, said = messages.splitlines()
+    assert said.startswith("nlp-gait: interrupted after") and said.endswith("; the same command continues")
+    done = RUN.invoke(app, [*command, "--out", str(killed)])
+    assert "steps were finished by an earlier call" in done.stderr
+    whole, resumed = (
+        without_times(json.loads((tmp_path / name / f"{STEM}.json").read_text())) for name in ("undisturbed", "killed")
+    )
+    assert resumed == whole and len(whole["points"]) == 6
+    names = [{path.name for path in (tmp_path / name / "steps").iterdir()} for name in ("undisturbed", "killed")]
+    assert names[0] == names[1]
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""One process or several, one thread or several: the same numbers; `python benchmarks/together.py` is the large version."""
+"""One process or several, one thread or several: the same numbers; more: `python -m benchmarks.faults.together`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from benchmarks import together
+from benchmarks.faults import together
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import GaitProblem
@@ -31,7 +31,7 @@ EXAMPLE = ROOT / "examples" / "bring_your_own.py"
 def test_threads_and_forked_processes_find_what_one_thread_does() -> None:
     # In a process of its own: forking the suite, with all its threads, is not what is tested.
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.together", "--problem", "walk12", "--solves", "4"],
+        [sys.executable, "-m", "benchmarks.faults.together", "--problem", "walk12", "--solves", "4"],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -1,6 +1,7 @@
 """Films of the simulated robot: what is recorded, laid out, captioned and drawn."""
 
 import os
+import signal
 import subprocess
 import sys
 from functools import partial
@@ -15,6 +16,7 @@ from nlp_gait.errors import InputError
 pytest.importorskip("mujoco")
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
+from nlp_gait.simulation.film import film  # noqa: E402
 from nlp_gait.simulation.film.caption import Captions, Strip  # noqa: E402
 from nlp_gait.simulation.film.film import picture_size  # noqa: E402
 from nlp_gait.simulation.film.recording import recorded  # noqa: E402
@@ -70,6 +72,28 @@ def test_a_recording_has_a_state_and_numbers_at_every_picture(recording):
     weight_N = record.model.body_mass.sum() * plan.gravity
     np.testing.assert_allclose(record.load[1:], weight_N, rtol=0.1)  # at first nothing has touched down
     assert np.linalg.norm(record.pressure - record.planned, axis=1)[during].max() < 0.03
+
+
+@pytest.mark.slow
+def test_ctrl_c_waits_for_the_end_of_a_picture(recording, monkeypatch):
+    drawn = []
+
+    class Interrupted:
+        def __init__(self, recording, views, width, height):
+            self.size = (height, width, 3)
+
+        def picture(self, k):
+            signal.raise_signal(signal.SIGINT)
+            drawn.append(k)
+            return np.zeros(self.size, dtype=np.uint8)
+
+        def close(self):
+            drawn.append("closed")
+
+    monkeypatch.setattr(film, "Stage", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(film.pictures([recording[1]], (320, 240)))
+    assert drawn == [0, "closed"]
 
 
 @pytest.mark.slow

@@ -46,9 +46,10 @@ def support(plan: Plan) -> Support:
 
 
 @pytest.fixture(scope="module")
-def shared(plan: Plan) -> Plan:
-    """Every sample on its own."""
-    return share_loads(plan, Sharing(period_s=1e-6))
+def shared(plan: Plan, support: Support) -> Plan:
+    """Every sample on its own: as many knots as samples."""
+    times = plan.signals.arrays["t"][support.first : support.last + 1]
+    return share_loads(plan, Sharing(period_s=(1 + 1e-9) * float(times[-1] - times[0]) / (len(times) - 1)))
 
 
 def power(plan: Plan) -> Array:

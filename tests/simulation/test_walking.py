@@ -13,7 +13,7 @@ import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, Signals, finely_sampled
-from nlp_gait.problem.steps import step_of, walk
+from nlp_gait.problem.motion.steps import step_of, walk
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over

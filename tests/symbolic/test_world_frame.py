@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from benchmarks.bounds import errors
+from benchmarks.guarantees.bounds import errors
 from nlp_gait.problems.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compare.cli.common import end_interrupted, print_result, print_table, stdout
+from compare.cli.common import end_interrupted, print_result, print_table, say, stdout
 from compare.cli.options import RESULTS, AsJson
 from nlp_gait.backends.interrupts import deferred_interrupts
 from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
     from compare.questions.answer import Answer
+    from compare.questions.kept import Finished
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,16 +29,19 @@ class Output:
         """Refuse a folder that cannot be written to."""
         writable_folder(self.out)
 
-    def take(self, answer: Answer, stopped: str = "") -> None:
+    def take(self, answer: Answer, stopped: str = "", finished: Finished | None = None) -> None:
         """Write an answer and print it, as one JSON object or in tables and sentences.
 
         Args:
             answer: what was found.
             stopped: sentence on where the work was interrupted, if it was; the command ends with it.
+            finished: what was kept on the way, of which an earlier call's part is said.
 
         Raises:
             OutputError: a file cannot be written; the answer is printed all the same.
         """
+        if finished is not None and finished.sentence:
+            say(finished.sentence)
         written: list[Path] = []
         with deferred_interrupts() as pressed:  # it takes a moment; pressed again, Ctrl-C does not wait
             try:
@@ -45,7 +49,9 @@ class Output:
             finally:
                 print_result(self.as_json, answer.data, written, lambda: _print(answer))
         if stopped or pressed():
-            end_interrupted(f"{stopped or 'interrupted at the end'}; what was found is in {self.out}")
+            end_interrupted(
+                f"{stopped or 'interrupted at the end'}; what was found is in {self.out}; the same command continues"
+            )
 
 
 def _print(answer: Answer) -> None:

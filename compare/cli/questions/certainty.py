@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import print_json, progress_bar, stdout
+from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AnyProblem, AsJson, Seed
 from compare.cli.questions.answers import Output
@@ -57,6 +57,7 @@ def certainty(
             tolerance=tolerance,
             time_limit_s=time_limit,
             seed=seed,
+            anew=say,
             progress=advance,
         )
     output.take(certainty_answer(study))

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import fail, progress_bar
+from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import interruptible
 from compare.cli.options import Seed, names_in
 from compare.cli.questions.answers import Output
@@ -35,14 +35,16 @@ def motions(
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """
+    from compare.questions.kept import Finished
     from compare.questions.motions.report import motions_answer
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
 
     study = tasks(problem, orders=names_in(orders), free_orders=names_in(free_orders), robot=robot, starts=starts)
+    finished = Finished(output.out, say)
     with interruptible(output.out), progress_bar("motions", len(study)) as advance:
-        found = run(study, output.out, seed=seed, progress=advance)
-    output.take(motions_answer(found, problem))
+        found = run(study, output.out, seed=seed, finished=finished, progress=advance)
+    output.take(motions_answer(found, problem), finished=finished)
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))

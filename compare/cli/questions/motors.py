@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import fail, progress_bar
+from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import NaoPhase, Seed
 from compare.cli.questions.answers import Output
@@ -25,13 +25,18 @@ def motors(
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """
+    from compare.questions.kept import Finished
     from compare.questions.motors.report import motors_answer
     from compare.questions.motors.study import VARIANTS, motor_variants
 
     spec = problem.spec()
     with progress_bar("variants", len(VARIANTS)) as advance:
-        found, stopped = until_interrupted(lambda: motor_variants(spec, starts=starts, seed=seed, progress=advance))
-    output.take(motors_answer(found, spec.load()), stopped)
+        finished = Finished(output.out, say)
+        found, stopped = until_interrupted(
+            lambda: motor_variants(spec, starts=starts, seed=seed, finished=finished, progress=advance),
+            folder=output.out,
+        )
+    output.take(motors_answer(found, spec.load()), stopped, finished)
     failed = [variant for variant in found if not variant.success]
     if failed:
         fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import progress_bar
+from compare.cli.common import progress_bar, say
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AsJson, NamedProblem, Seed
 from compare.cli.questions.answers import Output
@@ -47,6 +47,7 @@ def pareto(
 
     Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --objectives power,dbm_y_mean,speed`
     """
+    from compare.questions.kept import Finished
     from compare.questions.pareto.competing import parse_objectives
     from compare.questions.pareto.report import front_answer
     from compare.questions.pareto.study import pareto_study, parse_searches
@@ -59,9 +60,12 @@ def pareto(
         raise InputError("three objectives are traded without searches; leave out --search")
     output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
-    with interruptible(None if three else out), progress_bar("front", None) as advance:
+    finished = Finished(out, say)
+    with interruptible(out), progress_bar("front", None) as advance:
         if three:
-            surface = pareto_surface(loaded, names, points=points, starts=starts, seed=seed, progress=advance)
+            surface = pareto_surface(
+                loaded, names, points=points, starts=starts, seed=seed, finished=finished, progress=advance
+            )
             answer = surface_answer(surface)
         else:
             study = pareto_study(
@@ -73,7 +77,8 @@ def pareto(
                 searches=searches,
                 runs=runs,
                 seed=seed,
+                finished=finished,
                 progress=advance,
             )
             answer = front_answer(study, loaded)
-    output.take(answer)
+    output.take(answer, finished=finished)

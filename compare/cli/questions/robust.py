@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, progress_bar
+from compare.cli.common import end_interrupted, progress_bar, say
+from compare.cli.interrupts import kept_in
 from compare.cli.options import NaoPhase, Seed
 from compare.cli.questions.answers import Output
 
@@ -30,6 +31,7 @@ def robust(
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """
+    from compare.questions.kept import Finished
     from compare.questions.robust.playback import Played, played
     from compare.questions.robust.report import robust_answer
     from compare.questions.robust.study import Robust, boxes
@@ -41,16 +43,29 @@ def robust(
         mujoco()
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
+    finished = Finished(output.out, say)
+    finished.asked("robust", spec.load(), mass=mass, sole=sole, starts=starts, seed=seed, samples=samples)
     found: list[Robust] = []
     runs: tuple[Played, ...] = ()
     stopped = ""
     try:
         with progress_bar("steps", None) as advance:
             for name, box in uncertain.items():
-                found.append(find(spec, name, box, starts=starts, seed=seed, samples=samples, progress=advance))
-            runs = played(spec, found[-1], advance) if simulate else ()
+                found.append(
+                    find(
+                        spec,
+                        name,
+                        box,
+                        starts=starts,
+                        seed=seed,
+                        samples=samples,
+                        finished=finished,
+                        progress=advance,
+                    )
+                )
+            runs = played(spec, found[-1], finished, advance) if simulate else ()
     except KeyboardInterrupt:
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
-            end_interrupted(f"{stopped}; nothing was written")
-    output.take(robust_answer(problem.name, found, runs), stopped)
+            end_interrupted(f"{stopped}; {kept_in(output.out)}")
+    output.take(robust_answer(problem.name, found, runs), stopped, finished)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, progress_bar
+from compare.cli.common import end_interrupted, progress_bar, say
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import Evaluations, NamedProblem, Seed
 from compare.cli.questions.answers import Output
@@ -26,8 +26,11 @@ def sweep(
 ) -> None:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
 
+    Called again after a kill or Ctrl-C, it continues where it stopped.
+
     Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
     """
+    from compare.questions.kept import Finished
     from compare.questions.sweep.report import sweep_answer
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
@@ -35,6 +38,7 @@ def sweep(
 
     spec = problem.spec()
     axes = [parse_axis(text) for text in over]
+    finished = Finished(output.out, say)
     with progress_bar("solves", count_solves(axes, algorithm)) as advance:
         points, stopped = until_interrupted(
             lambda: run_sweep(
@@ -44,10 +48,12 @@ def sweep(
                 starts=starts,
                 evaluations=evaluations,
                 seed=seed,
+                finished=finished,
                 progress=advance,
-            )
+            ),
+            folder=output.out,
         )
-    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title))
+    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title), finished=finished)
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
-        end_interrupted(f"{stopped}; these are in {output.out}{not_twice}")
+        end_interrupted(f"{stopped}; these are in {output.out}{not_twice}; the same command continues")

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import fail, progress_bar
+from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import CycleOptions, DriveOptions, Seed
 from compare.cli.questions.answers import Output
+
+if TYPE_CHECKING:
+    from compare.questions.walk.planners import Rival
 
 
 @command
@@ -25,6 +28,12 @@ def walk(
         bool, typer.Option("--engine", help="Play ten steps of each gait in MuJoCo (extra sim): is the model right?")
     ] = False,
     steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Play this many; 0 plays none.")] = None,
+    baseline: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Planner beside the cheapest gaits, on their footsteps: cart-table, least-torque; repeatable."
+        ),
+    ] = None,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     servos: DriveOptions,
@@ -34,12 +43,15 @@ def walk(
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
     The problem is nao-cycle with the power as its objective; each point starts from its neighbours. Played is in open loop unless
-    a feedback is named.
+    a feedback is named. Called again after a kill or Ctrl-C, it continues where it stopped.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
+    `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
+    from compare.questions.kept import Finished
     from compare.questions.sweep.study import count_solves, parse_axis
+    from compare.questions.walk.planners import checked_planners, rivals
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLE, optimal_gaits, played
     from compare.study.engine import STEPS
@@ -49,20 +61,41 @@ def walk(
     steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
         mujoco()  # if it is missing, say so before the work
-    axis = parse_axis(over)
+    axis, planners = parse_axis(over), checked_planners(baseline or ())
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
+    finished = Finished(output.out, say)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(
-            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, progress=advance)
+            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, finished=finished, progress=advance),
+            folder=output.out,
         )
     if steps and not stopped:
         try:
             with progress_bar("walks", len(gaits)) as advance:
                 for i, gait in enumerate(gaits):
-                    gaits[i] = played(spec, gait, steps, drive)
+                    gaits[i] = played(spec, gait, steps, drive, finished)
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
-    output.take(walk_answer(spec, gaits), stopped)
+    others: list[Rival] = []
+    if planners and not stopped:
+        try:
+            with progress_bar("planners", len(planners) * len(gaits)) as advance:
+                others.extend(
+                    rivals(
+                        spec,
+                        gaits,
+                        planners,
+                        starts=starts,
+                        seed=seed,
+                        steps=steps,
+                        drive=drive,
+                        finished=finished,
+                        progress=advance,
+                    )
+                )
+        except KeyboardInterrupt:
+            stopped = "interrupted while other planners planned"
+    output.take(walk_answer(spec, gaits, others), stopped, finished)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)

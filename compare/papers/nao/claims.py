@@ -83,7 +83,7 @@ def _higher_hip(phase: PhaseFindings) -> Claim:
         verdict=f"holds in our model by {saved:.0f} %" if _falls(sweep) else FAILS,
         evidence=f"optimum {low.power_W:.4f} W with the hip at {low.at:.4f} m, {high.power_W:.4f} W at "
         f"{high.at:.4f} m, {'falling all the way' if _falls(sweep) else 'not falling all the way'}; at the upper bound "
-        f"one millimetre more is worth {-price:.2f} mW",
+        f"one millimetre more is worth {-price:z.2f} mW",
     )
 
 
@@ -123,7 +123,7 @@ def _swing_plateau(findings: Findings) -> Claim:
     return Claim(
         section="5.1.5",
         text="A swing height of 0.024 m costs 2.6 % more than one of 0.015 m (PSO; 27.9 % with GA)",
-        verdict=f"holds in our model by {price:.1f} %, whatever the algorithm",
+        verdict=f"holds in our model by {price:z.1f} %, whatever the algorithm",
         evidence=f"optimum {_swing_power(findings, 0.015):.5f} W at 0.015 m, {_swing_power(findings, 0.024):.5f} W at 0.024 m; "
         "the difference between PSO and GA is one of search histories, not of gaits",
     )
@@ -136,7 +136,7 @@ def _swing_rise(findings: Findings) -> Claim:
     return Claim(
         section="5.1.5",
         text=f"Beyond 0.024 m power rises steeply: at 0.028 m by {claimed[0]:.0f} % (PSO) and {claimed[1]:.0f} % (GA)",
-        verdict=f"holds in our model by {true:.1f} %" if steep else FAILS,
+        verdict=f"holds in our model by {true:z.1f} %" if steep else FAILS,
         evidence=f"the true price of 0.028 m is {true:.1f} % ({_swing_power(findings, 0.028):.5f} W); the printed rise is read "
         "off search histories, which hold few and poor solutions there (see the table of swing heights)",
     )
@@ -152,13 +152,13 @@ def _velocity(findings: Findings, claimed: VelocityRange) -> Claim:
     good = bool(np.all((claimed.low <= optimum) & (optimum <= claimed.high)))
     ranges = [phase.range_within(i, NEARLY_OPTIMAL) for i in claimed.variables]
     named = zip(symbols, optimum, ranges, strict=True)
-    found = ", ".join(f"{name} = {best:.4f} ({low:.4f} to {high:.4f})" for name, best, (low, high) in named)
+    found = ", ".join(f"{name} = {best:z.4f} ({low:z.4f} to {high:z.4f})" for name, best, (low, high) in named)
     return Claim(
         section=claimed.section,
         text=f"In {phase.paper.title} the solutions have {' and '.join(symbols)} from {claimed.low:g} to {claimed.high:g} m/s",
         verdict=f"holds in our model by {100 * within:.0f} % of the values at the ends of all runs" if good else FAILS,
         evidence=f"IPOPT's optimum, and where it costs less than {100 * NEARLY_OPTIMAL:.0f} % more: {found} m/s; the runs end "
-        f"between {ends.min():.4f} and {ends.max():.4f} m/s, {100 * within:.0f} % of the values within the range",
+        f"between {ends.min():z.4f} and {ends.max():z.4f} m/s, {100 * within:.0f} % of the values within the range",
     )
 
 

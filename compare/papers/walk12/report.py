@@ -138,7 +138,7 @@ def _errata(findings: Findings) -> dict[str, Any]:
     (corner,) = findings.runs["corner", IPOPT]
     free = [best(findings.runs[f"moment-free-{weight:g}", IPOPT]) for weight in MOMENT_FREE_WEIGHTS]
     return {
-        "f1_change": {zmp: f"{low:+.2f} % to {high:+.2f} %" for zmp, (low, high) in changes.items()},
+        "f1_change": {zmp: f"{low:+z.2f} % to {high:+z.2f} %" for zmp, (low, high) in changes.items()},
         "free": objectives(free),
         "hip_miss_mm": 1e3 * hip_miss(),
         "corner_slopes": corner_slopes(),

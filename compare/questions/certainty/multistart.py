@@ -46,6 +46,7 @@ def multistart(
     starts: int,
     seed: int = 0,
     solver: Solver | None = None,
+    anew: Progress | None = None,
     progress: Progress = unwatched,
 ) -> Ends:
     """Ends of a solver from random starts; batch k draws its start points from the seed and k, whatever ran before.
@@ -56,6 +57,7 @@ def multistart(
         starts: how many.
         seed: of the start points.
         solver: with its settings; None for IPOPT with its defaults.
+        anew: told of each batch that is made again, and why; None for ``progress``.
         progress: told of each batch when it begins and when it is done.
 
     Raises:
@@ -66,7 +68,7 @@ def multistart(
         raise InputError(f"starts must be at least 1, got {starts}")
     chosen = solver or IpoptSettings()
     ready = chosen.ready_for(problem, starts)
-    steps = Steps(out, progress, code=[sys.modules[__name__]])
+    steps = Steps(out, progress, code=[sys.modules[__name__]], anew=anew)
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
     rows: list[list[Any]] = []
     for k, first in enumerate(range(0, starts, BATCH)):

@@ -132,6 +132,7 @@ def certainty(
     tolerance: float = 0.01,
     time_limit_s: float = 600.0,
     seed: int = 0,
+    anew: Progress | None = None,
     progress: Progress = unwatched,
 ) -> Certainty:
     """Evidence by many starts, a long search and, for few variables, branch and bound; each step is kept under ``out``.
@@ -144,6 +145,7 @@ def certainty(
         tolerance: relative, of the certificate.
         time_limit_s: of the certificate [s]; 0 for none.
         seed: of starts and search.
+        anew: told of each step that is made again, and why; None for ``progress``.
         progress: told each step, and how far it is.
 
     Raises:
@@ -158,12 +160,12 @@ def certainty(
         )
     if evaluations:
         metaheuristics.algorithm("cma")
-    ends = multistart(problem, out, starts=starts, seed=seed, progress=progress)
+    ends = multistart(problem, out, starts=starts, seed=seed, anew=anew, progress=progress)
     optima = cluster(problem, ends)
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, progress, code=[boxes, branch_and_bound])
+    steps = Steps(out, progress, code=[boxes, branch_and_bound], anew=anew)
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:

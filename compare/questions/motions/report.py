@@ -52,7 +52,7 @@ def motions_answer(found: Sequence[Motion], problem: str) -> Answer:
                     "motion": title,
                     "variables": lambda m: str(m.variables),
                     "power [W]": lambda m: f"{m.power_W:.6f}",
-                    "saved [%]": lambda m: f"{100 * (1 - m.power_W / base):.2f}",
+                    "saved [%]": lambda m: f"{100 * (1 - m.power_W / base):z.2f}",
                     "IPOPT [s]": lambda m: f"{m.time_s:.1f}",
                     "iterations": lambda m: str(m.iterations),
                     "starts": lambda m: f"{m.converged}/{m.attempts}",
@@ -106,7 +106,7 @@ def sentences(found: Sequence[Motion]) -> list[str]:
             gains = ", ".join(
                 f"{name} {least.objectives[name]:.3g} to {value:.3g}" for name, value in m.objectives.items()
             )
-            said.append(f"{title(m)} costs {100 * (m.power_W / least.power_W - 1):.1f} % more power: {gains}")
+            said.append(f"{title(m)} costs {100 * (m.power_W / least.power_W - 1):z.1f} % more power: {gains}")
     return said
 
 

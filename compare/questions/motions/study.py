@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from compare.judge import evaluate
+from compare.questions.kept import Finished
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
 from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
@@ -19,6 +20,7 @@ from compare.study.steps import Steps
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problems.nao.curves import SPANS
@@ -73,39 +75,49 @@ class Motion:
         return sum("[" in name for name in self.x)
 
 
-def motions(study: Sequence[MotionTask], out: Path, *, seed: int = 0, progress: Progress = unwatched) -> list[Motion]:
+def motions(
+    study: Sequence[MotionTask],
+    out: Path,
+    *,
+    seed: int = 0,
+    finished: Finished | None = None,
+    progress: Progress = unwatched,
+) -> list[Motion]:
     """Solve all tasks; what an earlier call has finished is read from its file.
 
     Args:
         study: see ``tasks``.
         out: folder in which finished tasks are kept.
         seed: of the random starts.
+        finished: what an earlier call has finished of a task; None to keep nothing of an unfinished one.
         progress: told of each task when it is done.
 
     Raises:
         OutputError: a motion cannot be kept.
     """
-    steps = Steps(out, unwatched, code=[sys.modules[__name__]])
+    finished = finished or Finished()
+    steps = Steps(out, unwatched, code=[sys.modules[__name__]], anew=finished.anew)
+    solver = finished.solver(IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS))
     found: list[Motion] = []
     for task in study:
         problem = task.spec.load()
         x0 = _start(task, problem, found)
         start = None if x0 is None else x0.tolist()
         inputs = {**fingerprint(problem), "task": asdict(task), "seed": seed, "start": start}
-        kept = steps(f"{task.problem}-{task.label}", inputs, partial(_solved, task, problem, x0, seed))
+        kept = steps(f"{task.problem}-{task.label}", inputs, partial(_solved, task, problem, x0, seed, solver))
         found.append(decoded(Motion, kept))
         progress(task.label)
     return found
 
 
-def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int) -> dict[str, Any]:
+def _solved(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int, solver: Solver) -> dict[str, Any]:
     """A motion as plain data."""
     solution = solve(
         problem,
         starts=task.starts + 1,
         seed=seed,
         x0=None if x0 is None else np.clip(x0, problem.lower, problem.upper),
-        solver=IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS),
+        solver=solver,
     )
     x = problem.check_x(solution.x)
     verdict = evaluate(problem, x)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compare.questions.kept import Finished
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
@@ -76,7 +77,12 @@ class Variant:
 
 
 def motor_variants(
-    spec: ProblemSpec, *, starts: int = 10, seed: int = 0, progress: Progress = unwatched
+    spec: ProblemSpec,
+    *,
+    starts: int = 10,
+    seed: int = 0,
+    finished: Finished | None = None,
+    progress: Progress = unwatched,
 ) -> tuple[Variant, ...]:
     """Optimum under each variant.
 
@@ -84,6 +90,7 @@ def motor_variants(
         spec: a NAO phase, without the option ``motors``.
         starts: random starts of IPOPT for each.
         seed: of the starts.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told the name of each variant when it is solved.
 
     Raises:
@@ -95,13 +102,16 @@ def motor_variants(
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
     if "motors" not in inspect.signature(problem_maker(spec.called)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
+    finished = finished or Finished()
+    finished.asked("motors", published, starts=starts, seed=seed)
+    solver = finished.solver()
     limited = {rotor: spec.with_options(motors=f"limits{rotor}").load() for rotor in ("", ",rotor")}
     found: list[Variant] = []
     try:
         for name, features in VARIANTS.items():
             problem = spec.with_options(motors=features).load() if features else published
             first = published.check_x(found[0].x) if found else None
-            solution = solve(problem, starts=starts, seed=seed, x0=first)
+            solution = solve(problem, starts=starts, seed=seed, x0=first, solver=solver)
             x = problem.check_x(solution.x)
             unmoved = x if first is None else first
             moves = np.abs(x - unmoved) / problem.scale

@@ -13,6 +13,7 @@ from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from compare.study.progress import Progress, unwatched
 from metaheuristics.array import Array
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
@@ -103,6 +104,7 @@ def challenge(
     criterion: CompetingObjective,
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
+    solver: Solver | None = None,
     progress: Progress = unwatched,
 ) -> Challenge:
     """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
@@ -114,6 +116,7 @@ def challenge(
         criterion: beside power.
         front: the true one, as far as it is known.
         points: of searches.
+        solver: with its settings; None for IPOPT with its defaults.
         progress: told the point.
     """
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
@@ -128,7 +131,7 @@ def challenge(
             continue
         near = front[int(np.argmin(np.abs(values - point.value)))]
         at = min(point.value, front[-1].value)
-        of_front, of_search = (point_at(free, criterion, at, np.array(start.x)) for start in (near, point))
+        of_front, of_search = (point_at(free, criterion, at, np.array(start.x), solver) for start in (near, point))
         candidates = [p for p in (of_front, of_search) if p is not None]
         if not candidates:
             excess.append(exact.cost / near.power_W - 1.0 if near.value >= point.value else -np.inf)

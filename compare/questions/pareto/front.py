@@ -120,11 +120,13 @@ def pareto_front(
     return nondominated([p for at in sorted(found) if (p := _point(free, criterion, at, found[at])) is not None])
 
 
-def point_at(free: GaitProblem, criterion: CompetingObjective, least: float, x0: Array) -> FrontPoint | None:
+def point_at(
+    free: GaitProblem, criterion: CompetingObjective, least: float, x0: Array, solver: Solver | None = None
+) -> FrontPoint | None:
     """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
     limited = criterion.limited(free, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
-    return _point(free, criterion, least, [IpoptSettings().ready_for(free, SOLVES).run(limited, x0)])
+    return _point(free, criterion, least, [(solver or IpoptSettings()).ready_for(free, SOLVES).run(limited, x0)])
 
 
 def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:

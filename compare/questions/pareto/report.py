@@ -45,10 +45,10 @@ def _tables(study: ParetoStudy) -> tuple[Table, Table]:
     criterion, front = study.criterion, study.front
     unit, per = criterion.unit, f"W per {criterion.unit}"
     picked = [front[i] for i in sorted({round(k * (len(front) - 1) / 9) for k in range(10)})]
-    points = [(f"{p.value:.5f} {unit}", f"{p.power_W:.5f} W", f"{p.price:.4g} {per}") for p in picked]
+    points = [(f"{p.value:z.5f} {unit}", f"{p.power_W:.5f} W", f"{p.price:.4g} {per}") for p in picked]
     title = f"Front of power against {criterion.name}, {len(front)} points, {len(picked)} shown"
     knees = [
-        (f"{k.value:.5f} {unit}", f"{k.power_W:.5f} W", f"{k.turn_deg:.0f} degrees")
+        (f"{k.value:z.5f} {unit}", f"{k.power_W:.5f} W", f"{k.turn_deg:z.0f} degrees")
         + (f"{k.price_before:.4g} {per}", f"{k.price_after:.4g} {per}")
         for k in study.bends.knees
     ]
@@ -78,7 +78,7 @@ def _searches(study: ParetoStudy) -> tuple[Table | str, ...]:
     return (
         text_table(header, rows, "Searches: median over runs (least to greatest)"),
         f"{outcome.points} points of the searches are bettered by no other; {outcome.solved} of these, the lowest, were solved "
-        f"for. The nearest is {100 * outcome.least_excess:+.4f} % above the least power at its {study.criterion.name}; "
+        f"for. The nearest is {100 * outcome.least_excess:+z.4f} % above the least power at its {study.criterion.name}; "
         f"{outcome.moved} of them moved the front, {outcome.infeasible} are infeasible for the exact functions",
     )
 

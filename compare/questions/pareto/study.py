@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from compare.questions.kept import Finished
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.compare import Challenge, Quality, challenge, quality
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
@@ -69,6 +70,7 @@ def pareto_study(
     searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
+    finished: Finished | None = None,
     progress: Progress = unwatched,
 ) -> ParetoStudy:
     """The front, and the searches beside it; finished steps are kept under ``out`` and not done again.
@@ -82,6 +84,7 @@ def pareto_study(
         searches: budgets by algorithm of pymoo; none for the front alone.
         runs: of each algorithm.
         seed: of starts and of the first run.
+        finished: what an earlier call has finished of a step; None to keep nothing of an unfinished one.
         progress: told what is done.
 
     Raises:
@@ -93,11 +96,17 @@ def pareto_study(
     for algorithm, budgets in searches.items():
         MultiObjective(algorithm=algorithm).check_budgets(budgets)  # before the front, which takes long
     free = beside.freed(problem)
-    steps = Steps(out, progress, code=[front_module])
+    finished = finished or Finished()
+    asked = {"searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
+    finished.asked("pareto", free, objectives=[name], points=points, starts=starts, seed=seed, **asked)
+    solver = finished.solver()
+    steps = Steps(out, progress, code=[front_module], anew=finished.anew)
     identity = {**fingerprint(free), "criterion": name}
 
     inputs = {**identity, "points": points, "starts": starts, "seed": seed}
-    solved = partial(pareto_front, problem, beside, points=points, starts=starts, seed=seed, progress=progress)
+    solved = partial(
+        pareto_front, problem, beside, points=points, starts=starts, seed=seed, solver=solver, progress=progress
+    )
     kept = steps(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
     front = [decoded(FrontPoint, point) for point in kept]
     found: list[SearchFront] = []
@@ -107,9 +116,8 @@ def pareto_study(
             free, beside, Scale(front), out, searches=searches, runs=runs, seed=seed, progress=progress
         )
         best = best_of_all(found)
-        asked = {**inputs, "searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
-        answered = partial(challenge, free, beside, front, best, progress=progress)
-        outcome = decoded(Challenge, steps(f"challenge-{name}", asked, lambda: asdict(answered())))
+        answered = partial(challenge, free, beside, front, best, solver, progress)
+        outcome = decoded(Challenge, steps(f"challenge-{name}", {**inputs, **asked}, lambda: asdict(answered())))
         front = list(outcome.front)
     return ParetoStudy(
         problem=free,

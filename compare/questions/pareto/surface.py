@@ -15,6 +15,7 @@ from matplotlib.figure import Figure as Drawing
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer
+from compare.questions.kept import Finished
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import front_ends
 from compare.report.document import Figure
@@ -68,6 +69,7 @@ def pareto_surface(
     points: int,
     starts: int,
     seed: int,
+    finished: Finished | None = None,
     progress: Progress = unwatched,
 ) -> Surface:
     """Least power over a square grid of at least this many points, from the cheapest values of both criteria to the largest.
@@ -78,18 +80,22 @@ def pareto_surface(
         points: least number of pairs of demands.
         starts: random starts at both ends of the walk over the grid.
         seed: of these.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told after each solve.
     """
     first, second = (competing_objective(name, problem) for name in names)
     free = second.freed(first.freed(problem))
+    finished = finished or Finished()
+    finished.asked("pareto", free, objectives=list(names), points=points, starts=starts, seed=seed)
+    solver = finished.solver()
     side = math.ceil(math.sqrt(points))
     grids = []
     for beside in (first, second):
-        low, high = front_ends(free, beside, starts, seed)
+        low, high = front_ends(free, beside, starts, seed, solver)
         grids.append(np.linspace(low.value, high.value, side).tolist())
     walk = [(a, b) for row, b in enumerate(grids[1]) for a in (grids[0] if row % 2 == 0 else reversed(grids[0]))]
     limited = [second.limited(first.limited(free, a), b) for a, b in walk]
-    solutions = solve_both_ways(limited, starts=starts, seed=seed, progress=lambda: progress("surface"))
+    solutions = solve_both_ways(limited, starts=starts, seed=seed, solver=solver, progress=lambda: progress("surface"))
     found, infeasible = [], []
     for at, solution in zip(walk, solutions, strict=True):
         if not solution.success:

@@ -70,9 +70,9 @@ def _row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
     furthest = price.furthest(ranges)
     moves = "no derivative" if price.x is None else "-" if furthest is None else f"{furthest[0]} {furthest[1]:+.3g}"
     down, up = (value / price.step for value in price.reach)
-    steps = ("-", "-") if price.one_step is None else ("none" if v is None else f"{v:+.5f}" for v in price.one_step)
+    steps = ("-", "-") if price.one_step is None else ("none" if v is None else f"{v:+z.5f}" for v in price.one_step)
     line = f"{down:+.2g} to {up:+.2g}"
-    return (price.name, price.words, f"{price.per_step:+.5f}", *steps, _agreement(price), moves, line)
+    return (price.name, price.words, f"{price.per_step:+z.5f}", *steps, _agreement(price), moves, line)
 
 
 def _agreement(price: Price) -> str:

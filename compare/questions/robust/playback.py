@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
+from compare.questions.kept import Finished
 from compare.questions.robust.study import Robust
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
-from nlp_gait.problem import Array, Result
+from nlp_gait.decoding import decoded
+from nlp_gait.files import without_nan
+from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import averaged_pressure
 from nlp_gait.simulation.plan import SIDES, Plan, plan_of
@@ -40,8 +46,10 @@ class Played:
     predicted_margin_m: float
 
 
-def played(spec: ProblemSpec, found: Robust, progress: Progress = unwatched) -> tuple[Played, ...]:
-    """Both gaits on every robot of the scenario problem; ``progress`` is told of each.
+def played(
+    spec: ProblemSpec, found: Robust, finished: Finished | None = None, progress: Progress = unwatched
+) -> tuple[Played, ...]:
+    """Both gaits on every robot of the scenario problem; ``progress`` is told of each. What is finished is not played again.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -49,18 +57,21 @@ def played(spec: ProblemSpec, found: Robust, progress: Progress = unwatched) -> 
     runs = []
     for robot in found.robots:
         for gait, x in (("nominal", found.nominal_x), ("robust", found.x)):
-            runs.append(_play(spec, robot, gait, x))
+            problem = spec.with_options(robot=robot).load()
+            inputs = {**fingerprint(problem), "gait": gait, "x": dict(x)}
+            kept = (finished or Finished()).step("play", inputs, partial(_play, problem, robot, gait, x))
+            runs.append(decoded(Played, kept))
             progress(f"{gait} gait on {robot[:40]}")
     return tuple(runs)
 
 
-def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> Played:
-    problem = spec.with_options(robot=robot).load()
+def _play(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> dict[str, Any]:
+    """What was measured, as plain data."""
     point = problem.check_x(x)
     plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
     trace = play(plan, drive=drive)
     during = trace.t <= plan.duration_s
-    return Played(
+    run = Played(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,
@@ -68,6 +79,7 @@ def _play(spec: ProblemSpec, robot: str, gait: str, x: Mapping[str, float]) -> P
         margin_m=lateral_margin(plan, averaged_pressure(trace, drive.period_s)[during, 1]),
         predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
     )
+    return dict(without_nan(asdict(run)))
 
 
 def lateral_margin(plan: Plan, y: Array) -> float:

@@ -61,7 +61,7 @@ def _prices(found: Sequence[Robust]) -> Table:
             "uncertain": lambda r: r.name,
             "nominal gait breaks": lambda r: _violation(r.nominal_worst),
             "robust gait, nominal robot": lambda r: f"{r.power_W:.6f} W",
-            "price": lambda r: f"{r.power_W - r.nominal_W:+.6f} W, {r.power_W / r.nominal_W - 1.0:+.2%}",
+            "price": lambda r: f"{r.power_W - r.nominal_W:+z.6f} W, {r.power_W / r.nominal_W - 1.0:+z.2%}",
             "worst corner": lambda r: f"{r.worst_W:.6f} W",
             "robust gait breaks: scenarios": lambda r: _violation(r.worst),
             "random corners": lambda r: _violation(r.random_worst),

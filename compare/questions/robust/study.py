@@ -12,15 +12,21 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from compare.questions.kept import Finished
 from compare.questions.robust.family import Box, Corner, Family, Worst
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
+from nlp_gait.files import without_nan
 from nlp_gait.problem.solution import Solution
 from nlp_gait.problem.worst_case import worst_case
 
@@ -88,6 +94,7 @@ def robust(
     starts: int = 10,
     seed: int = 0,
     samples: int = 20,
+    finished: Finished | None = None,
     progress: Progress = unwatched,
 ) -> Robust:
     """Robust optimum over a box of robots.
@@ -99,11 +106,24 @@ def robust(
         starts: random starts of the nominal problem.
         seed: of the starts and of the random corners.
         samples: random corners on which the robust optimum is checked.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told each step when it begins.
     """
+    finished = finished or Finished()
+    asked = {"box": dict(box), "name": name, "starts": starts, "seed": seed, "samples": samples}
+
+    def found() -> dict[str, Any]:
+        return dict(without_nan(asdict(_found(spec, name, box, starts, seed, samples, finished.solver(), progress))))
+
+    return decoded(Robust, finished.step("box", {**fingerprint(spec.load()), **asked}, found))
+
+
+def _found(
+    spec: ProblemSpec, name: str, box: Box, starts: int, seed: int, samples: int, solver: Solver, progress: Progress
+) -> Robust:
     family = Family(spec, box)
     progress(f"{name}: nominal optimum")
-    nominal = solve(family.nominal, starts=starts, seed=seed)
+    nominal = solve(family.nominal, starts=starts, seed=seed, solver=solver)
     _require(nominal, "the nominal problem")
     first = x = family.nominal.check_x(nominal.x)
     corners: list[Corner] = [family.centre]
@@ -115,7 +135,7 @@ def robust(
             settled = True
             break
         corners += worse
-        found = solve(worst_case([family.problem(corner) for corner in corners]), x0=x)
+        found = solve(worst_case([family.problem(corner) for corner in corners]), x0=x, solver=solver)
         _require(found, f"{len(corners)} scenarios together ({name})")
         x = family.nominal.check_x(found.x)
     rng = np.random.default_rng(seed)

@@ -6,12 +6,14 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from functools import partial
+from typing import Any, cast
 
 import numpy as np
 
+from compare.questions.kept import Finished
 from compare.study.progress import Progress, unwatched
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, record_from
 from compare.study.runner import attempt, run_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
@@ -86,6 +88,7 @@ def sweep(
     starts: int = 5,
     evaluations: int = 10_000,
     seed: int = 0,
+    finished: Finished | None = None,
     progress: Progress = unwatched,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
@@ -100,6 +103,7 @@ def sweep(
         starts: random starts of an NLP solver at both ends of its walk, and where no neighbour helps.
         evaluations: budget of a search run, and of a run of SLSQP.
         seed: of starts and searches.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told of each solve, ``count_solves`` times.
 
     Raises:
@@ -116,13 +120,16 @@ def sweep(
     specs = [replace(spec, values=dict(placed(problem, at).values)) for at in walk]  # all checked before the work
     tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
     check_task(tasks[0])
+    finished = finished or Finished()
+    asked = {axis.name: list(axis.values) for axis in axes}
+    finished.asked("sweep", problem, over=asked, algorithm=algorithm, starts=starts, evaluations=evaluations, seed=seed)
     ends: Sequence[Solution | RunRecord | None]
     sentence = ""
     try:
         if tasks[0].is_search:
-            ends = _searched(tasks, progress)
+            ends = _searched(tasks, finished, progress)
         else:
-            problems, solver = [s.load() for s in specs], tasks[0].solver()
+            problems, solver = [s.load() for s in specs], finished.solver(tasks[0].solver())
             ends = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
     except Interrupted as interrupt:
         ends, sentence = cast("list[Solution | RunRecord | None]", interrupt.partial), interrupt.sentence
@@ -166,19 +173,23 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
     return points
 
 
-def _searched(tasks: Sequence[Task], progress: Progress) -> list[RunRecord]:
+def _searched(tasks: Sequence[Task], finished: Finished, progress: Progress) -> list[RunRecord]:
     """Records along the walk; an interrupt carries those that were made until then."""
     records: list[RunRecord] = []
     try:
         for task in tasks:
-            with remembered_interrupts() as check:
-                record = attempt(task) if task.is_own_code else run_task(task)
-                progress("")
-                check()
-            records.append(record)
+            records.append(record_from(finished.step("search", task.definition(), partial(_run, task))))
+            progress("")
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted after {len(records)} of {len(tasks)} points", records) from None
     return records
+
+
+def _run(task: Task) -> dict[str, Any]:
+    with remembered_interrupts() as check:
+        record = attempt(task) if task.is_own_code else run_task(task)
+        check()
+    return record.to_json()
 
 
 def _point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:

@@ -6,11 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
+from compare.questions.kept import Finished
 from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.decoding import decoded
+from nlp_gait.files import without_nan
 from nlp_gait.problem import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import plan_of
@@ -52,7 +56,13 @@ class Gait:
 
 
 def optimal_gaits(
-    spec: ProblemSpec, axis: Axis, *, starts: int, seed: int, progress: Progress = unwatched
+    spec: ProblemSpec,
+    axis: Axis,
+    *,
+    starts: int,
+    seed: int,
+    finished: Finished | None = None,
+    progress: Progress = unwatched,
 ) -> list[Gait]:
     """Optimal cycle at every point of an axis, each from its neighbours, there and back.
 
@@ -61,6 +71,7 @@ def optimal_gaits(
         axis: parameter or variable.
         starts: random starts of IPOPT at both ends, and where no neighbour helps.
         seed: of these starts.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told of each solve, twice for each point.
 
     Raises:
@@ -73,21 +84,35 @@ def optimal_gaits(
         return [Gait(found=point, indexes=own) for point, own in zip(points, indexes, strict=True)]
 
     try:
-        return gaits(sweep(spec, [axis], starts=starts, seed=seed, progress=progress))
+        return gaits(sweep(spec, [axis], starts=starts, seed=seed, finished=finished, progress=progress))
     except Interrupted as interrupt:
         raise Interrupted(interrupt.sentence, gaits(cast("list[SweepPoint]", interrupt.partial))) from None
 
 
-def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive) -> Gait:
-    """The gait with a playback of this many steps; unchanged where no feasible gait was found.
+def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive, finished: Finished | None = None) -> Gait:
+    """The gait with a playback of this many steps, taken from what is finished; unchanged where no feasible gait was found.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
     if not gait.found.feasible:
         return gait
-    plan = plan_of(result_of(spec, gait.found), steps)
-    return replace(gait, walk=measure_walk(plan, play(plan, drive=drive), drive, steps))
+    return replace(gait, walk=walked(result_of(spec, gait.found), steps, drive, finished or Finished()))
+
+
+def walked(gait: Result, steps: int, drive: Drive, finished: Finished) -> Walk:
+    """How so many steps of a gait fare in the engine, taken from what is finished.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    inputs = {**fingerprint(gait.problem), "x": gait.x.tolist(), "steps": steps, "drive": repr(drive)}
+
+    def measured() -> dict[str, Any]:
+        plan = plan_of(gait, steps)
+        return dict(without_nan(asdict(measure_walk(plan, play(plan, drive=drive), drive, steps))))
+
+    return decoded(Walk, finished.step("walk", inputs, measured))
 
 
 def result_of(spec: ProblemSpec, point: SweepPoint) -> Result:

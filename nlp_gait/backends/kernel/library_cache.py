@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
+from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import CompilerError
 from nlp_gait.files import refusing, temporary_folder
 
@@ -31,15 +32,20 @@ SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
 def load_library(
-    source: str, compiler: Compiler, flags: Sequence[str], symbols: Sequence[str]
+    source: str,
+    compiler: Compiler,
+    flags: Sequence[str],
+    symbols: Sequence[str],
+    written: Callable[[], str] | None = None,
 ) -> tuple[ctypes.CDLL, Path]:
     """Library of a C++ source, from the cache if a good one is there, else built now.
 
     Args:
-        source: C++.
+        source: C++; or all that it depends on, where another function writes it.
         compiler: that builds it.
         flags: of the compiler.
         symbols: functions that the library must have.
+        written: that function, which is called only if there is no good library.
 
     Returns:
         The loaded library and its file.
@@ -48,18 +54,17 @@ def load_library(
         CompilerError: the compiler fails, or what it built cannot be loaded.
     """
     key = _key(source, compiler, flags)
-    folders = [cache_folder(), *_private_folder_made()]
-    for library in [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]:
+    for library in _found(key):
         loaded = _load(library, symbols)
         if loaded is not None:
             return loaded, library
     with temporary_folder("nlp-gait-build-", CompilerError) as workshop:
-        written, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
+        file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
         try:
-            written.write_text(source, encoding="utf-8")
+            file.write_text(source if written is None else written(), encoding="utf-8")
         except OSError as error:
             raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
-        compiler.build(written, built, flags)
+        compiler.build(file, built, flags)
         library = _stored(built, key)
     loaded = _load(library, symbols)
     if loaded is None:
@@ -67,17 +72,28 @@ def load_library(
     return loaded, library
 
 
+def is_cached(source: str, compiler: Compiler, flags: Sequence[str]) -> bool:
+    """Whether there is a library of a source, for arguments of ``load_library``."""
+    return bool(_found(_key(source, compiler, flags)))
+
+
+def _found(key: str) -> list[Path]:
+    folders = [cache_folder(), *_private_folder_made()]
+    return [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]
+
+
 def _stored(built: Path, key: str) -> Path:
     """Where a new library was put: the first folder that takes it, under its final name at once."""
     name = f"{key}-{_digest(built)}{SUFFIX}"
-    for make_folder in (cache_folder, _private_folder):
-        folder = make_folder()
+    for place in (cache_folder, _private_folder):
+        folder = place()
         try:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
                 copy = Path(landing) / name
                 shutil.copyfile(built, copy)
                 copy.chmod(0o600)  # whatever the user's mask is
-                os.replace(copy, folder / name)  # never written in place: another library of that name may be in use
+                flush(copy)
+                rename(copy, folder / name)  # never written in place: another library of that name may be in use
             return folder / name
         except OSError as error:
             _warn_once(
@@ -99,7 +115,7 @@ def cache_folder() -> Path:
     try:
         if base.parts[0] == "~":
             base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_folder(base, mode=0o700)
         reason = _distrust(base, stat.S_ISDIR)
     except (OSError, RuntimeError) as error:
         reason = str(error)

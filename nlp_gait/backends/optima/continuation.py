@@ -10,6 +10,7 @@ from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
 from nlp_gait.backends.solve import solution_of
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.backends.starts import run_starts
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Outcome, Solution
 
@@ -59,7 +60,7 @@ class Continuation:
         if best_success(outcomes) is None and not in_vain and (near is None or not earlier):
             rng = np.random.default_rng(self._seed)
             points = [problem.start_point(rng) for _ in range(self._starts)]
-            outcomes += [solver.run(problem, x0, stop) for x0 in points if not stop()]
+            outcomes += run_starts(solver, problem, points, stop)
         self._neighbour = best_success([*earlier, *outcomes]) or near
         return outcomes
 

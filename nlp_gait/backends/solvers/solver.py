@@ -40,6 +40,10 @@ class Solver(Protocol):
         """A run that starts warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
         return None
 
+    def settled(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        """The same solver with every setting that ``ready_for`` would choose by the problem and the number of runs."""
+        return self
+
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Solver:
         """The same solver, checked and made ready for a number of runs of a problem and its copies."""
         self.check(problem)

@@ -1,4 +1,4 @@
-"""What a phase minimises: mean electrical power as in the paper, or the smoothness of its motion."""
+"""What a phase minimises: mean electrical power as in the paper, or its torques, or the smoothness of its motion."""
 
 from __future__ import annotations
 
@@ -29,37 +29,49 @@ def paper_draw(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Goal:
-    """What is minimised: mean power, or the mean squared rate of samples with power as an index beside it.
+    """What is minimised: mean power, or another figure of the samples with power as an index beside it.
 
     Attributes:
         objective: name and unit.
         draw: how the motors draw power; where not as in the paper, the paper's power is an index too.
-        rate_of: (m, N + 1) of the samples whose rate it is; None for power.
-        reads_motion: whether these are angles or their derivatives.
+        figure: of the samples; None for power.
+        reads_motion: whether it reads angles or their derivatives.
     """
 
     objective: Objective = POWER
     draw: Draw = paper_draw
-    rate_of: Callable[[Samples], MX] | None = None
+    figure: Callable[[Samples], MX] | None = None
     reads_motion: bool = False
     parameters = (HEAT_LOSS,)
 
     def value(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
         """Scalar, and the indexes that stand before and after those of the parts."""
-        if self.rate_of is not None:
-            values = self.rate_of(samples)
-            rate = ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
-            return rate, {"power_W": paper_draw(at, samples, Exact())}, {self.objective.name: rate}
+        if self.figure is not None:
+            figure = self.figure(samples)
+            return figure, {"power_W": paper_draw(at, samples, Exact())}, {self.objective.name: figure}
         power = self.draw(at, samples, ops)
         beside = {} if self.draw is paper_draw else {"paper_power_W": paper_draw(at, samples, Exact())}
         return power, {"power_W": power}, beside
 
 
-SMOOTHNESS = {
+def _mean_squared_rate(values: MX, samples: Samples) -> MX:
+    """Of columns (m, N + 1), one a sample."""
+    return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
+
+
+# What can be minimised in place of the power.
+INSTEAD = {
     "jerk": Goal(
-        objective=Objective(name="joint_jerk", unit="rad^2/s^6"), rate_of=lambda samples: samples.qdd, reads_motion=True
+        objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
+        figure=lambda samples: _mean_squared_rate(samples.qdd, samples),
+        reads_motion=True,
+    ),
+    "torque": Goal(
+        objective=Objective(name="squared_torque", unit="(Nm)^2"),
+        figure=lambda samples: time_mean(ca.sum1(samples.torque**2)),
     ),
     "torque-smoothness": Goal(
-        objective=Objective(name="torque_rate", unit="(Nm/s)^2"), rate_of=lambda samples: samples.torque
+        objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
+        figure=lambda samples: _mean_squared_rate(samples.torque, samples),
     ),
 }

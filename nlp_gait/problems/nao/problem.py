@@ -10,7 +10,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Assembly, GaitProblem, Playback, Point
-from nlp_gait.problems.biped.goals import HEAT_LOSS, SMOOTHNESS, Goal
+from nlp_gait.problems.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.nao.body import GRAVITY, PLANNED_JOINTS, nao
@@ -19,7 +19,7 @@ from nlp_gait.problems.nao.skeleton import skeleton
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-Criterion = Literal["power", "jerk", "torque-smoothness"]
+Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
 
 
 def paper_parts(robot: Robot, margins: Margins, mean_limits_m: tuple[float, float]) -> tuple[Part, ...]:
@@ -36,10 +36,10 @@ def goal_of(criterion: Criterion, motors: Motors) -> Goal:
     if criterion != "power" and motors.draw is not None:
         raise InputError(
             f"motors={','.join(motors.features)!r} changes the power, but the objective is "
-            f"{SMOOTHNESS[criterion].objective.name}; leave out what changes it"
+            f"{INSTEAD[criterion].objective.name}; leave out what changes it"
         )
     if criterion != "power":
-        return SMOOTHNESS[criterion]
+        return INSTEAD[criterion]
     return Goal() if motors.draw is None else Goal(draw=motors.draw)
 
 

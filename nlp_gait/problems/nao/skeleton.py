@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics

@@ -11,8 +11,8 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, NumericPoint, Playback, Signals
-from nlp_gait.problem.playback import PLAYED, Tread
-from nlp_gait.problem.steps import walk
+from nlp_gait.problem.motion.playback import PLAYED, Tread
+from nlp_gait.problem.motion.steps import walk
 from nlp_gait.problems.stairs.bodies import JOINTS, joint_angles, joint_torques, rigid_bodies, torso_lean
 from nlp_gait.problems.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS, points

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
 from nlp_gait.problems.stairs.formulas.loads import link_angles
 from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
 from nlp_gait.problems.stairs.formulas.planar_biped import points as planar_points

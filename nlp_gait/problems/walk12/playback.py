@@ -15,7 +15,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, NumericPoint, Playback, Signals
-from nlp_gait.problem.playback import PLAYED
+from nlp_gait.problem.motion.playback import PLAYED
 from nlp_gait.problems.walk12.locomotion import JOINTS, locomotion
 from nlp_gait.problems.walk12.model import GRAVITY, Zmp
 from nlp_gait.problems.walk12.robot import PointMassBiped

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
 from nlp_gait.problems.walk12.robot import PointMassBiped
 
 

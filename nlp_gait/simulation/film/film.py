@@ -9,6 +9,7 @@ from contextlib import ExitStack, closing
 import numpy as np
 from PIL import Image
 
+from nlp_gait.backends.interrupts import held_interrupts
 from nlp_gait.errors import InputError
 from nlp_gait.simulation.film.caption import PAPER, Captions, Strip, pasted
 from nlp_gait.simulation.film.recording import Recording
@@ -65,11 +66,12 @@ def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str =
             strip = Strip(left=left, top=height - strip_height, width=share, height=strip_height)
             parts.append((left, recording, stage, Captions(recording, moved, strip, line, most_power, end_s)))
         for k in range(max(len(recording.t) for recording in recordings)):
-            picture = Image.new("RGB", size, PAPER)
-            for left, recording, stage, captions in parts:
-                own = min(k, len(recording.t) - 1)
-                pasted(stage.picture(own), left, 0, picture)
-                captions.draw(picture, own, note)
+            with held_interrupts():  # a driver of graphics is not left in the middle of a picture
+                picture = Image.new("RGB", size, PAPER)
+                for left, recording, stage, captions in parts:
+                    own = min(k, len(recording.t) - 1)
+                    pasted(stage.picture(own), left, 0, picture)
+                    captions.draw(picture, own, note)
             yield np.asarray(picture)
 
 

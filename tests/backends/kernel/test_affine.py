@@ -8,13 +8,13 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from benchmarks.enclosures import OPERATIONS, lost
+from benchmarks.guarantees.enclosures import OPERATIONS, lost
 from nlp_gait.backends.kernel.affine import AffineFunction
 from nlp_gait.backends.kernel.kernel_source import kernel_of
 from nlp_gait.errors import CompilerError, InputError
 
 SEED = 7
-EACH = 50  # points of each operation; `python -m benchmarks.enclosures` takes 100,000
+EACH = 50  # points of each operation; `python -m benchmarks.guarantees.enclosures` takes 100,000
 POINTS = 500
 # Of values as computed in double precision, relative: they err themselves.
 ROUNDING = 1e-9

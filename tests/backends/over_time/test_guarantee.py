@@ -11,7 +11,7 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from benchmarks.guarantees import contradictions, feasible_gaits
+from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.backends.kernel import affine
 from nlp_gait.backends.over_time.guarantee import guarantee

@@ -147,13 +147,18 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
     steps.mkdir()
     (steps / "earlier.json").write_text("{}")
     error = one_sentence(*PARETO, "--search", "none", "--out", tmp_path, status=130)
-    assert error == f"nlp-gait: interrupted; 1 finished steps are kept in {tmp_path}; the same command continues\n"
+    kept = [path.name.partition("-")[0] for path in steps.iterdir()]
+    assert kept.count("solve") == 4 and len(kept) == 6  # both ends of the front, and how it was asked
+    assert error == f"nlp-gait: interrupted; 6 finished steps are kept in {tmp_path}; the same command continues\n"
 
 
 def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(motors, "solve", pressed_in_call(2, motors.solve))
     done = nlp_gait("motors", "nao-ssp", "--intervals", "3", "--starts", "1", "--out", tmp_path, status=130)
-    assert f"interrupted after 1 of 8 variants; what was found is in {tmp_path}\n" in done.stderr
+    assert (
+        f"interrupted after 1 of 8 variants; what was found is in {tmp_path}; the same command continues\n"
+        in done.stderr
+    )
     assert len((tmp_path / "nao-ssp-motors.csv").read_text().splitlines()) == 2
 
 
@@ -164,7 +169,8 @@ def test_ctrl_c_before_the_first_result_says_that_nothing_is_kept(
         monkeypatch.setattr(module, "solve", press)
     monkeypatch.setattr(prices, "solved", press)
     out = ["--out", tmp_path]
-    assert "after 0 of 8 variants; nothing was written" in one_sentence("motors", *out, status=130)
-    assert "after 0 of 3 boxes; nothing was written" in one_sentence("robust", "--no-simulate", *out, status=130)
+    kept = f"finished steps are kept in {tmp_path}; the same command continues\n"
+    assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("motors", *out, status=130)
+    assert f"after 0 of 3 boxes; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
     assert "interrupted; nothing was written" in one_sentence("prices", "walk12", *out, status=130)
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == ["steps"]

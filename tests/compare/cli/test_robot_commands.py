@@ -8,17 +8,9 @@ import pytest
 from PIL import Image
 
 from tests.compare.cli.calls import nlp_gait, one_sentence, process
+from tests.compare.records import DSP_X
 
-X = {
-    "hip_height_m": 0.31,
-    "hip_vz_start_m_s": -0.0008,
-    "hip_vz_end_m_s": -0.0055,
-    "hip_vx_start_m_s": 0.052,
-    "hip_vx_end_m_s": 0.001,
-    "hip_vy_start_m_s": -0.0367,
-    "hip_vy_end_m_s": -0.0424,
-    "double_support_time_s": 2,
-}
+X = {**DSP_X, "double_support_time_s": 2}  # slow enough for another robot
 
 
 @pytest.fixture
@@ -64,6 +56,15 @@ def test_bad_input_is_one_sentence(gait, arguments, words):
     error = one_sentence(*(gait if a == "GAIT" else a for a in arguments))
     for word in words:
         assert word in error
+
+
+def test_a_film_that_nobody_waits_for_is_refused_before_the_gait_is_played(gait, tmp_path):
+    pytest.importorskip("mujoco")
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 2.2}}))
+    film = tmp_path / "film.gif"
+    error = one_sentence("simulate", gait, "--video", film, "--speed", "0.05", "--fps", "50")
+    assert "at most 3000 frames, got 64 s at 50 frames a second = 3200; raise --speed or lower --fps" in error
+    assert not film.exists()
 
 
 def test_export_goes_beside_the_result_by_default(gait):

@@ -17,6 +17,7 @@ from compare.logs import NOTHING_FEASIBLE, traces, write_coco, write_ioh
 from compare.logs.trace import SMALLEST
 
 BUDGET = 10_000
+TARGETS = 2_001  # of our distribution; iohinspector's has no end of them
 SOLVERS = ("pso", "random", "de")
 WRITERS = {"ioh": write_ioh, "coco": write_coco}
 
@@ -59,11 +60,11 @@ def test_iohinspector_finds_our_numbers(comparisons: list[Comparison], form: str
                 compared += math.isfinite(ours)
             at = [100, 1000, BUDGET]
             shares = get_data_ecdf(rows, f_min=1e-6, f_max=1.0, eval_values=at)
-            targets = np.logspace(0.0, -6.0, 20_001)
+            targets = np.logspace(0.0, -6.0, TARGETS)
             costs = np.array([[c.reached(t) for t in targets] for c in solver.curves]).ravel()
             cost, share = ecdf(costs)
             ours_at = [float(share[cost <= count][-1]) if (cost <= count).any() else 0.0 for count in at]
-            np.testing.assert_allclose(shares["eaf"], ours_at, atol=2e-4)
+            np.testing.assert_allclose(shares["eaf"], ours_at, atol=1.0 / (TARGETS - 1))
     assert compared > 100
 
 

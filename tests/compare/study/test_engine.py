@@ -18,25 +18,14 @@ from compare.study.study import RECORDS
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
 from nlp_gait.simulation.drive import DRIVES, Drive
-from tests.compare.records import record
+from tests.compare.records import DSP_X, record
 
 pytestmark = pytest.mark.slow  # gaits are played
-
-X = {
-    "hip_height_m": 0.31,
-    "hip_vz_start_m_s": -0.0008,
-    "hip_vz_end_m_s": -0.0055,
-    "hip_vx_start_m_s": 0.052,
-    "hip_vx_end_m_s": 0.001,
-    "hip_vy_start_m_s": -0.0367,
-    "hip_vy_end_m_s": -0.0424,
-    "double_support_time_s": 0.4,
-}
 
 
 def dsp(algorithm: str, power_W: float, time_s: float = 0.4) -> RunRecord:
     made = record(algorithm, 0, [(10, power_W)], problem="nao-dsp")
-    return replace(made, x=X | {"double_support_time_s": time_s})
+    return replace(made, x=DSP_X | {"double_support_time_s": time_s})
 
 
 @pytest.fixture(scope="module")

@@ -155,11 +155,19 @@ def test_starts_have_coefficients_near_zero() -> None:
     assert ((problem.lower <= x) & (x <= problem.upper)).all()
 
 
+@pytest.mark.slow
+def test_squared_torques_are_their_mean_over_time() -> None:
+    problem = load("nao-ssp", objective="torque")
+    arrays = problem.signals(padded(problem)).arrays
+    mean = np.trapezoid((arrays["tau"] ** 2).sum(axis=1), arrays["t"]) / arrays["t"][-1]
+    assert evaluated(problem, padded(problem)).cost == pytest.approx(mean, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"trajectory": "septic"}, "trajectory must be one of cubic, quintic, spline-2, .* got 'septic'"),
-        ({"objective": "speed"}, "objective must be one of power, jerk, torque-smoothness, got 'speed'"),
+        ({"objective": "speed"}, "objective must be one of power, jerk, torque, torque-smoothness, got 'speed'"),
     ],
 )
 @pytest.mark.parametrize("name", NAMES)

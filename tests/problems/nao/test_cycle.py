@@ -7,8 +7,9 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
+from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.nao.body import GRAVITY, nao
-from nlp_gait.problems.nao.cycle import walking_cycle
+from nlp_gait.problems.nao.cycle.problem import walking_cycle
 from nlp_gait.problems.nao.double_support import LOAD_DEGREE, load_sharing
 from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.robots import load_robot
@@ -76,7 +77,8 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
     sharing = load_sharing(real.model, problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
     assert problem.grid is not None
-    cycle = walking_cycle(real, sharing, problem.grid, at_given_speed=problem.options["objective"] == "power")
+    at_given_speed = problem.options["objective"] == "power"
+    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=at_given_speed)
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

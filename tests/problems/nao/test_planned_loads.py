@@ -15,8 +15,9 @@ import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
 from nlp_gait.problems.biped.foot_loads import RAMP_SHARE, load_basis
+from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.nao.body import GRAVITY, nao
-from nlp_gait.problems.nao.cycle import walking_cycle
+from nlp_gait.problems.nao.cycle.problem import walking_cycle
 from nlp_gait.problems.nao.double_support import load_sharing
 from nlp_gait.problems.nao.motors import Motors
 from nlp_gait.robots import load_robot
@@ -67,7 +68,7 @@ def double_support(name: str, x: Array) -> Signals:
         return problem.signals(x)
     real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
     assert problem.grid is not None
-    cycle = walking_cycle(real, load_sharing(real.model, "free", 4), problem.grid, at_given_speed=True)
+    cycle = walking_cycle(real, load_sharing(real.model, "free", 4), problem.grid, Goal(), at_given_speed=True)
     return cycle.signals(problem.at(x))["dsp"]
 
 

@@ -24,6 +24,7 @@ SAME_TIME_S = 1e-9
 LIFTED = 2e-3  # [m]; a foot that rises by less stands
 STILL = 1e-5  # [m]; a foot that is nearer than this to where it ends has landed
 LEAST_SHARE = 0.02  # of the time; a shorter phase is none
+CLOSED = 1e-3  # [rad]; a motion whose end is nearer than this to the mirror image of its beginning can go on
 FINE = 400  # instants at which a whole motion is looked at
 # Joints of the arms that a file may leave out: they are held as in the paper, section 3.1 and in the middle of Table 3.
 LEFT_OUT = HELD_ARM_ANGLES | {"LShoulderPitch": 1.5, "RShoulderPitch": 1.5, "LElbowRoll": -0.53, "RElbowRoll": 0.53}
@@ -113,6 +114,11 @@ class Motion:
         return Motion(
             robot=self.robot, t=self.t, q=signs * self.q[:, columns], mirrored=not self.mirrored, held=self.held
         )
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the end is the mirror image of the beginning, so that another step can follow."""
+        return bool(np.abs(self.q[-1] - self.mirror_image().q[0]).max() < CLOSED)
 
     def phases(self, touch_down_s: float | None = None) -> dict[str, tuple[float, float]]:
         """Beginning and end [s] of single support ``"ssp"`` and double support ``"dsp"``, as far as there are both."""

@@ -228,18 +228,7 @@ class StandingLimits(Part):
 
 def bounds_of(variables: Sequence[Variable]) -> tuple[Parameter, ...]:
     """Bounds of a planned motion's variables as parameters."""
-    return tuple(
-        Parameter(
-            name=f"{v.name}.{end}",
-            unit=v.unit,
-            default=getattr(v, end),
-            description=f"{end} bound of {v.name}",
-            minimum=v.minimum,
-            maximum=v.maximum,
-        )
-        for v in variables
-        for end in ("lower", "upper")
-    )
+    return tuple(bound for v in variables for bound in (v.bound("lower"), v.bound("upper")))
 
 
 def mean_place(motion: Motion) -> Array:

@@ -13,15 +13,15 @@ from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
 from nlp_gait.problems.biped.parts import Part
 from nlp_gait.problems.biped.phase import Loader
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.cycle import OBJECTIVES
-from nlp_gait.problems.nao.cycle_motion import (
+from nlp_gait.problems.nao.cycle.motion import (
     STEP,
     TIMES,
     cycle_variables,
     double_support_planner,
     single_support_planner,
 )
-from nlp_gait.problems.nao.cycle_rows import WalkingCycle, double_margins, joined, mean_margins, single_margins
+from nlp_gait.problems.nao.cycle.problem import ENERGY_PER_METRE
+from nlp_gait.problems.nao.cycle.rows import WalkingCycle, double_margins, joined, mean_margins, single_margins
 from nlp_gait.problems.nao.double_support import (
     DURATION,
     double_support_loads,
@@ -124,7 +124,8 @@ def recorded(
         problem = _cycle(model, parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
         options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
         problem = replace(problem, options=options, refine=lambda by: built(factor * by))
-        return with_robot(problem, robot, model.armatures_kgm2)
+        repeats = len(parts) > 1 and motion.repeats
+        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     times: tuple[float, ...]
@@ -222,7 +223,7 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         title="A recorded gait of NAO, a walking cycle",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=OBJECTIVES["energy-per-metre"],
+        objective=ENERGY_PER_METRE,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),

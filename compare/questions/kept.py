@@ -1,0 +1,172 @@
+"""What a question has finished in its answer's folder, so that the same command goes on after a kill or Ctrl-C.
+
+Every finished run of an NLP solver is a step of its own (``compare.study.steps``), under the hash of all that it depends on: the
+problem's mathematics and values, the solver's settings, and the point where it began. Runs are deterministic, so a question that
+is asked again takes the same way past them, and its answer is that of an undisturbed one.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from compare.study.definition import fingerprint, sha256_of
+from compare.study.progress import Progress, unwatched
+from compare.study.steps import Steps
+from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.solvers import ipopt
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
+
+NAME_DIGITS = 20  # of a hash, in the name of a run's file
+FLOATS = tuple(field.name for field in fields(Outcome) if field.type == "float")
+
+
+class Finished:
+    """Steps of a question in its folder; without a folder nothing is kept.
+
+    Attributes:
+        anew: told what has changed if the question was asked otherwise before.
+        kept: steps that an earlier call had finished.
+        made: steps that were made now.
+
+    Args:
+        out: folder of the answer, or None.
+        anew: see above.
+    """
+
+    def __init__(self, out: Path | None = None, anew: Progress = unwatched) -> None:
+        self.anew = anew
+        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt], anew=anew)
+        self.kept = self.made = 0
+
+    def asked(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
+        """Say what has changed since this question was asked of a problem of this name, and remember how it is asked now."""
+        if self._steps is not None:
+            self._steps(f"{question}-{problem.name}", {**fingerprint(problem), **inputs}, lambda: None)
+
+    def step(self, name: str, inputs: Mapping[str, Any], compute: Callable[[], Any]) -> Any:
+        """Result of a step as plain data, see ``Steps``; its file is called after the hash of its inputs too."""
+        if self._steps is None:
+            return json.loads(json.dumps(compute(), allow_nan=False))
+        name = f"{name}-{sha256_of(inputs)[:NAME_DIGITS]}"
+        if (found := self._steps.kept(name, inputs)) is not None:
+            self.kept += 1
+            return found.result
+        self.made += 1
+        return self._steps.keep(name, inputs, compute())
+
+    def solver(self, solver: Solver | None = None) -> Solver:
+        """A solver whose finished runs are kept; None for IPOPT with its defaults."""
+        chosen = solver or IpoptSettings()
+        return chosen if self._steps is None else _KeptSolver(chosen, self)
+
+    @property
+    def sentence(self) -> str:
+        """How much an earlier call had finished; empty if nothing."""
+        return f"{self.kept} of {self.kept + self.made} steps were finished by an earlier call" if self.kept else ""
+
+
+class _Interrupted(Exception):
+    """A run was stopped where it was, so it is not finished."""
+
+    def __init__(self, outcome: Outcome | None) -> None:
+        self.outcome = outcome
+
+
+class _KeptSolver(Solver):
+    """A solver that takes runs which are finished from their files; it is made ready only for those that are not."""
+
+    name: ClassVar[str] = "kept"
+
+    def __init__(self, solver: Solver, finished: Finished, solves: int = 1) -> None:
+        self._solver, self._finished, self._solves = solver, finished, solves
+
+    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        self._solver.check(problem)
+        return _KeptSolver(self._solver, self._finished, solves)
+
+    def settled(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        return self._solver.settled(problem, solves)
+
+    def check(self, problem: GaitProblem) -> None:
+        self._solver.check(problem)
+
+    def plain(self) -> dict[str, Any]:
+        return self._solver.plain()
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        found = self._kept(problem, {"x0": _numbers(x0)}, stop, lambda ready: ready.run(problem, x0, stop))
+        assert found is not None
+        return found
+
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        start = {"x0": _numbers(near.x), "guess_sha256": None if near.guess is None else sha256_of(_plain(near.guess))}
+        return self._kept(problem, start, stop, lambda ready: ready.run_from(problem, near, stop))
+
+    def _kept(
+        self,
+        problem: GaitProblem,
+        start: Mapping[str, Any],
+        stop: Callable[[], bool],
+        run: Callable[[Solver], Outcome | None],
+    ) -> Outcome | None:
+        settings = self._solver.settled(problem, self._solves)
+        inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.plain(), **start}
+
+        def compute() -> Any:
+            outcome = run(self._solver.ready_for(problem, self._solves))
+            if stop():
+                raise _Interrupted(outcome)
+            return None if outcome is None else _plain(outcome)
+
+        try:
+            kept = self._finished.step("solve", inputs, compute)
+        except _Interrupted as interrupted:
+            return interrupted.outcome
+        return None if kept is None else _outcome(kept)
+
+
+def _plain(value: Any) -> Any:
+    """An outcome or guess as plain data that gives back every bit."""
+    if isinstance(value, (Outcome, Guess, Evaluations)):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, np.ndarray):
+        return _numbers(value)
+    if isinstance(value, float):
+        return _number(value)
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def _numbers(array: Array) -> list[float | str]:
+    return [_number(value) for value in array.tolist()]
+
+
+def _number(value: float) -> float | str:
+    """JSON has no NaN and no infinity: these are text."""
+    return value if math.isfinite(value) else repr(value)
+
+
+def _outcome(raw: Mapping[str, Any]) -> Outcome:
+    """The outcome that ``_plain`` was given."""
+    guess = raw["guess"]
+    found: dict[str, Any] = {name: float(value) if name in FLOATS else value for name, value in raw.items()}
+    found |= {name: _array(raw[name]) for name in ("x0", "x")}
+    found["evaluations"] = Evaluations(**raw["evaluations"])
+    found["history"] = tuple(Best(calls, None if f is None else float(f), float(t)) for calls, f, t in raw["history"])
+    if guess is not None:
+        multipliers = {name: _array(guess[name]) for name in ("primal", "bounds", "rows")}
+        found["guess"] = Guess(**multipliers, width=float(guess["width"]))
+    return Outcome(**found)
+
+
+def _array(numbers: list[float | str]) -> Array:
+    return np.array([float(number) for number in numbers])

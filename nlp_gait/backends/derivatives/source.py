@@ -1,0 +1,116 @@
+"""C++ of a plan: tables, functions of one sample over lanes, and what works through them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.resources import files
+
+import casadi as ca
+
+from nlp_gait.backends.derivatives.assembly import FIRST, SECOND, VALUES, NlpPlan
+from nlp_gait.backends.derivatives.operations import CODES, EXPRESSIONS
+from nlp_gait.backends.derivatives.straight_line import number, straight_line
+
+UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "fabs",
+         "log1p", "expm1")  # fmt: skip
+BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
+
+
+def nlp_source(found: NlpPlan) -> str:
+    """C++ of an NLP's functions with CasADi's interface; the lane count is the macro LANES."""
+    plan = found.plan
+    m, n = found.jacobian.shape
+    sizes = {
+        "VARIABLES": n,
+        "PARAMETERS": found.parameters,
+        "ROWS": m,
+        "SIZE": plan.size,
+        "INITIALS": len(plan.initial),
+        "MOST_IN": max((function.nnz_in() for function in plan.functions), default=1),
+        "MOST_OUT": max((function.nnz_out() for function in plan.functions), default=1),
+        "W": found.w,
+        "P": found.p,
+        "VALUE": found.rows,
+        "WEIGHT": found.weights,
+        "GRADIENT": found.gradient,
+        "HESSIAN": found.hessian_place,
+        "JACOBIAN_NONZEROS": found.jacobian.nnz(),
+        "HESSIAN_NONZEROS": found.hessian.nnz(),
+        "VALUE_STEPS": len(plan.steps[VALUES]),
+        "FIRST_STEPS": len(plan.steps[FIRST]),
+        "SECOND_STEPS": len(plan.steps[SECOND]),
+        "HAS_SECOND": int(bool(plan.steps[SECOND])),
+    }
+    cases = " ".join(
+        f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
+        for operation, expression in EXPRESSIONS.items()
+    )
+    lanes = files("nlp_gait.backends.kernel") / "native" / "lanes.hpp"
+    native = files("nlp_gait.backends.derivatives") / "native"
+    return "\n".join(
+        [
+            "#include <stdlib.h>\n#include <string.h>",
+            lanes.read_text(encoding="utf-8"),
+            (native / "operations.hpp").read_text(encoding="utf-8"),
+            *(f"ONE_ARGUMENT({name})" for name in UNARY),
+            *(f"TWO_ARGUMENTS({name})" for name in BINARY),
+            *(f"enum {{ {name} = {size} }};" for name, size in sizes.items() if name != "HAS_SECOND"),
+            f"#define HAS_SECOND {sizes['HAS_SECOND']}",
+            *(straight_line(f"function_{i}", function) for i, function in enumerate(plan.functions)),
+            _table("int", "initial_place", plan.initial),
+            _table("double", "initial_value", (number(value) for value in plan.initial.values())),
+            _table("int", "jacobian_place", found.jacobian_places.tolist()),
+            _table("long long int", "jacobian_sparsity", _compact(found.jacobian)),
+            _table("long long int", "hessian_sparsity", _compact(found.hessian)),
+            _rows("tape", 4, plan.tape),
+            _rows("runs", 4, plan.runs),
+            _rows("products", 5, plan.products),
+            *(
+                _rows(name, 3, plan.steps[phase])
+                for phase, name in ((VALUES, "value_steps"), (FIRST, "first_steps"), (SECOND, "second_steps"))
+            ),
+            _calls(found),
+            f"#define OPERATIONS {cases}",
+            (native / "nlp.hpp").read_text(encoding="utf-8"),
+            (native / "casadi.hpp").read_text(encoding="utf-8"),
+        ]
+    )
+
+
+def _rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
+    """A constant array of rows of integers."""
+    text = ",\n".join(_braces(row) for row in rows)
+    return f"static const int {name}[][{width}] = {{{text or '{0}'}}};"
+
+
+def _braces(row: Iterable[object]) -> str:
+    return f"{{{','.join(map(str, row))}}}"
+
+
+def _table(kind: str, name: str, values: Iterable[object]) -> str:
+    """A constant array."""
+    return f"static const {kind} {name}[] = {{{','.join(map(str, values)) or '0'}}};"
+
+
+def _compact(sparsity: ca.Sparsity) -> Sequence[int]:
+    return [*sparsity.shape, *sparsity.colind(), *sparsity.row()]
+
+
+def _calls(found: NlpPlan) -> str:
+    lines = [
+        "struct Block { int base, sample, length, step, direction; };",
+        "struct Call {\n  void (*function)(const Vector*, Vector*);\n  int count;\n  const int* directions;\n"
+        "  const Block *inputs, *outputs, *end;\n};",
+    ]
+    rows = []
+    for i, call in enumerate(found.plan.calls):
+        lines.append(_table("Block", f"blocks_{i}", [_braces(block) for block in call.inputs + call.outputs]))
+        if call.directions is not None:
+            lines.append(_table("int", f"directions_{i}", call.directions.tolist()))
+        directions = "nullptr" if call.directions is None else f"directions_{i}"
+        split, end = len(call.inputs), len(call.inputs + call.outputs)
+        rows.append(
+            f"{{function_{call.function},{call.samples},{directions},blocks_{i},blocks_{i}+{split},blocks_{i}+{end}}}"
+        )
+    lines.append(f"static const Call calls[] = {{{','.join(rows) or '{}'}}};")
+    return "\n".join(lines)

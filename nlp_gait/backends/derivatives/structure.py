@@ -1,0 +1,135 @@
+"""An NLP taken apart: functions of one sample that are mapped, and the cheap expressions between them (the glue).
+
+y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import casadi as ca
+import numpy as np
+from casadi import MX, SX
+
+from nlp_gait.errors import CompilerError
+
+
+class NotMapped(CompilerError):
+    """A graph that holds what cannot be taken apart; the message says what."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """A function of one sample, called at all samples.
+
+    Attributes:
+        function: of one sample, all inputs in one vector (m,), all outputs in another.
+        count: samples.
+        inputs: (count * m,) glue rows, sample by sample.
+        outputs: (count * nv,) symbols that stand for the outputs, sample by sample.
+    """
+
+    function: ca.Function
+    count: int
+    inputs: SX
+    outputs: SX
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Structure:
+    """Stages of an NLP in the order in which they are evaluated, and its last glue.
+
+    Attributes:
+        w: (n,) symbols of the NLP's variables.
+        p: (k,) symbols of its parameters.
+        stages: each of which depends on earlier ones only.
+        rows: (1 + m,) cost and rows.
+    """
+
+    w: SX
+    p: SX
+    stages: tuple[Stage, ...]
+    rows: SX
+
+
+def structure_of(nlp: Mapping[str, MX]) -> Structure:
+    """An NLP taken apart.
+
+    Args:
+        nlp: CasADi's dictionary of x, p, f, g.
+
+    Raises:
+        NotMapped: it calls a function that is neither mapped nor made of scalar operations.
+    """
+    x, p = nlp["x"], nlp["p"]
+    whole = ca.Function("nlp", [x, p], [nlp["f"], nlp["g"]])
+    numbers = [k for k in range(whole.n_instructions()) if whole.instruction_id(k) == ca.OP_CALL]
+    calls = [call for call in map(whole.instruction_MX, numbers) if call.which_function().class_name() == "Map"]
+    found = [[call.get_output(i) for i in range(call.n_out())] for call in calls]
+    symbols = [[MX.sym("v", output.sparsity()) for output in outputs] for outputs in found]
+    given = [[call.dep(i) for i in range(call.n_dep())] for call in calls]
+    wanted = [nlp["f"], nlp["g"], *_flat(given)]
+    replaced = ca.graph_substitute(wanted, _flat(found), _flat(symbols)) if calls else wanted
+    try:
+        glue = ca.Function("glue", [x, p, *_flat(symbols)], replaced).expand()
+    except RuntimeError as error:
+        raise NotMapped(str(error).splitlines()[-1]) from error
+    w, q, *v = glue.sx_in()
+    cost, rows, *u = glue.call([w, q, *v])
+    stages = []
+    for call, inputs, outputs in zip(calls, given, found, strict=True):
+        function = call.which_function()
+        inner = _scalar(function.find_functions(0)[0])
+        count = function.nnz_in() // inner.nnz_in()
+        stages.append(
+            Stage(
+                function=inner,
+                count=count,
+                inputs=_by_sample([u.pop(0) for _ in inputs], count),
+                outputs=_by_sample([v.pop(0) for _ in outputs], count),
+            )
+        )
+    return Structure(w=w, p=q, stages=tuple(stages), rows=ca.vertcat(ca.densify(cost), ca.densify(rows)))
+
+
+def nonzeros(value: SX) -> SX:
+    """Structural nonzeros as a dense vector."""
+    found = SX(value.nz[:])  # a row where the value is one
+    return found if found.shape[1] == 1 else found.T
+
+
+def scalars(value: SX) -> list[SX]:
+    """Structural nonzeros, one by one."""
+    return cast(list[SX], value.nonzeros())
+
+
+def _scalar(function: ca.Function) -> ca.Function:
+    """A function with vectors of the nonzeros of all inputs and of all outputs, of scalar operations."""
+    try:
+        expanded = function.expand()
+    except RuntimeError as error:
+        raise NotMapped(str(error).splitlines()[-1]) from error
+    inputs = expanded.sx_in()
+    outputs = expanded.call(inputs)
+    return ca.Function(
+        function.name(),
+        [ca.vertcat(*(nonzeros(each) for each in inputs))],
+        [ca.vertcat(*(nonzeros(each) for each in outputs))],
+    )
+
+
+def _by_sample(matrices: list[SX], count: int) -> SX:
+    """Nonzeros of matrices with one block of columns a sample, as one vector with one part a sample."""
+    parts = [nonzeros(matrix) for matrix in matrices]
+    order = []
+    before = 0
+    for part in parts:
+        order.append(before + np.arange(part.shape[0]).reshape(count, -1))
+        before += part.shape[0]
+    return ca.vertcat(*parts)[np.hstack(order).ravel().tolist()]
+
+
+def _flat(lists: list[list[MX]]) -> list[MX]:
+    return [each for one in lists for each in one]

@@ -1,0 +1,99 @@
+"""What is drawn of a gait: lines between joints, soles, the ground, centre of mass and zero-moment point over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlp_gait.problem.motion.signals import Array
+
+LEFT, RIGHT, TRUNK = "left", "right", "trunk"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limb:
+    """Joints from one end to the other.
+
+    Attributes:
+        side: left, right or trunk; it gives the colour.
+        points: (T, K, 3) [m].
+    """
+
+    side: str
+    points: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sole:
+    """Outline of a foot.
+
+    Attributes:
+        side: left or right.
+        corners: (T, K, 3) [m].
+        supports: (T,) whether it bears load.
+    """
+
+    side: str
+    corners: Array
+    supports: np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Skeleton:
+    """A gait as it is drawn; x forward, y left, z up.
+
+    Attributes:
+        t: (T,) [s].
+        limbs: lines.
+        soles: outlines.
+        ground: (K, 2) line (x, z) of the floor or stair, seen from the side [m].
+        com: (T, 3) centre of mass [m], if known.
+        zmp: (T, 3) zero-moment point on the ground [m], if known.
+        planar: only the side view means anything.
+        title: one line.
+    """
+
+    t: Array
+    limbs: tuple[Limb, ...]
+    soles: tuple[Sole, ...]
+    ground: Array
+    com: Array | None
+    zmp: Array | None
+    planar: bool = False
+    title: str = ""
+
+    def support(self, k: int) -> Array | None:
+        """(M, 2) support polygon at a sample: the hull of the loaded soles, seen from above [m]; None if there is none."""
+        from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
+
+        loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
+        if not loaded:
+            return None
+        points = np.concatenate(loaded)
+        try:
+            return np.asarray(points[ConvexHull(points).vertices])
+        except QhullError:  # soles of no width, as in a planar model
+            return None
+
+    def box(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates of everything that moves, (3,) each [m]."""
+        parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
+        everything = np.concatenate([part.reshape(-1, 3) for part in parts])
+        return everything.min(axis=0), everything.max(axis=0)
+
+
+def flat_ground(*points: Array) -> Array:
+    """Line (x, z) at height zero below all points (..., 3)."""
+    x = np.concatenate([p[..., 0].ravel() for p in points])
+    return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
+
+
+def rectangle(back: float, front: float, right: float, left: float) -> Array:
+    """(4, 3) corners at height zero."""
+    return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
+
+
+def grounded(zmp: Array) -> Array:
+    """(T, 3) from (T, 2)."""
+    return np.column_stack([zmp, np.zeros(len(zmp))])

@@ -1,0 +1,1 @@
+"""The walking cycle: planned by its optimum, or by the textbook."""

@@ -1,0 +1,131 @@
+"""NAO's walking cycle: single and double support that fit together, at least energy per metre or least power at a speed.
+
+The published phases (Gupta, Pratihar, Deb 2023) cannot be chained: single support ends with the hip 0.03 m ahead of the stance
+foot, double support starts 0.01 m ahead of it, and arms and velocities differ too. Here the states at both switches, the times
+and the step length are variables, and the cycle repeats after mirroring left to right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
+from nlp_gait.problems.biped.goals import Goal
+from nlp_gait.problems.biped.phase import Phase
+from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.curves import grid_for
+from nlp_gait.problems.nao.cycle.motion import (
+    TIMES,
+    cycle_variables,
+    double_support_planner,
+    single_support_planner,
+)
+from nlp_gait.problems.nao.cycle.rows import (
+    WalkingCycle,
+    double_margins,
+    joined,
+    mean_margins,
+    single_margins,
+    start_at_speed,
+)
+from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
+from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
+from nlp_gait.problems.nao.single_support import single_support_loads
+
+CycleGoal = Literal["energy-per-metre", "power", "torque"]
+ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
+
+
+@maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
+def nao_cycle(
+    *,
+    robot: str = "nao-v5",
+    objective: CycleGoal = "energy-per-metre",
+    intervals: int = 10,
+    rotational_inertia: bool = True,
+    torso_share: TorsoShare = "lever",
+    samples_per_interval: int = 0,
+    motors: str = "",
+    load_degree: int = LOAD_DEGREE,
+) -> GaitProblem:
+    """Walking cycle of NAO: one step, whose mirror image is the next one; for the other options see ``problems.nao``.
+
+    Args:
+        robot: name or file.
+        objective: ``"energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
+            torques, are those at the speed ``speed_m_s``, a parameter: the step length is then no variable but speed times the
+            time of the cycle.
+        intervals: of each phase.
+        rotational_inertia: False takes every link as a point mass.
+        torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
+            farther one; free plans the load of the foot that has landed.
+        samples_per_interval: above 1 for a denser grid; 0 for what suits the loads: 4 where they are planned, else 1.
+        motors: what of the real motors is taken into account; the mean square of a continuous torque is that of each phase.
+        load_degree: of the planned wrench over double support.
+    """
+    grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    real, at_given_speed = Motors.parsed(motors, nao(robot, rotational_inertia)), objective != "energy-per-metre"
+    sharing = load_sharing(real.model, torso_share, load_degree)
+    goal = goal_of("torque" if objective == "torque" else "power", real)
+    cycle = walking_cycle(real, sharing, grid, goal, at_given_speed=at_given_speed)
+    least = goal.objective if at_given_speed else ENERGY_PER_METRE
+    names = tuple(variable.name for variable in cycle.decisions)
+
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return start_at_speed(names, parameters, rng)
+
+    problem = GaitProblem(
+        name="nao-cycle",
+        title=f"NAO, walking cycle: least {least.name.replace('_', ' ')}",
+        variables=cycle.decisions,
+        own_parameters=cycle.parameters,
+        objective=least,
+        assemble=cycle.assemble,
+        grid=grid,
+        motion=lambda at: joined(cycle.signals(at)),
+        start=sharing.start_of(names, start if at_given_speed else None),
+        durations=tuple(TIMES.values()),
+        stretches=cycle.stretches,
+        long_derivatives=bool(sharing.variables),
+    )
+    return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
+
+
+def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:
+    """Both phases of the cycle.
+
+    Args:
+        motors: of a robot as ``nao`` makes it.
+        sharing: of load in double support, see ``double_support.load_sharing``.
+        grid: of each phase.
+        goal: of each phase; the cycle's is their mean over time, or energy per metre.
+        at_given_speed: the step length follows from the speed.
+    """
+    model = motors.model
+    *motion, step = cycle_variables(model)
+    variables, means = (*motion, *sharing.variables, step), mean_margins(model)
+    double = sharing.planned(double_support_planner(model))
+    halves = {
+        "ssp": (single_support_planner(model), single_support_loads(model), single_margins(model), ()),
+        "dsp": (double, sharing.loads, double_margins(model), sharing.parts),
+    }
+    phases = {
+        name: Phase(
+            robot=model,
+            joints=JOINTS,
+            planned=PLANNED_JOINTS,
+            variables=variables,
+            duration=TIMES[name],
+            plan=plan,
+            loads=loads,
+            grid=grid,
+            parts=(*paper_parts(model, margins, means[name]), *motors.parts, *more),
+            goal=goal,
+        )
+        for name, (plan, loads, margins, more) in halves.items()
+    }
+    return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=at_given_speed)

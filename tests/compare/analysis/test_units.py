@@ -1,0 +1,33 @@
+"""Numbers as tables show them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from compare.analysis.units import millimetres, number, seconds, with_unit
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (-0.0, ".3f", "0.000"),
+        (-4e-4, ".3f", "0.000"),
+        (-6e-4, ".3f", "-0.001"),
+        (-4e-6, "+.2%", "+0.00%"),
+        (-0.0, "", "0.0"),
+        (-0.4, ",.0f", "0"),
+        (1234567.0, ",.0f", "1,234,567"),
+        (7, "d", "7"),
+        (math.nan, ".3f", "nan"),
+    ],
+)
+def test_what_is_rounded_to_zero_has_no_sign(value: float, digits: str, shown: str) -> None:
+    assert number(value, digits) == shown
+
+
+def test_units_follow_numbers() -> None:
+    assert with_unit(-1e-9, "W") == "0.000000 W" and with_unit(-1e-9, "1", "g") == "-1e-09"
+    assert millimetres(-1e-6) == "0.0 mm" and millimetres(None) == "-"
+    assert seconds(-0.0) == "0.000 s" and seconds(math.nan) == "-"

@@ -1,0 +1,163 @@
+"""Questions killed after a few steps go on with the same call: nothing finished is done again, and the answer is the same."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import nlp_gait
+from compare.cli import app
+from compare.questions.certainty import multistart
+from compare.questions.kept import Finished, _outcome, _plain
+from compare.questions.motors import study as motors
+from compare.study.steps import Steps
+from nlp_gait.problem.solution import Best, Outcome
+from tests.compare.cli.test_question_commands import PARETO
+
+RUN = CliRunner()
+TIMES = ("time_s", "cpu_s", "run_time_s", "files")
+NAO = ("nao-ssp", "--intervals", "2", "--starts", "1")
+WHOLE = {
+    "sweep": ("sweep", "walk12", "--over", "step_length_m=0.08,0.1", "--starts", "1"),
+    "sweep by a search": (
+        "sweep", "walk12", "--over", "foot_lift_m=0.01:0.03:3", "--algorithm", "random", "--evaluations", "200",
+    ),
+    "motors": ("motors", *NAO),
+    "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
+}  # fmt: skip
+# These take long to their end: how they begin is enough, since all go past finished solves in the same way.
+BEGUN = {
+    "pareto": (*PARETO, "--search", "none"),
+    "pareto of three": (*PARETO, "--objectives", "power,dbm_y_mean,speed"),
+    "robust": ("robust", *NAO, "--no-simulate", "--samples", "0"),
+    "walk": ("walk", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2"),
+}
+
+
+class Killed(BaseException):
+    """Nobody catches it: what comes after it does not happen, as after a kill."""
+
+
+@pytest.fixture(autouse=True)
+def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(multistart, "BATCH", 2)
+    monkeypatch.setattr(motors, "VARIANTS", dict(list(motors.VARIANTS.items())[:2]))
+
+
+def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
+    """Steps that were kept; the call ends after so many."""
+    kept: list[str] = []
+    keep = Steps.keep
+
+    def counted(self: Steps, name: str, *rest: Any) -> Any:
+        result = keep(self, name, *rest)
+        kept.append(name)
+        if len(kept) == steps:
+            raise Killed
+        return result
+
+    monkeypatch.setattr(Steps, "keep", counted)
+    return kept
+
+
+def answer(out: Path, *arguments: object) -> tuple[Any, str]:
+    """The answer without its times, and what was said beside it."""
+    done = RUN.invoke(app, [*map(str, arguments), "--out", str(out), "--json"])
+    assert done.exit_code == 0, done.output
+    return without_times(json.loads(done.stdout)), done.stderr
+
+
+def without_times(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_times(value) for key, value in data.items() if key not in TIMES}
+    return [without_times(item) for item in data] if isinstance(data, list) else data
+
+
+@pytest.mark.parametrize("case", WHOLE)
+def test_the_same_call_goes_on(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        all_steps = kill_after(patch, 0)
+        undisturbed, _ = answer(tmp_path / "undisturbed", *WHOLE[case])
+    killed = tmp_path / "killed"
+    with monkeypatch.context() as patch:
+        before = kill_after(patch, max(2, len(all_steps) // 2))
+        with pytest.raises(Killed):
+            RUN.invoke(app, [*WHOLE[case], "--out", str(killed)])
+    with monkeypatch.context() as patch:
+        after = kill_after(patch, 0)
+        resumed, said = answer(killed, *WHOLE[case])
+    assert resumed == undisturbed
+    assert not set(before) & set(after) and sorted([*before, *after]) == sorted(all_steps)  # none is lost, none double
+    assert "made again" not in said
+
+
+@pytest.mark.parametrize("case", BEGUN)
+def test_a_second_call_repeats_no_solve(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    for _ in range(2):
+        with monkeypatch.context() as patch:
+            calls.append(kill_after(patch, 2))  # the first step says how the question is asked
+            with pytest.raises(Killed):
+                RUN.invoke(app, [*BEGUN[case], "--out", str(tmp_path)])
+    first, second = calls
+    assert first[-1].startswith("solve-")
+    assert not set(first) & set(second)
+
+
+def test_what_changed_is_said_and_made_again(tmp_path: Path) -> None:
+    robot = tmp_path / "my.json"
+    text = (files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8")
+    sweep = ["sweep", *NAO, "--robot", str(robot), "--over", "swing_height_m=0.02"]
+    found = []
+    for content in (text, text.replace('"mass_kg": 1.04956', '"mass_kg": 1.5')):
+        robot.write_text(content, encoding="utf-8")
+        found.append(answer(tmp_path / "out", *sweep))
+    assert text != content
+    (light, _), (heavy, said) = found
+    assert heavy["points"][0]["objective"] > light["points"][0]["objective"]
+    assert said == "sweep-nao-ssp: made again: the problem's mathematics or limits\n"
+    again, said = answer(tmp_path / "out", *sweep)
+    assert again == heavy and said == "2 of 2 steps were finished by an earlier call\n"
+    _, said = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")
+    assert said == "sweep-nao-ssp: made again: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
+
+
+def test_a_kept_outcome_has_every_bit() -> None:
+    problem = nlp_gait.load("walk12")
+    (outcome,) = nlp_gait.solve(problem).starts
+    strange = replace(outcome, objective=math.nan, violation=math.inf, cost=-0.0, history=(Best(3, None, 0.5),))
+    for whole in (outcome, strange, replace(outcome, guess=None)):
+        back = _outcome(json.loads(json.dumps(_plain(whole), allow_nan=False)))
+        for field in fields(Outcome):
+            if field.name != "guess":
+                assert repr(getattr(back, field.name)) == repr(getattr(whole, field.name))
+        for name in ("x", "x0"):
+            assert getattr(back, name).tobytes() == getattr(whole, name).tobytes()
+        if whole.guess is not None:
+            assert back.guess is not None and back.guess.width == whole.guess.width
+            assert all(
+                getattr(back.guess, name).tobytes() == getattr(whole.guess, name).tobytes()
+                for name in ("primal", "bounds", "rows")
+            )
+
+
+def test_a_solve_that_was_stopped_is_not_finished(tmp_path: Path) -> None:
+    problem, finished = nlp_gait.load("walk12"), Finished(tmp_path)
+    solver = finished.solver()
+    x0 = (problem.lower + problem.upper) / 2
+    stopped = solver.run(problem, x0, lambda: True)
+    assert stopped.status == "was interrupted" and not list((tmp_path / "steps").iterdir())
+    whole = solver.run(problem, x0)
+    assert whole.success and len(list((tmp_path / "steps").iterdir())) == 1
+    warm = solver.run_from(problem, whole)
+    later = Finished(tmp_path).solver()
+    kept = later.run(problem, x0)
+    kept_warm = later.run_from(problem, kept)
+    assert warm is not None and kept_warm is not None and repr(kept_warm) == repr(warm)

@@ -1,0 +1,203 @@
+"""A power cut at every point of what writes files: what was said to be finished is there, whole; all else is old or absent."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.study.manifest import Session, write_manifest
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.steps import Steps
+from compare.study.study import Study, keep_record, record_file, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.backends.kernel import library_cache
+from nlp_gait.export.tables import write_npz
+from nlp_gait.files import writable_folder, write_json
+from nlp_gait.problem import Signals
+from tests.compare.records import record
+from tests.faults.forgetful_disk import Files, ForgetfulDisk
+
+ROOT = Path(__file__).parents[2]
+Finished = Callable[[Path], None]
+WALK = ProblemSpec(name="walk12")
+
+
+def one_file_again_and_again(folder: Path, finished: Finished) -> None:
+    for version in range(3):
+        write_json(folder / "answer.json", {"version": version, "more": "x" * 100})
+        finished(folder / "answer.json")
+
+
+def a_file_in_new_folders(folder: Path, finished: Finished) -> None:
+    inner = writable_folder(folder / "records" / "walk12")
+    write_json(inner / "pso-0000.json", [1])
+    finished(inner / "pso-0000.json")
+
+
+def an_archive(folder: Path, finished: Finished) -> None:
+    write_npz(folder / "points.npz", Signals(joints=("a",), arrays={"q": np.arange(20.0)[:, None]}, columns={}))
+    finished(folder / "points.npz")
+
+
+def a_study(folder: Path, finished: Finished) -> None:
+    tasks = tuple(Task(problem=WALK, algorithm="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
+    study = Study(
+        tasks=tasks,
+        folder=folder,
+        run=lambda task, _: replace(
+            record("random", task.run, [(9, 1.0)], problem="walk12"), definition=task.definition()
+        ),
+    )
+    run_study(study, lambda task, _: finished(record_file(folder, task)))
+
+
+def a_record_of_another_definition(folder: Path, finished: Finished) -> None:
+    old = record("pso", 0, [(9, 1.0)])
+    finished(keep_record(old, folder))
+    new = replace(old, definition={**old.definition, "stop": {"evaluations": 10}})
+    path = keep_record(new, folder)
+    finished(path)
+    (other,) = [file for file in path.parent.glob("*.json") if file != path]
+    finished(other)
+
+
+def steps_of_a_reproduction(folder: Path, finished: Finished) -> None:
+    steps = Steps(folder, lambda note: None)
+    for inputs in ({"seed": 1}, {"seed": 2}):
+        steps("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
+        finished(folder / "steps" / "one.json")
+
+
+def sessions_of_a_study(folder: Path, finished: Finished) -> None:
+    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),))
+    session = Session(command="x", started="now", machine={}, versions={}, kernel="", jobs="1")
+    for _ in range(2):
+        write_manifest(folder, settings, session)
+        finished(folder / "study.json")
+
+
+def a_compiled_library(folder: Path, finished: Finished) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(library_cache.FOLDER_VARIABLE, str(folder / "cache"))
+        built = folder.parent / "library.so"
+        built.write_bytes(b"code" * 20)
+        finished(library_cache._stored(built, "key"))
+
+
+SCENARIOS = (
+    one_file_again_and_again,
+    a_file_in_new_folders,
+    an_archive,
+    a_study,
+    a_record_of_another_definition,
+    steps_of_a_reproduction,
+    sessions_of_a_study,
+    a_compiled_library,
+)
+
+
+class Ledger:
+    """Whole versions of each file, from a run on a good disk, and how many of them are finished."""
+
+    def __init__(self, scenario: Callable[[Path, Finished], None], folder: Path) -> None:
+        self.versions: dict[str, list[bytes]] = {}
+        folder.mkdir()
+        scenario(folder, lambda path: self.versions.setdefault(self._name(path, folder), []).append(path.read_bytes()))
+        self.counts = dict.fromkeys(self.versions, 0)
+
+    def _name(self, path: Path, folder: Path) -> str:
+        return path.relative_to(folder).as_posix()
+
+    def check(self, files: Files) -> None:
+        shown = {path: content for path, content in files.items() if not _is_temporary(path)}
+        for path, content in shown.items():
+            assert content in self.versions[path][max(0, self.counts[path] - 1) :], f"{path} is torn or too old"
+        for path, count in self.counts.items():
+            last = self.versions[path][count - 1]
+            assert not count or path in shown or last in shown.values(), f"{path} is lost"
+
+    def finish(self, path: Path, folder: Path) -> None:
+        self.counts[self._name(path, folder)] += 1
+
+
+def _is_temporary(path: str) -> bool:
+    return any(part.startswith((".", "new-")) for part in Path(path).parts)
+
+
+def cut_everywhere(
+    scenario: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flushes: bool = True
+) -> ForgetfulDisk:
+    ledger, folder = Ledger(scenario, tmp_path / "good"), tmp_path / "forgetful"
+    folder.mkdir()
+    with monkeypatch.context() as patch:
+        disk = ForgetfulDisk(folder, patch, ledger.check, flushes)
+
+        def finished(path: Path) -> None:
+            ledger.finish(path, folder)
+            disk.cut()
+
+        scenario(folder, finished)
+    assert all(count == len(ledger.versions[path]) for path, count in ledger.counts.items())
+    return disk
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_nothing_finished_is_lost_and_nothing_is_torn(
+    scenario: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cut_everywhere(scenario, tmp_path, monkeypatch).cuts > 20
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_without_flushes_the_disk_loses_it(
+    scenario: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The test above can fail."""
+    with pytest.raises(AssertionError, match="is torn or too old|is lost"):
+        cut_everywhere(scenario, tmp_path, monkeypatch, flushes=False)
+
+
+# Writers that hold a temporary file of ``new_file``, or write where nothing is kept.
+ALLOWED = {
+    "nlp_gait/disk.py",
+    "nlp_gait/files.py",
+    "nlp_gait/backends/kernel/library_cache.py",  # in its workshop; what is kept goes through nlp_gait.disk
+    "nlp_gait/export/tables.py",
+    "nlp_gait/simulation/film/video.py",
+    "compare/bench/baseline.py",
+    "compare/drawing/animation.py",
+    "compare/drawing/figures.py",
+    "compare/papers/nao/runs.py",
+    "compare/study/apart.py",  # /dev/null
+}
+WRITING = ("write_text", "write_bytes", "savefig", "savez", "savez_compressed", "replace", "rename", "mkdir", "touch")
+
+
+def writes(text: str) -> Iterator[str]:
+    """Calls that write or rename files; ``replace`` of texts and data classes takes more than one argument."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            own = isinstance(node.func, ast.Name)
+            modes = [
+                a.value for a in [*node.args[1:2], *(k.value for k in node.keywords)] if isinstance(a, ast.Constant)
+            ]
+            if name == "open" and any(isinstance(mode, str) and set(mode) & set("wax+") for mode in modes):
+                yield f"line {node.lineno}: open for writing"
+            elif name in WRITING and not own and not (name == "replace" and len(node.args) != 1):
+                yield f"line {node.lineno}: {name}"
+
+
+def test_every_writer_goes_through_one_module() -> None:
+    found = {}
+    for package in ("nlp_gait", "metaheuristics", "compare"):
+        for path in (ROOT / package).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            if any(f"{word}(" in text for word in (*WRITING, "open")) and (calls := list(writes(text))):
+                found[path.relative_to(ROOT).as_posix()] = calls
+    assert found.keys() <= ALLOWED, {name: calls for name, calls in found.items() if name not in ALLOWED}

@@ -1,0 +1,84 @@
+"""The textbook's walk: preview control against least squares, and the cycle that comes of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array, Result, finely_sampled
+from nlp_gait.problems.nao.body import GRAVITY, nao
+from nlp_gait.problems.nao.cycle.cart_table import Footsteps, Walker, cart_table_walk
+from nlp_gait.problems.nao.cycle.preview_control import JERK_WEIGHT, PreviewController
+from nlp_gait.problems.nao.recorded.problem import Recorded
+
+STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3)
+
+
+def histories(gait: Recorded) -> dict[str, Array]:
+    return dict(finely_sampled(Result(problem=gait.problem, x=np.array(gait.x))).arrays)
+
+
+def test_preview_control_is_the_least_squares_optimum() -> None:
+    """The gains come from a Riccati equation; the same cost over a long horizon is a linear least squares problem."""
+    controller = PreviewController(sample_s=0.02, height_m=0.26)
+    count, t = 300, 0.02
+    reference = np.zeros(count + controller.preview)
+    reference[100:], reference[160:] = 0.05, 0.12
+    course = controller.follow(reference)
+    step = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
+    push, output = np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -0.26 / GRAVITY])
+    response = np.array([output @ np.linalg.matrix_power(step, k) @ push for k in range(count)])
+    zmp = np.array([[response[i - j - 1] if i > j else 0.0 for j in range(count)] for i in range(count)])
+    changes = np.eye(count) - np.eye(count, k=-1)
+    jerks = np.linalg.lstsq(
+        np.vstack([zmp, np.sqrt(JERK_WEIGHT) * changes]),
+        np.concatenate([reference[:count], np.zeros(count)]),
+        rcond=None,
+    )[0]
+    # The controller looks 1.6 s ahead, the least squares to the end.
+    assert np.abs(course.jerks[:200] - jerks[:200]).max() < 1e-3 * np.abs(jerks).max()
+
+
+def test_a_course_is_exact_between_its_samples() -> None:
+    controller = PreviewController(sample_s=0.02, height_m=0.26)
+    course = controller.follow(np.linspace(0.0, 0.1, 50 + controller.preview))
+    assert course.at(np.arange(50) * 0.02) == pytest.approx(course.states[:, 0], abs=1e-15)
+    assert course.at(np.array([0.02 - 1e-9])) == pytest.approx(course.states[1, :1], abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def walks() -> dict[int, Recorded]:
+    """The same footsteps with the cart alone, and with the whole body's ZMP."""
+    return {passes: cart_table_walk(STEPS, passes=passes) for passes in (1, 2)}
+
+
+def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: dict[int, Recorded]) -> None:
+    planned = Walker(robot=nao("nao-v5", rotational_inertia=True), footsteps=STEPS).planned_zmp
+    errors = {}
+    for passes, gait in walks.items():
+        played = histories(gait)
+        errors[passes] = np.sqrt(np.mean((played["zmp"].T - planned(played["t"])) ** 2, axis=1))
+    assert (errors[1] < 0.01).all() and (errors[2] < 0.3 * errors[1]).all()
+
+
+def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Recorded]) -> None:
+    gait = walks[2]
+    hip = histories(gait)["hip"]
+    assert gait.gait == "nao-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)
+    assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.05, 0, 0), abs=1e-9)
+    assert hip[:, 2] == pytest.approx(0.3, abs=1e-6)
+    assert gait.problem.playback is not None and gait.problem.playback.repeats
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"hip_height_m": 0.33}, "a hip 0.33 m high reaches no step of 0.05 m: .* lower the hip"),
+        ({"single_s": 0.0}, "single_s must be a finite number > 0, got 0.0"),
+        ({"step_m": float("nan")}, "step_m must be a finite number > 0, got nan"),
+    ],
+)
+def test_footsteps_that_are_no_walk_are_refused(change: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        cart_table_walk(Footsteps(**{**vars(STEPS), **change}))
