@@ -73,8 +73,9 @@ def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
         print_json({"schema": 1, **asdict(found)})
         return
     stdout.print(
-        f"{file.problem['name']}: bound {proof.bound:.8g}, incumbent {proof.objective:.8g}; {found.paths} random paths end in "
-        f"pieces that are dropped, after at most {found.deepest} halvings; they make {found.boxes:,.0f} boxes likely, and the "
-        f"certificate names {proof.boxes:,}" + ("" if found.same_code else "; it was made by other code than this"),
+        f"{file.problem['name']}: bound {proof.bound:.8g}, incumbent {proof.objective:.8g}; {found.paths} random paths of up to "
+        f"{found.deepest} halvings end, {found.pieces:,} pieces on them are proven to hold nothing better; they make "
+        f"{found.boxes:,.0f} boxes likely, and the certificate names {proof.boxes:,}"
+        + ("" if found.same_code else "; it was made by other code than this"),
         soft_wrap=True,
     )

@@ -1,4 +1,4 @@
-"""A proven bound as a file, and its check: random paths from all of the box to where a piece of it is dropped, followed again."""
+"""A proven bound as a file, and its check: random paths from the whole box inwards, followed again."""
 
 from __future__ import annotations
 
@@ -56,13 +56,15 @@ class Check:
     """What following random paths found.
 
     Attributes:
-        paths: followed to a piece that is dropped.
+        paths: followed to boxes of which both halves are dropped.
+        pieces: dropped on the way: every one of them is proven to hold nothing better.
         deepest: halvings on the longest.
         boxes: estimate of the boxes in the whole tree from these paths (Knuth 1975).
         same_code: the file was made by this code; with another one, the paths are proofs of today's.
     """
 
     paths: int
+    pieces: int
     deepest: int
     boxes: float
     same_code: bool
@@ -81,7 +83,7 @@ def read_certificate(path: Path) -> CertificateFile:
 
 
 def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
-    """Follow random paths again, each half of a box as likely as the other.
+    """Follow random paths again: both halves of a box are bounded, and the path goes on in one that is not dropped.
 
     Args:
         file: of a closed proof.
@@ -106,17 +108,24 @@ def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
     if not problem.objective.sign * proof.bound <= target + SAME_VALUE * abs(target):
         raise InputError(f"the certificate's bound {proof.bound} says more than its tolerance {proof.tolerance}")
     bounds, rng = BoxBounds(problem), np.random.default_rng(seed)
-    open_, sizes = np.repeat(whole(problem), paths, axis=0), np.zeros(paths)
-    path = np.arange(paths)
+    open_, _, cut, origin = bounds.assess(np.repeat(whole(problem), paths, axis=0), target)
+    path, weight, sizes, dropped = origin, np.ones(len(origin)), np.ones(paths), paths - len(origin)
     for depth in range(DEEPEST_PATH):
-        sizes[path] += 2.0**depth
-        found = bounds.assess(open_, target)
-        path = path[found.origin]
         if not len(path):
-            return Check(paths=paths, deepest=depth, boxes=float(sizes.mean()), same_code=file.code_sha256 == _code())
-        both = halves(found.boxes, found.cut)
-        side = rng.integers(0, 2, len(path))
-        open_ = both[np.arange(len(path)) + side * len(path)]
+            same = file.code_sha256 == _code()
+            return Check(paths=paths, pieces=dropped, deepest=depth, boxes=float(sizes.mean()), same_code=same)
+        sizes[path] += 2.0 * weight
+        found = bounds.assess(halves(open_, cut), target)
+        count = len(path)
+        dropped += 2 * count - len(found.origin)
+        alive = np.full((2, count), -1)
+        alive[found.origin // count, found.origin % count] = np.arange(len(found.origin))
+        both = (alive >= 0).all(axis=0)
+        side = np.where(both, rng.integers(0, 2, count), (alive[0] < 0).astype(int))
+        chosen = alive[side, np.arange(count)]
+        goes_on = chosen >= 0
+        weight = np.where(both, 2.0, 1.0)[goes_on] * weight[goes_on]
+        path, open_, cut = path[goes_on], found.boxes[chosen[goes_on]], found.cut[chosen[goes_on]]
     raise InputError(f"{len(path)} of {paths} paths do not end after {DEEPEST_PATH} halvings: the bound is not proven")
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from benchmarks.guarantees.boxes import lost
 from compare.questions.certainty import branch_and_bound, certificate
-from compare.questions.certainty.boxes import BoxBounds
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
 from nlp_gait.backends.exact import exact_model
@@ -32,25 +32,7 @@ def walk() -> tuple[GaitProblem, np.ndarray]:
 
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target() -> None:
     problem, best = walk()
-    rng, model, bounds = np.random.default_rng(SEED), exact_model(problem), BoxBounds(problem)
-    points = [
-        best + rng.uniform(0.0, 1.0) ** 3 * (rng.uniform(problem.lower, problem.upper) - best) for _ in range(120)
-    ]
-    values = [model.at(x, problem.p) for x in points]
-    kept = [(x, v.cost) for x, v in zip(points, values, strict=True) if v.violation <= 1e-6]
-    assert len(kept) > 50
-    half = problem.scale * 10.0 ** rng.uniform(-5, 0, (len(kept), 1))
-    shift = rng.uniform(-1.0, 1.0, (len(kept), len(best)))
-    X = np.array([x for x, _ in kept])
-    boxes = np.stack(
-        [np.maximum(problem.lower, X + half * (shift - 1)), np.minimum(problem.upper, X + half * (shift + 1))], -1
-    )
-    costs = np.array([cost for _, cost in kept])
-    found = bounds.assess(boxes, costs.max() + 1e-9)
-    np.testing.assert_array_equal(np.sort(found.origin), np.arange(len(kept)))
-    X, costs = X[found.origin], costs[found.origin]
-    assert np.all((found.boxes[..., 0] <= X) & (X <= found.boxes[..., 1]))
-    assert np.all(found.lowest <= costs)
+    assert lost(problem, best, 200, np.random.default_rng(SEED)) == 0
 
 
 @pytest.mark.slow
