@@ -79,7 +79,6 @@ def nao_cycle(
         motion=lambda at: joined(cycle.signals(at)),
         start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
-        long_derivatives=bool(sharing.variables),
     )
     return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
