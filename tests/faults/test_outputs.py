@@ -12,6 +12,7 @@ import pytest
 from compare.cli.command import PLAIN, run_app
 from nlp_gait import load, solve, solver
 from nlp_gait.backends.kernel.compiler import _find, find_compiler
+from tests.compare.cli.calls import one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
 
 FULL = Path("/dev/full")
@@ -80,11 +81,10 @@ def test_a_name_that_is_no_text_is_refused_before_the_work(arguments: str, tmp_p
     assert list(tmp_path.iterdir()) == [] and done.stdout == ""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])
 def test_a_folder_in_place_of_a_result_is_said(path: str) -> None:
-    done = shell(f"$gait animate {path}; $gait export {path} --format csv; $gait simulate {path}")
-    assert done.stderr.count("\n") == 3 and done.stderr.count("cannot be read") == 3, done.stderr
+    for command in (["animate", path], ["export", path, "--format", "csv"], ["simulate", path]):
+        assert "cannot be read" in one_sentence(*command)
 
 
 @pytest.mark.slow

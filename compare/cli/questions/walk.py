@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,9 @@ from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import CycleOptions, DriveOptions, Seed
 from compare.cli.questions.answers import Output
+
+if TYPE_CHECKING:
+    from compare.questions.walk.planners import Rival
 
 
 @command
@@ -25,6 +28,12 @@ def walk(
         bool, typer.Option("--engine", help="Play ten steps of each gait in MuJoCo (extra sim): is the model right?")
     ] = False,
     steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Play this many; 0 plays none.")] = None,
+    baseline: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Planner beside the cheapest gaits, on their footsteps: cart-table, least-torque; repeatable."
+        ),
+    ] = None,
     starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     servos: DriveOptions,
@@ -37,10 +46,12 @@ def walk(
     a feedback is named. Called again after a kill or Ctrl-C, it continues where it stopped.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
+    `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
     from compare.questions.kept import Finished
     from compare.questions.sweep.study import count_solves, parse_axis
+    from compare.questions.walk.planners import checked_planners, rivals
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLE, optimal_gaits, played
     from compare.study.engine import STEPS
@@ -50,7 +61,7 @@ def walk(
     steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
         mujoco()  # if it is missing, say so before the work
-    axis = parse_axis(over)
+    axis, planners = parse_axis(over), checked_planners(baseline or ())
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
     finished = Finished(output.out, say)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
@@ -66,6 +77,25 @@ def walk(
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
-    output.take(walk_answer(spec, gaits), stopped, finished)
+    others: list[Rival] = []
+    if planners and not stopped:
+        try:
+            with progress_bar("planners", len(planners) * len(gaits)) as advance:
+                others.extend(
+                    rivals(
+                        spec,
+                        gaits,
+                        planners,
+                        starts=starts,
+                        seed=seed,
+                        steps=steps,
+                        drive=drive,
+                        finished=finished,
+                        progress=advance,
+                    )
+                )
+        except KeyboardInterrupt:
+            stopped = "interrupted while other planners planned"
+    output.take(walk_answer(spec, gaits, others), stopped, finished)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)

@@ -14,6 +14,8 @@ from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
 from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.sweep.report import mark
+from compare.questions.walk.planners import Rival
+from compare.questions.walk.planners_report import planners_parts
 from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
@@ -49,8 +51,8 @@ WALKED = (
 MEASURED = ("largest_tilt_deg", "tracking_max_rad", "mechanical_W", "heat_W")
 
 
-def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
-    """What walking costs along the axis, from at least one gait."""
+def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait], rivals: Sequence[Rival] = ()) -> Answer:
+    """What walking costs along the axis, from at least one gait, and what other planners need over the same footsteps."""
     (name,), problem = gaits[0].found.at, spec.load()
     feasible = [gait for gait in gaits if gait.found.feasible]
     placed = {f"{problem.name}-{name}-{gait.at:g}": result_of(spec, gait.found) for gait in feasible}
@@ -75,6 +77,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
         cheapest_cycles,
         *(f"{name} = {gait.at:g}: {gait.found.status}" for gait in gaits if not gait.found.feasible),
         *_walks(name, gaits),
+        *planners_parts(problem, gaits, rivals),
         costs,
     ]
     if feasible:
@@ -88,7 +91,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait]) -> Answer:
         stem=stem,
         title=f"{problem.name}: cheapest cycles over {name}",
         parts=parts,
-        data={"gaits": [gait.to_json() for gait in gaits]},
+        data={"gaits": [gait.to_json() for gait in gaits], "planners": [rival.to_json() for rival in rivals]},
         results={file: {**plain_problem(r.problem), "x": r.problem.by_name(r.x)} for file, r in placed.items()},
     )
 

@@ -97,14 +97,22 @@ def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive, finished: Fi
     """
     if not gait.found.feasible:
         return gait
-    found = result_of(spec, gait.found)
-    inputs = {**fingerprint(found.problem), "x": found.x.tolist(), "steps": steps, "drive": repr(drive)}
+    return replace(gait, walk=walked(result_of(spec, gait.found), steps, drive, finished or Finished()))
 
-    def walked() -> dict[str, Any]:
-        plan = plan_of(found, steps)
+
+def walked(gait: Result, steps: int, drive: Drive, finished: Finished) -> Walk:
+    """How so many steps of a gait fare in the engine, taken from what is finished.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    inputs = {**fingerprint(gait.problem), "x": gait.x.tolist(), "steps": steps, "drive": repr(drive)}
+
+    def measured() -> dict[str, Any]:
+        plan = plan_of(gait, steps)
         return dict(without_nan(asdict(measure_walk(plan, play(plan, drive=drive), drive, steps))))
 
-    return replace(gait, walk=decoded(Walk, (finished or Finished()).step("walk", inputs, walked)))
+    return decoded(Walk, finished.step("walk", inputs, measured))
 
 
 def result_of(spec: ProblemSpec, point: SweepPoint) -> Result:

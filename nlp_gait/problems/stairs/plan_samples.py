@@ -18,7 +18,7 @@ from nlp_gait.problems.stairs.formulas.posture import Posture, posture
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # The swing foot is checked against the stair this often per interval, and not while the toe leaves or meets the ground.
@@ -174,6 +174,18 @@ def clearance_function(ops: Nonsmooth) -> ca.Function:
     found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
+
+
+def reach_function(per_phase: int) -> ca.Function:
+    """Cosines of both knees (2, m) at the samples of a step, from governing parameters, size and reach margin."""
+    inputs, _, _, step = _planned(Exact())
+    s, passing = PlannedStep(per_phase=per_phase).grid
+    one = ca.Function("reach", inputs, [ca.cse(step.reach)])
+    given = [SX.sym("given", size.shape) for size in inputs[2:]]
+    columns = s.shape[1]
+    return ca.Function(
+        "reach", given, [one.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in given))]
+    )
 
 
 def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:

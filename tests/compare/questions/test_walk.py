@@ -11,7 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
+from compare.cli.options import DriveOptions
 from compare.questions.sweep.study import parse_axis
+from compare.questions.walk.planners import PLANNERS, rivals
 from compare.questions.walk.report import walk_answer
 from compare.questions.walk.study import Gait, optimal_gaits
 from compare.report.document import Figure
@@ -59,6 +61,26 @@ def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait]) -> None:
 
     assert pictures(gaits) == ["nao-cycle-cost", "nao-cycle"]
     assert pictures([replace(gait, found=replace(gait.found, feasible=False)) for gait in gaits]) == ["nao-cycle-cost"]
+
+
+def test_other_planners_take_the_same_footsteps(gaits: list[Gait]) -> None:
+    """Least power is the floor of all; the textbook breaks a limit it does not know, the optimum of torques none."""
+    drive = DriveOptions().chosen()
+    cart, torque = rivals(SPEC, gaits[1:], PLANNERS, starts=1, seed=0, steps=0, drive=drive)
+    for rival in (cart, torque):
+        assert rival.indexes["energy_J_per_m"] > gaits[1].indexes["energy_J_per_m"]
+        assert rival.indexes["step_length_m"] == pytest.approx(gaits[1].indexes["step_length_m"], rel=1e-9)
+    assert torque.broken == () and any(" Nm" in limit or " m" in limit for limit in cart.broken)
+    parts = walk_answer(SPEC, gaits, [cart, torque]).parts
+    said = [part for part in parts if isinstance(part, str)]
+    saved = 100 * (1 - gaits[1].indexes["energy_J_per_m"] / cart.indexes["energy_J_per_m"])
+    assert f"Less energy by least-power than by cart-table: {saved:.1f} to {saved:.1f} % in the model." in said
+    assert any(sentence.startswith("Published: 9.16 to 13.35 %") for sentence in said)
+
+
+def test_an_unknown_planner_is_named(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["walk", "--baseline", "zmp", "--out", str(tmp_path)])
+    assert done.exit_code == 1 and "a baseline is one of cart-table, least-torque, got 'zmp'" in done.stderr
 
 
 def test_the_command_walks(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from tests.problems.walk12.oracle import TABLE_3
 
 OPTIMUM_TOLERANCE = 2e-4  # the reference values have four digits
 STARTS, LEAST_AGREEING = 20, 18
-START_TIME_S = 0.3
-GA_TIME_S = 0.05
+START_ITERATIONS = 100  # median; another processor's load changes times, not this
+GA_TIME_S = 0.05  # of the processor
 F1MAX = 470.7
 PROBLEM = nlp_gait.load("walk12")
 
@@ -27,7 +27,7 @@ def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     ends = [start.objective for start in solution.starts if start.success]
     assert sum(abs(f - row[-1]) < OPTIMUM_TOLERANCE for f in ends) >= LEAST_AGREEING
     assert solution.objective == pytest.approx(row[-1], abs=OPTIMUM_TOLERANCE)
-    assert np.median([start.time_s for start in solution.starts]) < START_TIME_S
+    assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
 
 
 def test_between_the_plateaus() -> None:
@@ -57,11 +57,11 @@ def test_the_papers_ga_on_the_compiled_objective() -> None:
         pytest.skip("no compiler")
     times = []
     for seed in range(5):
-        started = time.perf_counter()
+        started = time.process_time()
         result = metaheuristics.minimize(
             objective, metaheuristics.GeneticAlgorithm.goswami2008(), evaluations=930, seed=seed
         )
-        times.append(time.perf_counter() - started)
+        times.append(time.process_time() - started)
         assert result.feasible
         assert 0.9 < -result.objective < 0.9708 + OPTIMUM_TOLERANCE
     assert min(times) < GA_TIME_S

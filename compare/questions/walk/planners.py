@@ -1,0 +1,168 @@
+"""Other planners over the footsteps of the cheapest gaits: the textbook's cart-table, and the least squared torques."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from compare.questions.kept import Finished
+from compare.questions.walk.study import Gait, result_of, walked
+from compare.study.definition import fingerprint
+from compare.study.progress import Progress, unwatched
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Result
+from nlp_gait.problems.nao.cycle.cart_table import Footsteps, cart_table_walk
+from nlp_gait.problems.nao.single_support import LIFT
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.walking import Walk
+
+CART_TABLE, LEAST_TORQUE, LEAST_POWER = "cart-table", "least-torque", "least-power"
+PLANNERS = (CART_TABLE, LEAST_TORQUE)
+HEIGHT = "hip_z_lift_off_m"  # variable whose bounds are those of the hip's height
+HEIGHT_STEP_M = 0.005  # between the hip's heights that are tried
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rival:
+    """Gait of another planner over the footsteps of a cheapest gait.
+
+    Attributes:
+        planner: its name.
+        at: value on the axis.
+        indexes: exact performance figures, as of the cheapest gait; empty where there is no gait.
+        broken: limits that do not hold, with their excess.
+        note: what was chosen on the way, or why there is no gait.
+        walk: playback in the engine; None if it was not played.
+    """
+
+    planner: str
+    at: float
+    indexes: Mapping[str, float]
+    broken: tuple[str, ...]
+    note: str
+    walk: Walk | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries and numbers."""
+        return asdict(self)
+
+
+def checked_planners(names: Sequence[str]) -> tuple[str, ...]:
+    """Planners by name.
+
+    Raises:
+        InputError: one is not known.
+    """
+    for name in names:
+        if name not in PLANNERS:
+            raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
+    return tuple(dict.fromkeys(names))
+
+
+def rivals(
+    spec: ProblemSpec,
+    gaits: Sequence[Gait],
+    planners: Sequence[str],
+    *,
+    starts: int,
+    seed: int,
+    steps: int,
+    drive: Drive,
+    finished: Finished | None = None,
+    progress: Progress = unwatched,
+) -> Iterator[Rival]:
+    """Gaits of other planners over the footsteps, the times and the swing height of each feasible gait, one after the other.
+
+    Args:
+        spec: of the gaits, of least power.
+        gaits: cheapest ones.
+        planners: some of ``PLANNERS``.
+        starts: of IPOPT for least squared torques.
+        seed: of these.
+        steps: that are played; 0 plays none.
+        drive: of the playback.
+        finished: what an earlier call has finished; None to keep nothing.
+        progress: told of each gait.
+    """
+    kept = finished or Finished()
+    for gait in gaits:
+        if not gait.found.feasible:
+            continue
+        for planner in planners:
+            if planner == CART_TABLE:
+                planned = cart_table(result_of(spec, gait.found), gait, kept)
+            else:
+                planned = least_torque(spec, gait, starts, seed, kept)
+            yield _rival(planner, gait.at, planned, steps, drive, kept)
+            progress(f"{planner} {gait.at:g}")
+
+
+def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | None, str]:
+    """The textbook's walk at the cheapest height of its hip: from the highest that reaches, lower as long as it pays."""
+    problem = own.problem
+    single, double = (gait.found.x[name] for name in problem.durations)
+
+    def at(height_m: float) -> Result:
+        footsteps = Footsteps(
+            step_m=gait.indexes["step_length_m"],
+            single_s=single,
+            double_s=double,
+            hip_height_m=height_m,
+            lift_m=gait.found.x[LIFT],
+        )
+        options = problem.options
+        walk = cart_table_walk(footsteps, robot=str(options["robot"]), intervals=int(options["intervals"]))
+        shared = {name: value for name, value in problem.values.items() if name in walk.problem.values}
+        return Result(problem=walk.problem.with_values(**shared), x=np.array(walk.x))
+
+    def cheapest() -> float | None:
+        best: tuple[float, float | None] = (np.inf, None)
+        low, high = (problem.value(f"{HEIGHT}.{end}") for end in ("lower", "upper"))
+        for height in np.arange(high, low - 1e-9, -HEIGHT_STEP_M):
+            try:
+                walk = at(float(height))
+            except InputError:  # a foot is out of reach
+                continue
+            energy = exact_model(walk.problem).at(walk.x, walk.problem.p).indexes["energy_J_per_m"]
+            if energy >= best[0]:
+                break
+            best = energy, float(height)
+        return best[1]
+
+    height = finished.step(CART_TABLE, {**fingerprint(problem), "x": own.x.tolist()}, cheapest)
+    if height is None:
+        return None, "no height of the hip reaches"
+    return at(height), f"hip {1000.0 * height:.0f} mm high"
+
+
+def least_torque(
+    spec: ProblemSpec, gait: Gait, starts: int, seed: int, finished: Finished
+) -> tuple[Result | None, str]:
+    """The gait of least squared torques at the same times, so with the same steps."""
+    own = result_of(spec, gait.found).problem
+    problem = replace(spec, options={**spec.options, "objective": "torque"}).load().with_values(**own.values)
+    same = {name: gait.found.x[name] for name in (*own.durations, LIFT)}
+    solution = solve(problem, starts=starts, seed=seed, fix=same, solver=finished.solver())
+    if not solution.success:
+        return None, solution.status
+    return Result(problem=problem, x=problem.check_x(solution.x)), ""
+
+
+def _rival(
+    planner: str, at: float, planned: tuple[Result | None, str], steps: int, drive: Drive, finished: Finished
+) -> Rival:
+    """A planned gait, judged and played."""
+    result, note = planned
+    if result is None:
+        return Rival(planner=planner, at=at, indexes={}, broken=(), note=note)
+    exact = exact_model(result.problem)
+    values = exact.at(result.x, result.problem.p)
+    broken = tuple(f"{row.name} by {row.violation:.2g} {row.unit}" for row in exact.violated(values))
+    walk = walked(result, steps, drive, finished) if steps else None
+    return Rival(planner=planner, at=at, indexes=dict(values.indexes), broken=broken, note=note, walk=walk)
