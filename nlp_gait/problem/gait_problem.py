@@ -18,7 +18,7 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, shown, unknown
-from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
 from nlp_gait.problem.locking import CASADI, one_at_a_time
 from nlp_gait.problem.motion.grid import Grid
 from nlp_gait.problem.motion.playback import Playback
@@ -68,6 +68,7 @@ class GaitProblem:
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
         searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
+        stretches: the motion's rows as functions of time, part by part; empty where a problem is sampled by definition.
         loaded_as: what ``load`` was asked for, where that is not the name: code of one's own.
     """
 
@@ -92,6 +93,7 @@ class GaitProblem:
     starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
+    stretches: tuple[Stretch, ...] = ()
     loaded_as: str = ""
     # No argument, so that every copy but those of ``with_values`` begins with nothing built.
     _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
@@ -240,6 +242,7 @@ class GaitProblem:
             motion=None if motion is None else lambda at: motion(at.only(self.names)),
             start=start if self.start is not None or variables else None,
             refine=None if self.refine is None else refine,
+            stretches=self.stretches if change is None and not variables else (),
             loaded_as="" if name else self.loaded_as,
         )
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem import Array, Assembly, Constraint, Objective, Parameter, Point, Signals, Variable
+from nlp_gait.problem import Array, Assembly, Constraint, Objective, Parameter, Point, Signals, Stretch, Variable
 from nlp_gait.problem.assembly import parameters
 from nlp_gait.problems.biped.cycle_motion import LEAST_STEP, STEP, TIMES
 from nlp_gait.problems.biped.parts import rows
@@ -133,14 +134,41 @@ class WalkingCycle:
     def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
         limit, joints = motion["torque_jump_limit_Nm"], self.phases["ssp"].joints
         return tuple(
-            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, self.torque_size)
+            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.torque_size)
             for switch, jump in jumps.items()
+        )
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Both phases as functions of time."""
+        found: list[Stretch] = []
+        begins: tuple[str, ...] = ()
+        for name, phase in self.phases.items():
+            for stretch in phase.stretch(name, begins):
+                found.append(
+                    replace(
+                        stretch,
+                        assemble=partial(self._assemble_at, name),
+                        means=tuple(f"{name}_{index}" for index in stretch.means),
+                    )
+                )
+            begins = (*begins, phase.duration)
+        return tuple(found)
+
+    def _assemble_at(self, name: str, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        """Rows and indexes of one phase with samples at other phases (1, k)."""
+        at, phase = self.motion(point), self.phases[name]
+        part = phase.assemble(_named_for(at, name), phase.samples_at(at, ops, phases), ops)
+        return Assembly(
+            objective=part.objective,
+            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
+            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
         )
 
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
         if not self.at_given_speed:
             return ()
-        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"]),)
+        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),)
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Changes of torques (J, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""

@@ -79,14 +79,14 @@ class PlannedStep:
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
         return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
-    def samples(self, point: Point, ops: Nonsmooth) -> PlanSamples:
-        """The step at all samples."""
-        s, passing = self.grid
+    def samples(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> PlanSamples:
+        """The step at all samples, or at those of another grid."""
+        s, passing = grid or self.grid
         return PlanSamples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
 
-    def clearances(self, point: Point, ops: Nonsmooth) -> MX:
+    def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> MX:
         """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._mapped(clearance_function(ops), point, *self.clearance_grid)
+        return self._mapped(clearance_function(ops), point, *(grid or self.clearance_grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -113,11 +113,20 @@ class PlannedStep:
         """Number of the first sample of each phase."""
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
-    def _mapped(self, function: ca.Function, point: Point, s: Array, passing: Array, *more: MX) -> MX:
+    def _mapped(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
         stair = stair_of(point)
         constants = (governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
         columns = s.shape[1]
-        return function.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in constants))
+        repeated = (ca.repmat(value, 1, columns) for value in constants)
+        return function.map(columns)(s if isinstance(s, MX) else DM(s), DM(passing), *repeated)
+
+
+def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
+    """The same grid as ``phase_grid`` gives, at fractions (1, k) of one phase alone."""
+    k = int(fractions.shape[1])
+    parts = [MX(DM.ones(1, k) * float(j < phase)) for j in range(len(PHASES))]
+    parts[phase] = fractions
+    return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
 
 
 def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:

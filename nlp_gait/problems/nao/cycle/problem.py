@@ -79,6 +79,7 @@ def nao_cycle(
         motion=lambda at: joined(cycle.signals(at)),
         start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
+        stretches=cycle.stretches,
         long_derivatives=bool(sharing.variables),
     )
     return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
