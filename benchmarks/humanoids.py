@@ -1,6 +1,6 @@
 """Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [steps] [cycles] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -21,10 +21,12 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.problems.humanoid.body import GRAVITY
+from nlp_gait.robots.biped import NAO_LEG_M, biped_of
 from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
+TIME_S = 2.0  # of NAO's single support
 CLOSURE_M = 1e-9
 
 
@@ -132,6 +134,41 @@ def kernel(files: dict[str, str]) -> Iterator[str]:
         yield cells(name, f"{1e3 * best[name]:.2f}", f"{best[name] / best['nao-ssp']:.2f}")
 
 
+def steps(files: dict[str, str]) -> Iterator[str]:
+    """Cheapest single supports of NAO's 2 s times the root of lambda, in the model and played: equal Froude numbers."""
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.plan import plan_of
+    from nlp_gait.simulation.playback import play
+
+    yield header("robot", "leg m", "mass kg", "time s", "step m", "power W", "CoT", "margins mm", "binding", "engine")
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        robot, leg = problem.robot, leg_of(problem)
+        assert robot is not None
+        time_s = TIME_S * float(np.sqrt(leg / NAO_LEG_M))
+        problem = problem.fix(single_support_time_s=time_s)
+        solution = nlp_gait.solve(problem, starts=2, seed=0)
+        x = np.array(list(solution.x.values()))
+        indexes, hip = exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
+        plan = plan_of(Result(problem=problem, x=x))
+        m = measure(plan, play(plan), Drive())
+        fate = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"upright, tilt {m.largest_tilt_deg:.1f} deg"
+        step = float(hip[0, 0])
+        yield cells(
+            name,
+            f"{leg:.3f}",
+            f"{robot.mass_kg:.1f}",
+            f"{time_s:.2f}",
+            f"{step:.3f}",
+            f"{indexes['power_W']:.3f}" if solution.success else "not feasible",
+            f"{indexes['power_W'] * time_s / (robot.mass_kg * GRAVITY * step):.3f}",
+            ", ".join(f"{1e3 * indexes[f'dbm_{axis}_min_m']:.0f}" for axis in "xy"),
+            ", ".join(active.name for active in solution.active_constraints[:3]),
+            f"{fate}, {m.measured.total_W:.3f} W",
+        )
+
+
 def cycles(files: dict[str, str]) -> Iterator[str]:
     """Cheapest cycles at NAO's 0.03 m/s times the root of lambda, in the model and over some steps in the engine."""
     from nlp_gait.simulation.drive import Drive
@@ -183,8 +220,6 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
 
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
-    from nlp_gait.robots.biped import biped_of
-
     assert problem.robot is not None
     return biped_of(problem.robot).leg_length_m
 
@@ -193,6 +228,7 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "oracle": oracle,
     "starts": starts,
     "kernel": kernel,
+    "steps": steps,
     "cycles": cycles,
 }
 
