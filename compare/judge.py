@@ -1,7 +1,7 @@
 """The one judge: whatever a solver claims about x, these are the exact functions' values.
 
 A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, which shows
-violations between the samples.
+violations between the samples. Where the rows are functions of time, what holds at all times is proven beside.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from nlp_gait.backends.exact import exact_model, violated_rows
+from nlp_gait.backends.over_time.guarantee import Guarantee, guarantee
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 
@@ -35,6 +36,7 @@ class Evaluation:
         dense: the same indexes on the dense grid; None for a problem without samples.
         dense_violations: rows violated on the dense grid, worst first; times are samples of that grid.
         dense_intervals: equal parts of the dense grid.
+        guaranteed: what is proven between the samples; None for a point that is infeasible on them.
     """
 
     problem: str
@@ -49,6 +51,7 @@ class Evaluation:
     dense: Mapping[str, float] | None
     dense_violations: tuple[ConstraintValue, ...]
     dense_intervals: int | None
+    guaranteed: Guarantee | None
 
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:
@@ -92,4 +95,5 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         dense=None if dense_values is None else dense_values.indexes,
         dense_violations=() if dense is None or dense_values is None else exact_model(dense).violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
+        guaranteed=guarantee(problem, point) if values.violation <= FEASIBILITY_TOLERANCE else None,
     )

@@ -5,21 +5,23 @@ functions to search algorithms.
 """
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from nlp_gait.errors import GaitError
-from nlp_gait.problem import GaitProblem, load, problem_names
 
 if TYPE_CHECKING:
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
     from nlp_gait.backends.solvers.registry import solver
+    from nlp_gait.problem import GaitProblem, load, problem_names
     from nlp_gait.problem.solution import Solution
 
-# Imported when first used: a search needs no NLP solver, and a solve no kernel.
+# Imported when first used: a search needs no NLP solver, a solve no kernel, and the command line begins at once.
 _LATER = {
+    "GaitProblem": "nlp_gait.problem",
+    "load": "nlp_gait.problem",
+    "problem_names": "nlp_gait.problem",
     "CompiledObjective": "nlp_gait.backends.kernel.compiled",
     "compile_objective": "nlp_gait.backends.kernel.compiled",
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
@@ -45,6 +47,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """What is imported or read when first used."""
     if name == "__version__":
+        from importlib.metadata import version
+
         return version("nlp-gait")
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

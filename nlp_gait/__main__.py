@@ -11,6 +11,6 @@ from pathlib import Path
 if sys.path[0] in ("", os.getcwd()) and Path(__file__).parents[1] != Path.cwd():
     del sys.path[0]
 
-from compare.cli import main
+from compare.__main__ import main
 
 main()

@@ -24,7 +24,10 @@ from pathlib import Path
 from typing import Any
 
 SMALL = ("nao-ssp", "--intervals", "2", "--starts", "1")
-FIXED = ("hip_height_m=0.31", "hip_vz_start_m_s=-0.00122", "hip_vz_end_m_s=0.0035", "hip_vx_start_m_s=0.01243")
+FIXED = (
+    *("hip_height_m=0.31", "hip_vz_start_m_s=-0.00122", "hip_vz_end_m_s=0.0035", "hip_vx_start_m_s=0.01243"),
+    *("hip_vx_end_m_s=0.001", "swing_height_m=0.015"),
+)
 WALKS = ("walk12", "--runs", "4", "--evaluations", "3000")
 # {out} is the folder of the case; {gait} a result that was made before.
 CASES: dict[str, tuple[str, ...]] = {
@@ -42,7 +45,10 @@ CASES: dict[str, tuple[str, ...]] = {
         "{out}",
     ),
     "search": ("search", *WALKS, "--algorithm", "de", "--jobs", "1", "--out", "{out}"),
-    "bench": ("bench", "random", "--instance", "gaitbench-1/walk12-n4-fast", "--runs", "4", "--out", "{out}"),
+    "bench": (
+        *("bench", "--algorithm", "random", "--label", "mine", "--instances", "walk12-w015", "--runs", "4"),
+        *("--jobs", "1", "--out", "{out}"),
+    ),
     "sweep": ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:12", "--starts", "3", "--out", "{out}"),
     "sweep by a search": (
         *("sweep", "walk12", "--over", "foot_lift_m=0.01:0.03:6", "--algorithm", "pso", "--evaluations", "2000"),
@@ -50,7 +56,22 @@ CASES: dict[str, tuple[str, ...]] = {
     ),
     "walk": ("walk", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2", "--out", "{out}"),
     "pareto": (
-        *("pareto", *SMALL, "--points", "5", "--objectives", "power,speed", "--search", "NSGA2=1000", "--runs", "2"),
+        *(
+            "pareto",
+            "nao-ssp",
+            "--intervals",
+            "4",
+            "--starts",
+            "1",
+            "--points",
+            "5",
+            "--objectives",
+            "power,speed",
+            "--search",
+            "NSGA2=1000",
+            "--runs",
+            "2",
+        ),
         *(f"--fix={fixed}" for fixed in FIXED),
         *("--out", "{out}"),
     ),
@@ -62,12 +83,12 @@ CASES: dict[str, tuple[str, ...]] = {
     ),
     "prices": ("prices", "walk12", "--starts", "2", "--out", "{out}"),
     "solve": ("solve", "walk12", "--starts", "40", "--out", "{out}/best.json"),
-    "evaluate": ("evaluate", "--result", "{gait}", "--signals", "{out}/signals.npz"),
+    "evaluate": ("evaluate", "walk12", "--x", "0.1,0.1,0.2,1", "--signals", "{out}/signals.npz"),
     "export": ("export", "{gait}", "--format", "json", "--out", "{out}/gait.json"),
     "animate": ("animate", "{gait}", "--out", "{out}/gait.gif", "--fps", "10"),
-    "export-objective": ("export-objective", "gaitbench-1/walk12-n4-fast", "--out", "{out}"),
+    "export-objective": ("export-objective", "walk12-w015", "--to", "{out}"),
 }
-TIMES = ("time_s", "cpu_s", "result_sha256", "sessions", "files")
+TIMES = ("time_s", "build_s", "compile_s", "objective_s", "cpu_s", "result_sha256", "sessions", "files")
 
 
 def begin(arguments: list[str]) -> subprocess.Popen[bytes]:

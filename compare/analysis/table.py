@@ -18,6 +18,7 @@ HEADER = (
     "runs",
     "claim success",
     "judged feasible",
+    "guaranteed",
     "best claim",
     "best",
     "median",
@@ -38,6 +39,7 @@ class SolverSummary:
         claimed: how many claim success; None for results from elsewhere that claim nothing.
         feasible: how many end feasible, by the judge, on the problem's own samples.
         dense_feasible: how many are feasible between the samples too; None without a dense grid.
+        guaranteed: how many are proven to keep all limits at all times; None where that was not asked or cannot be.
         best_claim: best objective that a run claims to be feasible.
         best: best objective that the judge finds feasible; likewise ``median`` and ``worst`` over the feasible runs.
         median_interval: 95 % bootstrap interval of the median.
@@ -55,6 +57,7 @@ class SolverSummary:
     claimed: int | None
     feasible: int
     dense_feasible: int | None
+    guaranteed: int | None
     best_claim: float | None
     best: float | None
     median: float | None
@@ -79,6 +82,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     claims = [sign * r.objective for r in records if r.success and r.objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
     unsaid = all("imported" in r.definition and r.objective is None for r in records)
+    asked = [g.holds for r in records if (g := r.verdict.guaranteed) is not None and not g.reason]
     dense = [r.verdict.dense_feasible for r in records]
     return SolverSummary(
         algorithm=solver.name,
@@ -86,6 +90,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         claimed=None if unsaid else sum(r.success for r in records),
         feasible=len(costs),
         dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
+        guaranteed=sum(holds is True for holds in asked) if asked else None,
         best_claim=sign * min(claims) if claims else None,
         best=comparison.value(costs[0]) if costs else None,
         median=comparison.value(median(costs)) if costs else None,
@@ -109,6 +114,7 @@ def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
         str(summary.runs),
         "-" if summary.claimed is None else f"{summary.claimed}/{summary.runs}",
         f"{summary.feasible}/{summary.runs}",
+        "-" if summary.guaranteed is None else f"{summary.guaranteed}/{summary.runs}",
         *(with_unit(value, comparison.objective.unit) for value in values),
         percent(summary.gap),
         count(summary.evaluations),

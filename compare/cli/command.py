@@ -21,6 +21,7 @@ from typing import Any, TypeVar, get_type_hints
 import typer
 
 from compare.cli.common import end_interrupted, fail, say_error
+from compare.starting import raised_interrupts
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError
 
@@ -39,10 +40,11 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     @functools.wraps(function)
     def run(**given: Any) -> R:
         try:
-            for name, group in groups.items():
-                given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-            result = function(**given)
-            sys.stdout.flush()  # a failure to write is reported here, not by the interpreter at its end
+            with raised_interrupts():
+                for name, group in groups.items():
+                    given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
+                result = function(**given)
+                sys.stdout.flush()  # a failure to write is reported here, not by the interpreter at its end
             return result
         except (GaitError, SearchError) as error:
             fail(str(error))

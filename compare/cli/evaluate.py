@@ -143,6 +143,7 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
             "violation",
             "feasible",
             "between samples",
+            "guaranteed",
             "violated most",
         ),
         [
@@ -152,6 +153,7 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
                 f"{e.violation:.3g}",
                 "yes" if e.feasible else "no",
                 "-" if e.dense is None else "no" if e.dense_violations else "yes",
+                "-" if e.guaranteed is None else e.guaranteed.word,
                 next((row.name for row in (*e.violations, *e.dense_violations)), "-"),
             )
             for k, e in enumerate(judged, start=1)
@@ -161,7 +163,7 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
 
 def _write(path: Path, judged: Sequence[Evaluation]) -> None:
     """One row a candidate: its variables, what the judge found, and the indexes."""
-    found = ("violation", "feasible", "feasible_between_samples")
+    found = ("violation", "feasible", "feasible_between_samples", "guaranteed")
     name = judged[0].objective["name"]
     indexes = [index for index in judged[0].indexes if index != name]
     rows = [
@@ -171,6 +173,7 @@ def _write(path: Path, judged: Sequence[Evaluation]) -> None:
             e.violation,
             e.feasible,
             "" if e.dense is None else not e.dense_violations,
+            "" if e.guaranteed is None or e.guaranteed.holds is None else e.guaranteed.holds,
             *(e.indexes[index] for index in indexes),
         ]
         for e in judged
@@ -182,10 +185,23 @@ def _print(evaluation: Evaluation) -> None:
     objective = evaluation.objective
     stdout.print(f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}")
     dense = evaluation.dense or {}
-    rows = [(name, f"{value:z.6f}", with_unit(dense.get(name), "1")) for name, value in evaluation.indexes.items()]
+    means = {} if evaluation.guaranteed is None else evaluation.guaranteed.means
+    rows = [
+        (
+            name,
+            f"{value:z.6f}",
+            with_unit(dense.get(name), "1"),
+            "{:.6f} to {:.6f}".format(*means[name]) if name in means else "-",
+        )
+        for name, value in evaluation.indexes.items()
+    ]
     grid = f"{evaluation.dense_intervals} intervals" if evaluation.dense else "no dense grid"
-    print_table("Indexes", ("index", "own samples", grid), rows)
+    columns = 4 if means else 3
+    header = ("index", "own samples", grid, "proven over time")[:columns]
+    print_table("Indexes", header, [row[:columns] for row in rows])
     _print_violations(evaluation)
+    if evaluation.guaranteed is not None:
+        stdout.print(f"Guaranteed: {evaluation.guaranteed}", soft_wrap=True)
 
 
 def _print_violations(evaluation: Evaluation) -> None:

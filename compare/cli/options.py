@@ -127,16 +127,17 @@ class NamedProblem(ProblemOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class AnyProblem(ProblemOptions):
-    """A problem that need not be named where a motion shows which it is."""
+    """A problem that need not be named where a file shows which it is."""
 
     name: Annotated[
-        str | None, typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion.")
+        str | None,
+        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion or --check."),
     ] = None
 
     def spec(self) -> ProblemSpec:
         """The problem, checked; raises as ``spec_of``."""
         if self.name is None:
-            raise InputError("name the problem that --x is a point of, for example nao-ssp")
+            raise InputError("name the problem, for example nao-ssp")
         return self.spec_of(self.name)
 
     def recorded(self, motion: Path, touch_down_s: float | None) -> Recorded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -50,6 +51,7 @@ def solve(
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
     import nlp_gait
+    from nlp_gait.backends.over_time.guarantee import guarantee
     from nlp_gait.backends.solvers import registry
     from nlp_gait.files import without_nan, write_json
 
@@ -70,14 +72,18 @@ def solve(
                 progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
             )
         )
+    proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
+    data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven)}
     try:  # before printing, so that a reader who has gone does not take the file with him
         if target is not None:
-            write_json(target, without_nan(solution.to_json()))
+            write_json(target, without_nan(data))
     finally:  # nor a full disk what is printed
         if as_json:
-            print_json(solution.to_json())
+            print_json(data)
         else:
             _print(solution)
+            if proven is not None:
+                stdout.print(f"Guaranteed: {proven}", soft_wrap=True)
             if target is not None and target.exists():
                 print_written(target)
     if stopped:

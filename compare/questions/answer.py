@@ -21,7 +21,7 @@ class Answer(Document):
     Attributes:
         stem: name of the page's and the data's files, without suffix.
         data: the whole answer as plain data.
-        results: gaits that other commands read, by the names of their files, without suffix.
+        results: gaits or certificates that other commands read, by the names of their files, without suffix.
     """
 
     stem: str

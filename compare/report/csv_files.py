@@ -10,7 +10,7 @@ from nlp_gait.files import csv_text, without_nan, write_text
 
 CALLS = ("f", "g", "gradient", "jacobian", "hessian")
 RUN = ("problem", "solver", "run", "seed", "success", "status", "claimed_objective", "claimed_violation")
-JUDGED = ("objective", "violation", "feasible", "feasible_between_samples")
+JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
 COST = (*(f"calls_{kind}" for kind in CALLS), "failed_evaluations", "iterations", "time_s")
 
 
@@ -59,7 +59,8 @@ def _run(record: RunRecord) -> list[object]:
 
 def _judged(record: RunRecord) -> list[object]:
     verdict = record.verdict
-    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible]
+    proven = None if verdict.guaranteed is None else verdict.guaranteed.holds
+    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible, proven]
 
 
 def _cost(record: RunRecord) -> list[object]:

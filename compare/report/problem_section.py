@@ -192,14 +192,22 @@ def _failures(comparison: Comparison) -> Section | None:
 
 def _between(comparison: Comparison) -> Section | None:
     rows = [
-        (r.algorithm, str(r.run), "; ".join(r.verdict.violated[:3]))
+        (r.algorithm, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _proven(r))
         for r in comparison.records
-        if r.verdict.feasible and r.verdict.dense_feasible is False
+        if r.verdict.feasible and (r.verdict.dense_feasible is False or _proven(r) != "-")
     ]
     if not rows:
         return None
-    made = text_table(("solver", "run", "violated between the samples, worst first"), rows, prose=True)
-    return Section(title="Feasible on their own samples, violated between them", parts=(made,))
+    made = text_table(
+        ("solver", "run", "violated on a dense grid, worst first", "proven at all times"), rows, prose=True
+    )
+    return Section(title="Feasible on their own samples, not at all times", parts=(made,))
+
+
+def _proven(record: RunRecord) -> str:
+    """What is proven to fail between the samples, or is not proven to hold."""
+    found = record.verdict.guaranteed
+    return "-" if found is None or found.holds or found.reason else str(found)
 
 
 def _p(value: float) -> str:

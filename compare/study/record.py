@@ -11,6 +11,7 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL, Task
+from nlp_gait.backends.over_time.guarantee import Guarantee
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, without_nan
@@ -67,6 +68,8 @@ class Verdict:
         dense: the same on the dense grid, if there is one.
         dense_feasible: no row violated on the dense grid; None without one.
         violated: names of the worst violated rows with the amount, own samples first.
+        guaranteed: what is proven between the samples; None where the point is infeasible, or in a record from before it was
+            asked.
     """
 
     objective: float
@@ -76,6 +79,7 @@ class Verdict:
     dense: Mapping[str, float] | None
     dense_feasible: bool | None
     violated: tuple[str, ...]
+    guaranteed: Guarantee | None = None
 
     @classmethod
     def of(cls, evaluation: Evaluation) -> Verdict:
@@ -89,6 +93,7 @@ class Verdict:
             dense=evaluation.dense,
             dense_feasible=None if evaluation.dense is None else not evaluation.dense_violations,
             violated=tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
+            guaranteed=evaluation.guaranteed,
         )
 
     @classmethod

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import casadi as ca
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError, shown, unknown
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Expression = TypeVar("Expression", MX, SX, DM)
+# Of what of a motion rows are stated: of each instant, of the change over each interval, of a time mean, of a root mean square,
+# of neighbouring samples, so that they mean nothing between them, or of no time at all.
+Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "samples", "once"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +71,7 @@ class Variable:
 
 def _check_number(owner: str, field: str, value: object) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError(f"{owner}: {field} must be a finite number, got {value!r}")
+        raise InputError(f"{owner}: {field} must be a finite number, got {shown(value)}")
 
 
 def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
@@ -104,6 +108,7 @@ class Constraint:
         value: (m, 1).
         lower: (m, 1) or scalar, a function of parameters only.
         upper: likewise.
+        over: of what the rows are stated; None if nothing is known. Labels of rows at samples end with a comma and the sample.
     """
 
     name: str
@@ -113,6 +118,7 @@ class Constraint:
     value: MX
     lower: MX | None = None
     upper: MX | None = None
+    over: Over | None = None
 
     def __post_init__(self) -> None:
         """Refuse what gives no rows, by the name of the row."""
@@ -249,3 +255,26 @@ class PointOf(Generic[Expression]):
 Point: TypeAlias = PointOf[MX]
 InstantPoint: TypeAlias = PointOf[SX]
 NumericPoint: TypeAlias = PointOf[Any]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretch:
+    """Part of a motion, over which rows are functions of a phase between 0 and 1: what holds between samples.
+
+    Attributes:
+        name: of the part, empty if it is the whole.
+        assemble: from a point, phases (1, k) and an interpretation to the rows and indexes with samples at these phases; each
+            row says by ``Constraint.over`` what it is of them.
+        times: from the values of variables and parameters by name to the instants of phase 0 and 1 [s].
+        intervals: equal parts over which limits on changes hold.
+        means: indexes that are means or integrals over time: with all samples at one phase they are what is averaged. Those
+            of one name in several stretches add up.
+        kinks: phases at which a formula changes, such as a spline's knots.
+    """
+
+    name: str = ""
+    assemble: Callable[[Point, MX, Nonsmooth], Assembly]
+    times: Callable[[Mapping[str, float]], tuple[float, float]]
+    intervals: int = 1
+    means: tuple[str, ...] = ()
+    kinks: tuple[float, ...] = ()

@@ -17,8 +17,8 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.errors import InputError, shown, unknown
+from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
 from nlp_gait.problem.locking import CASADI, one_at_a_time
 from nlp_gait.problem.motion.grid import Grid
 from nlp_gait.problem.motion.playback import Playback
@@ -68,6 +68,7 @@ class GaitProblem:
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
         searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
+        stretches: the motion's rows as functions of time, part by part; empty where a problem is sampled by definition.
         loaded_as: what ``load`` was asked for, where that is not the name: code of one's own.
     """
 
@@ -92,6 +93,7 @@ class GaitProblem:
     starts: int = 20
     searchable: bool = True
     values: Mapping[str, float] = field(default_factory=dict)
+    stretches: tuple[Stretch, ...] = ()
     loaded_as: str = ""
     # No argument, so that every copy but those of ``with_values`` begins with nothing built.
     _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
@@ -154,7 +156,7 @@ class GaitProblem:
         for name, value in values.items():
             parameter = self._parameter(name)
             if not is_number(value):
-                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
+                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {shown(value)}")
             if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
@@ -175,7 +177,7 @@ class GaitProblem:
             i = self.variable_index(name)
             if not (is_number(value) and self.lower[i] <= value <= self.upper[i]):
                 raise InputError(
-                    f"variable {name!r} cannot be fixed at {value!r}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
+                    f"variable {name!r} cannot be fixed at {shown(value)}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
                     f"{self.variables[i].unit}; widen them with --set {name}.lower=... or --set {name}.upper=..."
                 )
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
@@ -240,6 +242,7 @@ class GaitProblem:
             motion=None if motion is None else lambda at: motion(at.only(self.names)),
             start=start if self.start is not None or variables else None,
             refine=None if self.refine is None else refine,
+            stretches=self.stretches if change is None and not variables else (),
             loaded_as="" if name else self.loaded_as,
         )
 
@@ -355,7 +358,7 @@ class GaitProblem:
 
     def _parameter(self, name: str) -> Parameter:
         for parameter in self.parameters:
-            if parameter.name == name:
+            if isinstance(name, str) and parameter.name == name:
                 return parameter
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
-from nlp_gait.errors import GaitError, RobotDataError, unknown
+from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown
 from nlp_gait.files import refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
@@ -106,6 +106,8 @@ def load_robot(name_or_path: str) -> Robot:
         RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
         MissingExtraError: a URDF cannot be read without its extra.
     """
+    if not isinstance(name_or_path, str):
+        raise UnknownNameError(f"the name of a robot must be a text, got {shown(name_or_path)}")
     return _made_from(name_or_path) if is_robot_file(name_or_path) else _loaded(name_or_path)
 
 

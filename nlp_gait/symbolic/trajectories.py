@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import casadi as ca
-from casadi import SX
+from casadi import DM, SX
 
 
 class Motion(NamedTuple):
@@ -82,6 +82,11 @@ def plus(first: Motion, second: Motion) -> Motion:
 def constant(value: float) -> Motion:
     """A quantity that does not move."""
     return Motion(SX(value), SX(0), SX(0))
+
+
+def at_rest(place: Sequence[float]) -> Motion:
+    """A point (n,) that does not move."""
+    return Motion(SX(DM(list(place))), SX(len(place), 1), SX(len(place), 1))
 
 
 def stack(*motions: Motion) -> Motion:

@@ -18,6 +18,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import nlp_gait
+from compare import starting
 from compare.cli import app
 from compare.study.record import read_record
 from compare.study.steps import Steps
@@ -26,7 +27,7 @@ from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from tests.backends.toys import corner, toy
-from tests.faults.processes import start
+from tests.faults.processes import ROOT, start
 
 RUN = CliRunner()
 
@@ -278,3 +279,50 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
         == f"nlp-gait: interrupted at the end; what was found is in {tmp_path}; the same command continues\n"
     )
     assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1
+
+
+PRESSED_AT_IMPORT = """
+import signal, sys
+
+class Presses:
+    name = sys.argv.pop(1)
+
+    def find_spec(self, name, *rest):
+        if name == self.name:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Presses())
+from compare.__main__ import main
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", ["typer", "casadi", "nlp_gait.backends.kernel.compiled"])
+def test_while_modules_are_imported(module: str) -> None:
+    """Before the command has begun, and within it."""
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSED_AT_IMPORT, module, "search", "walk12", "--runs", "1"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+    )
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.startswith("nlp-gait: interrupted") and done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+def test_ctrl_c_ends_the_process_outside_of_a_command_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[object] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    monkeypatch.setattr(os, "write", lambda *what: ended.append(what))
+    before = signal.signal(signal.SIGINT, starting._end)
+    try:
+        with pytest.raises(KeyboardInterrupt), starting.raised_interrupts():
+            signal.raise_signal(signal.SIGINT)
+        assert ended == []
+        signal.raise_signal(signal.SIGINT)
+        assert ended == [(2, b"nlp-gait: interrupted\n"), 130]
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import progress_bar, say
+from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
-from compare.cli.options import AsJson, NamedProblem, Seed
+from compare.cli.options import AnyProblem, AsJson, Seed
 from compare.cli.questions.answers import Output
 
 
@@ -26,14 +27,22 @@ def certainty(
         float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables; 0 for none.")
     ] = 600.0,
     seed: Seed = 0,
-    problem: NamedProblem,
+    problem: AnyProblem,
+    check: Annotated[
+        Path | None, typer.Option(help="Certificate to check instead: random parts of its proof are made again.")
+    ] = None,
+    paths: Annotated[int, typer.Option(min=1, max=100_000, help="Parts of a proof to check.")] = 200,
     out: Annotated[Path, typer.Option(help="Folder; finished batches in it are kept.")] = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
     """Evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
 
-    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000 --evaluations 0`
+    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000 --evaluations 0`,
+    `nlp-gait certainty --check certainty/walk12-certificate.json`
     """
+    if check is not None:
+        _check(check, paths, seed, as_json)
+        return
     from compare.questions.certainty.report import certainty_answer
     from compare.questions.certainty.study import certainty as study_certainty
 
@@ -52,3 +61,21 @@ def certainty(
             progress=advance,
         )
     output.take(certainty_answer(study))
+
+
+def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
+    from compare.questions.certainty.certificate import check, read_certificate
+
+    file = read_certificate(path)
+    found = check(file, paths=paths, seed=seed)
+    proof = file.certificate
+    if as_json:
+        print_json({"schema": 1, **asdict(found)})
+        return
+    stdout.print(
+        f"{file.problem['name']}: bound {proof.bound:.8g}, incumbent {proof.objective:.8g}; {found.paths} random paths of up to "
+        f"{found.deepest} halvings end, {found.pieces:,} pieces on them are proven to hold nothing better; they make "
+        f"{found.boxes:,.0f} boxes likely, and the certificate names {proof.boxes:,}"
+        + ("" if found.same_code else "; it was made by other code than this"),
+        soft_wrap=True,
+    )

@@ -42,6 +42,7 @@ def certainty_answer(study: Certainty) -> Answer:
             text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, no proof"),
             Figure(name=stem, caption=shown, drawing=certainty_figure(study)),
         ),
+        results={} if study.certificate_json is None else {f"{problem.name}-certificate": study.certificate_json},
         data=study.to_json(),
     )
 

@@ -12,11 +12,12 @@ import numpy as np
 
 import metaheuristics
 from compare.analysis.units import with_unit
-from compare.questions.certainty import branch_and_bound
+from compare.questions.certainty import boxes, branch_and_bound
 from compare.questions.certainty.branch_and_bound import Certificate, certify
+from compare.questions.certainty.certificate import certificate_file
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
-from compare.study.definition import fingerprint
+from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from compare.study.task import plain_problem
@@ -82,8 +83,14 @@ class Certainty:
         return (
             f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
             + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
-            + "; intervals rounded outward, libm's functions taken to be within four units in the last place"
+            + "; affine arithmetic rounded outward, libm's functions taken to be within four units in the last place"
         )
+
+    @property
+    def certificate_json(self) -> dict[str, Any] | None:
+        """The certificate as a file that can be checked, where the proof is closed."""
+        c = self.certificate
+        return certificate_file(self.problem, c).to_json() if c is not None and c.closed else None
 
     @property
     def supported(self) -> str:
@@ -158,7 +165,7 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, progress, code=[branch_and_bound], anew=anew)
+    steps = Steps(out, progress, code=[boxes, branch_and_bound], anew=anew)
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -171,7 +178,9 @@ def certainty(
 
     def proven() -> dict[str, Any]:
         x = np.array(best.x)
-        found = certify(problem, x, tolerance=tolerance, time_limit_s=time_limit_s, progress=progress)
+        kept = out / "steps" / f"proof-{sha256_of({**identity, 'tolerance': tolerance})[:12]}.npz"
+        limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
+        found = certify(problem, x, **limits, progress=progress, checkpoint=kept)
         return dict(without_nan(asdict(found)))
 
     search = certificate = None

@@ -50,6 +50,12 @@ class Splines:
         return coefficient_count(SPANS[self.trajectory])
 
     @property
+    def kinks(self) -> tuple[float, ...]:
+        """Knots between the ends."""
+        spans = SPANS[self.trajectory]
+        return tuple(k / spans for k in range(1, spans))
+
+    @property
     def variables(self) -> tuple[Variable, ...]:
         """Coefficients, curve by curve."""
         return tuple(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem import Array, Assembly, Constraint, Parameter, Point, Signals, Variable
+from nlp_gait.problem import Array, Assembly, Constraint, Objective, Parameter, Point, Signals, Stretch, Variable
 from nlp_gait.problem.assembly import parameters
 from nlp_gait.problems.biped.cycle_motion import LEAST_STEP, STEP, TIMES
 from nlp_gait.problems.biped.parts import rows
@@ -21,6 +23,9 @@ from nlp_gait.robots.mirror import mirror_sign
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 SPEED = "speed_m_s"
+# Energy per metre leaves the speed free; the others are means over the time of a cycle at a given speed.
+CycleGoal = Literal["energy-per-metre", "power", "torque"]
+ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
 # Limits that differ between the phases, and so do their names.
@@ -50,6 +55,11 @@ class WalkingCycle:
     variables: tuple[Variable, ...]
     phases: Mapping[str, Phase]
     at_given_speed: bool
+
+    @property
+    def objective(self) -> Objective:
+        """What is minimised."""
+        return self.phases["ssp"].goal.objective if self.at_given_speed else ENERGY_PER_METRE
 
     @property
     def decisions(self) -> tuple[Variable, ...]:
@@ -124,14 +134,41 @@ class WalkingCycle:
     def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
         limit, joints = motion["torque_jump_limit_Nm"], self.phases["ssp"].joints
         return tuple(
-            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, self.torque_size)
+            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.torque_size)
             for switch, jump in jumps.items()
+        )
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Both phases as functions of time."""
+        found: list[Stretch] = []
+        begins: tuple[str, ...] = ()
+        for name, phase in self.phases.items():
+            for stretch in phase.stretch(name, begins):
+                found.append(
+                    replace(
+                        stretch,
+                        assemble=partial(self._assemble_at, name),
+                        means=tuple(f"{name}_{index}" for index in stretch.means),
+                    )
+                )
+            begins = (*begins, phase.duration)
+        return tuple(found)
+
+    def _assemble_at(self, name: str, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        """Rows and indexes of one phase with samples at other phases (1, k)."""
+        at, phase = self.motion(point), self.phases[name]
+        part = phase.assemble(_named_for(at, name), phase.samples_at(at, ops, phases), ops)
+        return Assembly(
+            objective=part.objective,
+            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
+            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
         )
 
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
         if not self.at_given_speed:
             return ()
-        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"]),)
+        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),)
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Changes of torques (J, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""

@@ -188,7 +188,9 @@ class FootLimits(Part):
         for side, foot in BOTH_FEET.items():
             kinds = self._bearing(foot).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
-                found.append(rows(f"{foot}_{name}", unit, ca.vec(values), MX(0.0), labels=labels(names, range(n))))
+                found.append(
+                    rows(f"{foot}_{name}", unit, ca.vec(values), MX(0.0), None, labels(names, range(n)), "instant")
+                )
             loads[foot] = samples.wrenches[side][2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
         right = samples.traces["load_slope"] / (samples.step_s * samples.steps * self._weight)
@@ -201,8 +203,16 @@ class FootLimits(Part):
         return Contribution(
             rows=(
                 *found,
-                rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names),
-                rows("switch_load", "1", ends, None, at["switch_load_limit"], ("right, landed", "left, lifting")),
+                rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
+                rows(
+                    "switch_load",
+                    "1",
+                    ends,
+                    None,
+                    at["switch_load_limit"],
+                    ("right, landed", "left, lifting"),
+                    over="once",
+                ),
             ),
             indexes={
                 "load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))),

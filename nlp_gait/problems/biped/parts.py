@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem import Constraint, InstantPoint, Parameter, Point
+from nlp_gait.problem import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.problem.assembly import parameters as table
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.samples import Samples, Trace
@@ -65,11 +65,19 @@ def rows(
     lower: MX | None = None,
     upper: MX | None = None,
     labels: Sequence[str] = (),
+    over: Over | None = None,
     size: float = 1.0,
 ) -> Constraint:
     """Rows of a part, in which a violation counts as every other in its unit; ``size`` is that of the robot next to NAO's."""
     return Constraint(
-        name=name, labels=tuple(labels), unit=unit, scale=size * SCALES[unit], value=value, lower=lower, upper=upper
+        name=name,
+        labels=tuple(labels),
+        unit=unit,
+        scale=size * SCALES[unit],
+        value=value,
+        lower=lower,
+        upper=upper,
+        over=over,
     )
 
 
@@ -95,7 +103,7 @@ class JointLimits(Part):
         limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
         names = labels(self._planned, range(n))
-        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names),))
+        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, "instant"),))
 
 
 class Reach(Part):
@@ -109,7 +117,7 @@ class Reach(Part):
         """Two-sided rows."""
         limit = 1 - at[REACH_MARGIN]
         names = labels(("left leg", "right leg"), range(samples.steps + 1))
-        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names),))
+        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, "instant"),))
 
 
 class Closure(Part):
@@ -127,7 +135,7 @@ class Closure(Part):
         columns = samples.steps + 1
         miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(self._legs) * columns)
         names = labels(self._legs, range(columns))
-        return Contribution(rows=(rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names),))
+        return Contribution(rows=(rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant"),))
 
 
 class DriveLimits(Part):
@@ -152,8 +160,17 @@ class DriveLimits(Part):
         torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
         return Contribution(
             rows=(
-                rows("effort", "Nm", torque, -strongest, strongest, labels(samples.joints, range(n)), self._size),
-                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n))),
+                rows(
+                    "effort",
+                    "Nm",
+                    torque,
+                    -strongest,
+                    strongest,
+                    labels(samples.joints, range(n)),
+                    "instant",
+                    self._size,
+                ),
+                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n)), "instant"),
             ),
             indexes={
                 "effort_share": ca.mmax(ca.fabs(torque) / strongest),
@@ -183,7 +200,7 @@ class TorqueChange(Part):
         limit = at["torque_change_limit_Nm"]
         names = labels(samples.joints, range(change.shape[1]))
         return Contribution(
-            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, self._size),),
+            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size),),
             indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
         )
 
@@ -213,10 +230,13 @@ class BalanceMargins(Part):
         means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
         each = [
-            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names)
+            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
             for axis, margin in margins.items()
         ]
-        mean = [rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"]) for axis, value in means.items()]
+        mean = [
+            rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
+            for axis, value in means.items()
+        ]
         return Contribution(
             rows=(*each, *mean),
             indexes={
@@ -253,7 +273,7 @@ def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> 
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
     )
-    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)))
+    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), "instant")
 
 
 class FootClearance(Part):
@@ -272,7 +292,7 @@ class FootClearance(Part):
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Rows with a lower bound, and the equation of the middle."""
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
-        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)])
+        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         halfway = self._halfway(at)
         return Contribution(rows=(above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])))
 
@@ -297,6 +317,6 @@ def halfway_rows(
         corners: names of the points.
     """
     return (
-        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0)),
-        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners),
+        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
+        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),
     )

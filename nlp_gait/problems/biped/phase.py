@@ -20,6 +20,7 @@ from nlp_gait.problem import (
     Parameter,
     Point,
     Signals,
+    Stretch,
     Variable,
     in_space,
 )
@@ -107,6 +108,7 @@ class Phase:
         derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
         parts: what limits the phase.
         goal: what it minimises.
+        kinks: phases at which the motion's formula changes: knots of splines.
     """
 
     robot: Robot
@@ -120,6 +122,7 @@ class Phase:
     derivatives: Derivatives = "analytic"
     parts: Sequence[Part] = ()
     goal: Goal = Goal()
+    kinks: tuple[float, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -140,9 +143,18 @@ class Phase:
 
     def samples(self, at: Point, ops: Nonsmooth) -> Samples:
         """The phase at N + 1 equidistant samples, each evaluated once; mapped, never unrolled."""
+        return self.samples_at(at, ops, None)
+
+    def samples_at(self, at: Point, ops: Nonsmooth, phases: MX | None) -> Samples:
+        """The phase at its samples, or at other phases (1, k).
+
+        Finite differences are of the samples themselves, so that other phases have analytic derivatives only.
+        """
         traces, motion, pressed = self._traces, self._reads_motion, len(BOTH_FEET) * self._reads_wrenches
         if self.derivatives == "analytic":
-            planned, reach, torque, power, zmp, miss, *rest = self._sampled(at, ops, motion, pressed > 0, traces)
+            planned, reach, torque, power, zmp, miss, *rest = self._sampled(
+                at, ops, motion, pressed > 0, traces, phases
+            )
             wrenches, moved, seen = rest[:pressed], rest[pressed : pressed + 3 * motion], rest[pressed + 3 * motion :]
         else:
             q, _, _, hip, planned, reach, world, _, *seen = self._mapped(self._kinematics(ops, traces), at)
@@ -155,7 +167,7 @@ class Phase:
         return Samples(
             joints=self.joints,
             moving=self.moving,
-            per_interval=self.grid.samples_per_interval,
+            per_interval=self.grid.samples_per_interval if phases is None else 1,
             duration=at[self.duration],
             planned=planned,
             reach=reach,
@@ -166,6 +178,34 @@ class Phase:
             motion=tuple(moved),
             wrenches=dict(zip(BOTH_FEET, wrenches, strict=False)),
             traces=dict(zip(traces, seen, strict=True)),
+        )
+
+    def stretch(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[Stretch, ...]:
+        """The phase as functions of time; none with finite differences, which are of its samples.
+
+        Args:
+            name: of the phase in a longer motion.
+            begins: durations of the phases before it.
+        """
+        if self.derivatives != "analytic":
+            return ()
+
+        def assemble(at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+            return self.assemble(at, self.samples_at(at, ops, phases), ops)
+
+        def times(values: Mapping[str, float]) -> tuple[float, float]:
+            start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
+            return start, start + max(values[self.duration], LEAST_DURATION)
+
+        return (
+            Stretch(
+                name=name,
+                assemble=assemble,
+                times=times,
+                intervals=self.grid.intervals,
+                means=("power_W", "paper_power_W", "dbm_x_mean_m", "dbm_y_mean_m"),
+                kinks=self.kinks,
+            ),
         )
 
     def signals(self, at: NumericPoint) -> Signals:
@@ -244,19 +284,25 @@ class Phase:
         return [x, margin, phase], self.plan(at, phase, ops), at
 
     def _sampled(
-        self, at: Point, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]
+        self,
+        at: Point,
+        ops: Nonsmooth,
+        motion: bool,
+        wrenches: bool,
+        traces: Mapping[str, Trace],
+        phases: MX | None,
     ) -> list[Any]:
-        """Outputs of ``_sample`` at all samples; equations that it leaves open are tied."""
+        """Outputs of ``_sample`` at all samples, or at other phases; equations that it leaves open are tied."""
         inputs, outputs = self._sample(ops, motion, wrenches, traces)
         roots = ops.open_roots()
         if roots is None:
-            return self._mapped(ca.Function("sample", inputs, economical(outputs)), at)
-        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at)
+            return self._mapped(ca.Function("sample", inputs, economical(outputs)), at, phases=phases)
+        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], economical([roots.residual, *outputs]))
         found: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *rest = self._mapped(tied, at, unknowns)
+            rows, *rest = self._mapped(tied, at, unknowns, phases=phases)
             found.extend(rest)
             return rows
 
@@ -324,10 +370,15 @@ class Phase:
         loads = self.loads({**plan.joints, **moved}, hip, feet, ca.vertcat(*wrench) if wrench else SX(0, 1))
         return [*parts, hip, world], loads
 
-    def _mapped(self, function: ca.Function, at: Point, *columns: MX) -> list[Any]:
-        """A function of columns that differ from sample to sample and (x, margin, phase) at all samples, one column each."""
-        n = self.grid.parts + 1
+    def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
+        """A function of columns and (x, margin, phase) at all samples, or at other phases (1, k), one column each.
+
+        Columns are those of its inputs that differ from sample to sample.
+        """
+        n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         margin = ca.repmat(at[REACH_MARGIN], 1, n)
+        if phases is not None:
+            return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, phases]))
         function, table = tabulated(function, DM(np.linspace(0.0, 1.0, n)).T)
         return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, table]))
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem import Array, GaitProblem, InstantPoint, Objective, Point, Variable, maker
+from nlp_gait.problem import Array, GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.curves import grid_for
-from nlp_gait.problems.biped.cycle import SPEED, WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle import SPEED, CycleGoal, WalkingCycle, joined, start_at_speed
 from nlp_gait.problems.biped.cycle_motion import (
     LIFT,
     STEP,
@@ -41,8 +40,6 @@ from nlp_gait.problems.humanoid.single_support import sole_margins
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
 
-CycleGoal = Literal["energy-per-metre", "power", "torque"]
-ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 SPEED_M_S = 0.03  # NAO's
 
@@ -61,8 +58,8 @@ def humanoid_cycle(
 ) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one; for the options see ``problems.humanoid``.
 
-    ``objective=power``, and ``torque`` for squared torques, are those at the speed ``speed_m_s``, a parameter: the step length
-    follows from it.
+    ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
+    parameter: the step length follows from it.
     """
     body = humanoid(robot)
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
@@ -92,7 +89,7 @@ def humanoid_cycle(
         for name, (plan, loads, margins, more) in halves.items()
     }
     cycle = _cycle(body, real, variables, phases, at_given_speed)
-    return _problem(body, cycle, sharing, goal.objective if at_given_speed else ENERGY_PER_METRE, at_given_speed)
+    return _problem(body, cycle, sharing, at_given_speed)
 
 
 def _cycle(
@@ -110,9 +107,7 @@ def _cycle(
     )
 
 
-def _problem(
-    body: Humanoid, cycle: WalkingCycle, sharing: Sharing, objective: Objective, at_given_speed: bool
-) -> GaitProblem:
+def _problem(body: Humanoid, cycle: WalkingCycle, sharing: Sharing, at_given_speed: bool) -> GaitProblem:
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(at: Point) -> MX:
@@ -124,10 +119,10 @@ def _problem(
     own = sharing.start_of(names, start if at_given_speed else None)
     problem = GaitProblem(
         name="humanoid-cycle",
-        title=f"{body.biped.full.name}, walking cycle: least {objective.name.replace('_', ' ')}",
+        title=f"{body.biped.full.name}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=objective,
+        objective=cycle.objective,
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
         motion=lambda at: joined(cycle.signals(at)),

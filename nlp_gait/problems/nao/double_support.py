@@ -88,6 +88,7 @@ def nao_dsp(
             *sharing.parts,
         ),
         goal=goal_of(objective, real),
+        kinks=splines.kinks,
     )
     return phase_problem(
         "nao-dsp",

@@ -105,6 +105,7 @@ def nao_dsp_free(
             FlatSoles(lambda at, s: closure(model, pose(at, s), ankles)[1]),
             *sharing.parts,
         ),
+        kinks=splines.kinks,
     )
     return phase_problem(
         "nao-dsp-free",
@@ -130,4 +131,4 @@ class FlatSoles(Part):
         """Two-sided rows."""
         names = labels(("left", "right"), range(1, samples.steps))
         turns = ca.vec(samples.traces["sole_turn"][:, 1:-1])
-        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names),))
+        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names, "instant"),))

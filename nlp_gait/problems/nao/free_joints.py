@@ -174,20 +174,20 @@ class FreePhase(Phase):
 
     free: FreeMotion
 
-    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
-        """The phase at N + 1 equidistant samples; traces are ``others``, ``along``, ``heights`` and ``sides``.
+    def samples_at(self, at: Point, ops: Nonsmooth, phases: MX | None) -> Samples:
+        """The phase at its samples, or at other phases (1, k); traces are ``others``, ``along``, ``heights`` and ``sides``.
 
         The joints' motion is tied, for torques are far from linear in it and it is linear in most of the many variables; and so
         is what follows from it at each sample alone, before limits join samples. Traces: ``others`` (5, N + 1), angles of the
         hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad]; ``along`` (1, N + 1), x of the right ankle [m]; ``heights``
         (4, N + 1) of the right sole's corners above the ground [m]; ``sides`` (2, N + 1), y of its left corners [m].
         """
-        n = self.grid.parts + 1
+        n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
         joints = self.free.joints(InstantPoint.of(x, margin, self.names, [REACH_MARGIN]), s, ops)
         moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
         motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
-        motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T)
+        motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
         motions = tied(values, ops)
         torque, zmp, along, heights, sides = (tied(part, ops) for part in self.free.instant.map(n)(motions))
@@ -195,7 +195,7 @@ class FreePhase(Phase):
         return Samples(
             joints=JOINTS,
             moving=MOVING,
-            per_interval=self.grid.samples_per_interval,
+            per_interval=self.grid.samples_per_interval if phases is None else 1,
             duration=at[self.duration],
             planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
             reach=ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
@@ -248,7 +248,7 @@ class FreeLimits(Part):
 def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
     """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
     names = labels(corners, range(1, values.shape[1] + 1))
-    return rows(name, "m", ca.vec(values), MX(0.0), labels=names)
+    return rows(name, "m", ca.vec(values), MX(0.0), None, names, "instant")
 
 
 def free_splines(trajectory: Trajectory) -> Splines:

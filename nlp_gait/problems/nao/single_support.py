@@ -83,6 +83,7 @@ def nao_ssp(
             *real.parts,
         ),
         goal=goal_of(objective, real),
+        kinks=splines.kinks,
     )
     return phase_problem(
         "nao-ssp",

@@ -75,6 +75,7 @@ def nao_ssp_free(
             FreeLimits(model, sum(stance.swing_x) / 2, stance.support_xy[1] - foot.right_m),
         ),
         free=motion,
+        kinks=splines.kinks,
     )
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

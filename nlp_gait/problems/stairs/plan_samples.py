@@ -18,7 +18,7 @@ from nlp_gait.problems.stairs.formulas.posture import Posture, posture
 from nlp_gait.problems.stairs.governing import GOVERNING, governing, stair_plan
 from nlp_gait.problems.stairs.robot import toe_foot_biped
 from nlp_gait.problems.stairs.stair import GRAVITY, SETBACK, stair_of
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
 # The swing foot is checked against the stair this often per interval, and not while the toe leaves or meets the ground.
@@ -79,14 +79,14 @@ class PlannedStep:
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
         return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
-    def samples(self, point: Point, ops: Nonsmooth) -> PlanSamples:
-        """The step at all samples."""
-        s, passing = self.grid
+    def samples(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> PlanSamples:
+        """The step at all samples, or at those of another grid."""
+        s, passing = grid or self.grid
         return PlanSamples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
 
-    def clearances(self, point: Point, ops: Nonsmooth) -> MX:
+    def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> MX:
         """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._mapped(clearance_function(ops), point, *self.clearance_grid)
+        return self._mapped(clearance_function(ops), point, *(grid or self.clearance_grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -113,11 +113,20 @@ class PlannedStep:
         """Number of the first sample of each phase."""
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
-    def _mapped(self, function: ca.Function, point: Point, s: Array, passing: Array, *more: MX) -> MX:
+    def _mapped(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
         stair = stair_of(point)
         constants = (governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
         columns = s.shape[1]
-        return function.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in constants))
+        repeated = (ca.repmat(value, 1, columns) for value in constants)
+        return function.map(columns)(s if isinstance(s, MX) else DM(s), DM(passing), *repeated)
+
+
+def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
+    """The same grid as ``phase_grid`` gives, at fractions (1, k) of one phase alone."""
+    k = int(fractions.shape[1])
+    parts = [MX(DM.ones(1, k) * float(j < phase)) for j in range(len(PHASES))]
+    parts[phase] = fractions
+    return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
 
 
 def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
@@ -174,6 +183,18 @@ def clearance_function(ops: Nonsmooth) -> ca.Function:
     found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
+
+
+def reach_function(per_phase: int) -> ca.Function:
+    """Cosines of both knees (2, m) at the samples of a step, from governing parameters, size and reach margin."""
+    inputs, _, _, step = _planned(Exact())
+    s, passing = PlannedStep(per_phase=per_phase).grid
+    one = ca.Function("reach", inputs, [ca.cse(step.reach)])
+    given = [SX.sym("given", size.shape) for size in inputs[2:]]
+    columns = s.shape[1]
+    return ca.Function(
+        "reach", given, [one.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in given))]
+    )
 
 
 def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:

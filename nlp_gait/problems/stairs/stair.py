@@ -109,6 +109,7 @@ def rows(
         value=ca.vec(value),
         lower=None if lower is None else MX(lower),
         upper=None if upper is None else MX(upper),
+        over="instant",
     )
 
 

@@ -19,6 +19,7 @@ from nlp_gait.problem import (
     Objective,
     Point,
     Signals,
+    Stretch,
     Variable,
     maker,
     parameters,
@@ -79,6 +80,14 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)
 
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        zmp_at = _sampled(_zmp_function(robot, ops, zmp), point, phases)
+        Q = point["step_time_s"] * ca.sum1(ca.sum2(zmp_at**2)) / phases.shape[1]
+        indexes = {"Q_m2s": Q} if horizon == "step" else {}
+        return Assembly(
+            objective=MX(0), constraints=(_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
+        )
+
     def motion(at: NumericPoint) -> Signals:
         return locomotion(
             robot,
@@ -101,6 +110,13 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
         motion=motion,
         skeleton=skeleton(robot),
         playback=playback(robot, zmp),
+        stretches=(
+            Stretch(
+                assemble=at_phases,
+                times=lambda values: (0.0, values["step_time_s"]),
+                means=("Q_m2s",) if horizon == "step" else (),
+            ),
+        ),
         hessian="limited-memory",  # from 640 random starts all converge; of those with the exact one, 5 fail
     )
 
@@ -126,23 +142,30 @@ def _assemble(point: Point, zmp_at: ca.Function, robot: PointMassBiped, interval
     f1 = 1 / Q  # (eq. 10)
     f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
     indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_stability(zmp, robot)}
-    return Assembly(objective=f, constraints=(_reach(point, robot, intervals // 2),), indexes=indexes)
+    return Assembly(objective=f, constraints=(_reach(point, robot, *_panels(intervals // 2)),), indexes=indexes)
 
 
-def _reach(point: Point, robot: PointMassBiped, intervals: int) -> Constraint:
-    """Knees bent by at least kappa, at the ends of Simpson's panels: near-straight legs make the ZMP spike."""
+def _panels(intervals: int) -> tuple[DM, list[str]]:
+    """Phases (1, n) of the ends of Simpson's panels, with their names."""
+    n = intervals + 1
+    return DM(np.linspace(0.0, 1.0, n)).T, [f"{k / intervals:g} T" for k in range(n)]
+
+
+def _reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
+    """Knees bent by at least kappa, at the ends of Simpson's panels or other phases: near-straight legs make the ZMP spike."""
     x, phase = SX.sym("x", len(VARIABLES)), SX.sym("phase")
     cosines = ca.Function("reach", [x, phase], ca.cse([reaches(x, phase, robot)]))
-    n = intervals + 1
+    n = len(names)
     limit = ca.cos(point["reach_margin_rad"])
     return Constraint(
         name="reach",
-        labels=tuple(f"{leg} leg, {k / intervals:g} T" for k in range(n) for leg in ("stance", "swing")),
+        labels=tuple(f"{leg} leg, {name}" for name in names for leg in ("stance", "swing")),
         unit="1",
         scale=1.0,
-        value=ca.vec(cosines.map(n)(ca.repmat(point.x, 1, n), DM(np.linspace(0.0, 1.0, n)).T)),
+        value=ca.vec(cosines.map(n)(ca.repmat(point.x, 1, n), phases)),
         lower=-limit,
         upper=limit,
+        over="instant",
     )
 
 

@@ -12,8 +12,9 @@ from casadi import MX
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings
+from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
+from nlp_gait.backends.solvers.stages import CONVERGED
 from nlp_gait.problem import Constraint
 from nlp_gait.problem.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -140,7 +141,7 @@ def test_what_ipopt_returns_is_said_in_words(returned: str, words: str) -> None:
     """The limit is out of reach, so that the exact functions find every point infeasible."""
     problem = toy(corner, limit=2.5)
     ready = IpoptSettings(iterations=1).ready_for(problem)
-    ready._cold = Returning(ready._cold, returned)  # type: ignore[assignment]
+    ready.cold = Returning(ready.cold, returned)  # type: ignore[assignment]
     outcome = ready.run(problem, np.array([-2.0, -1.0]))
     assert (outcome.success, outcome.claimed, outcome.status) == (False, False, words)
 

@@ -70,7 +70,7 @@ def test_other_planners_take_the_same_footsteps(gaits: list[Gait]) -> None:
     for rival in (cart, torque):
         assert rival.indexes["energy_J_per_m"] > gaits[1].indexes["energy_J_per_m"]
         assert rival.indexes["step_length_m"] == pytest.approx(gaits[1].indexes["step_length_m"], rel=1e-9)
-    assert torque.broken == () and cart.broken[0].startswith("dsp_dbm_y_mean by 0.01")
+    assert torque.broken == () and any(" Nm" in limit or " m" in limit for limit in cart.broken)
     parts = walk_answer(SPEC, gaits, [cart, torque]).parts
     said = [part for part in parts if isinstance(part, str)]
     saved = 100 * (1 - gaits[1].indexes["energy_J_per_m"] / cart.indexes["energy_J_per_m"])

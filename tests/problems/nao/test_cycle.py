@@ -78,8 +78,7 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     real = nao_motors("", nao("nao-v5", rotational_inertia=True))
     sharing = standing(real.model).sharing(problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
     assert problem.grid is not None
-    at_given_speed = problem.options["objective"] == "power"
-    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=at_given_speed)
+    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

@@ -8,13 +8,12 @@ and the step length are variables, and the cycle repeats after mirroring left to
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
 
 import numpy as np
 
-from nlp_gait.problem import Array, GaitProblem, Grid, Objective, Variable, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, Variable, maker
 from nlp_gait.problems.biped.curves import grid_for
-from nlp_gait.problems.biped.cycle import WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle import CycleGoal, WalkingCycle, joined, start_at_speed
 from nlp_gait.problems.biped.cycle_motion import TIMES
 from nlp_gait.problems.biped.double_support import LOAD_DEGREE, Sharing, TorsoShare
 from nlp_gait.problems.biped.goals import Goal
@@ -30,9 +29,6 @@ from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import partner
-
-CycleGoal = Literal["energy-per-metre", "power", "torque"]
-ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 
 
 @maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
@@ -67,7 +63,6 @@ def nao_cycle(
     sharing = standing(real.model).sharing(torso_share, load_degree)
     goal = goal_of("torque" if objective == "torque" else "power", real)
     cycle = walking_cycle(real, sharing, grid, goal, at_given_speed=at_given_speed)
-    least = goal.objective if at_given_speed else ENERGY_PER_METRE
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -75,15 +70,16 @@ def nao_cycle(
 
     problem = GaitProblem(
         name="nao-cycle",
-        title=f"NAO, walking cycle: least {least.name.replace('_', ' ')}",
+        title=f"NAO, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=least,
+        objective=cycle.objective,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),
         start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
+        stretches=cycle.stretches,
         long_derivatives=bool(sharing.variables),
     )
     return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.problem import Array, Constraint, NumericPoint, Parameter, Point, Signals, Variable
+from nlp_gait.problem import Array, Constraint, NumericPoint, Parameter, Point, Signals, Stretch, Variable
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.parts import Contribution, Part, rows
 from nlp_gait.problems.biped.phase import BOTH_FEET, COLUMNS, WRENCHES, Phase
@@ -52,6 +52,10 @@ class RecordedPhase(Phase):
         """Joints whose angle changes over the phase."""
         turned = np.ptp(self.recorded.q, axis=0)
         return tuple(name for name, range_rad in zip(JOINTS, turned, strict=True) if range_rad > MOVES)
+
+    def stretch(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[Stretch, ...]:
+        """None: between the samples of a recording nothing is known."""
+        return ()
 
     def samples(self, at: Point, ops: Nonsmooth) -> Samples:
         """The phase at N + 1 equidistant samples.

@@ -18,7 +18,7 @@ from nlp_gait.problems.biped.phase import Loader
 from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
-from nlp_gait.problems.nao.cycle.problem import ENERGY_PER_METRE, nao_cycle_of
+from nlp_gait.problems.nao.cycle.problem import nao_cycle_of
 from nlp_gait.problems.nao.cycle.rows import double_margins, mean_margins, single_margins
 from nlp_gait.problems.nao.double_support import DURATION, standing
 from nlp_gait.problems.nao.legs import hip_variables
@@ -111,8 +111,7 @@ def recorded(
         problem = _cycle(model, parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
         options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
         problem = replace(problem, options=options, refine=lambda by: built(factor * by))
-        repeats = len(parts) > 1 and motion.repeats
-        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
+        return with_robot(problem, robot, model.armatures_kgm2)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     times: tuple[float, ...]
@@ -210,7 +209,7 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         title="A recorded gait of NAO, a walking cycle",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=ENERGY_PER_METRE,
+        objective=cycle.objective,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),

@@ -1,0 +1,145 @@
+"""Pieces of time, halved until every row is shown to hold over each, or enough is known of how it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.backends.kernel.affine import AffineFunction, Forms
+from nlp_gait.problem import Array
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+# Phases are multiples of this, so that they and their sums are exact; an interval of a phase is rounded to one.
+GRAIN = 2.0**-40
+FIRST_PIECES = 64
+LEAST_PIECE = 2.0**-16
+# Pieces of a stretch after which what is open stays open.
+MOST_PIECES = 3000
+# A violated row's bounds are sharpened until they agree to this share.
+SHARPNESS = 0.02
+# Share of a mean's value within which its bounds are wanted, and pieces after which they are left as they are.
+MEAN_SHARPNESS = 4e-3
+MOST_MEAN_PIECES = 800
+# Widens sums of pieces by far more than they can be rounded.
+ROUNDING = 1e-12
+
+
+def first_pieces(kinks: Sequence[float], shift: float | None) -> Array:
+    """(P, 2) pieces of the phase, none of which has a kink inside, at itself or an interval later."""
+    last = 1.0 - (shift or 0.0)
+    inner = [kink - later for kink in kinks for later in ((0.0, shift) if shift else (0.0,))]
+    even = np.round(np.linspace(0.0, last, FIRST_PIECES + 1) / GRAIN) * GRAIN
+    cuts = np.unique([*even, *(cut for cut in inner if 0.0 < cut < last)])
+    return np.stack([cuts[:-1], cuts[1:]], axis=-1)
+
+
+def halves(pieces: Array) -> Array:
+    """(2 P, 2) pieces, each cut in the middle."""
+    middle = np.round(pieces.mean(axis=1) / GRAIN) * GRAIN
+    return np.concatenate([np.stack([pieces[:, 0], middle], -1), np.stack([middle, pieces[:, 1]], -1)])
+
+
+class Search:
+    """Halving of pieces until every row is shown to hold, or enough is known of its violation.
+
+    Attributes:
+        count: pieces enclosed.
+        first: earliest piece in which a row is not shown to hold, by its number.
+        least: (m,) the largest violation is at least this.
+        most: (m,) and at most this.
+    """
+
+    def __init__(self, values: AffineFunction, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
+        self._values, self._given, self._shift = values, given, shift
+        self._lower, self._upper = lower, upper
+        self.count = 0
+        self.least = np.full(len(lower), -np.inf)
+        self.most = np.full(len(lower), -np.inf)
+        self.first: dict[int, tuple[float, float]] = {}
+        self._settled: list[tuple[Array, Array]] = []
+
+    def run(self, pieces: Array) -> None:
+        """Halve what is open until little is, or the pieces are too many or too small."""
+        m = len(self._lower)
+        while len(pieces):
+            forms = self._enclosed(pieces)
+            self.count += len(pieces)
+            low, high = forms.lower[:, :m], forms.upper[:, :m]
+            most = np.maximum(self._lower - low, high - self._upper)
+            least = np.maximum(self._lower - high, low - self._upper)
+            self.least = np.fmax(self.least, least.max(axis=0, initial=-np.inf))
+            holds = most <= FEASIBILITY_TOLERANCE
+            broken = least > FEASIBILITY_TOLERANCE
+            sharp = most <= self.least + np.maximum(SHARPNESS * self.least, FEASIBILITY_TOLERANCE)
+            width = pieces[:, 1] - pieces[:, 0]
+            large = (width > 2 * LEAST_PIECE) & (self.count + 2 * len(pieces) <= MOST_PIECES)
+            coarse = width > 4.0 / FIRST_PIECES**2  # where a row breaks, its beginning is wanted no finer
+            again = large & ((~holds & ~broken & ~(sharp & ~coarse[:, None])) | (~holds & ~sharp)).any(axis=1)
+            stays = ~again
+            self._settle(pieces[stays], Forms(*(part[stays] for part in forms)), most[stays], holds[stays])
+            pieces = halves(pieces[again])
+
+    def open_rows(self) -> list[int]:
+        """Numbers of the rows that are not shown to hold."""
+        return sorted(self.first)
+
+    def integrals(self) -> tuple[Array, Array]:
+        """Bounds of the integrals over the phase of what follows the rows, (k,) each."""
+        parts = np.concatenate([parts for _, parts in self._settled])
+        low, high = parts.sum(axis=0).T
+        return low - ROUNDING * (1 + np.abs(low)), high + ROUNDING * (1 + np.abs(high))
+
+    def sharpen_integrals(self, limits: Array) -> None:
+        """Halve the pieces that add most to the width of the integrals' bounds, until these are narrow.
+
+        Args:
+            limits: (k, 2) of the integrals: while one may lie on either side of a limit, its bounds are not narrow.
+        """
+        pieces = np.concatenate([pieces for pieces, _ in self._settled])
+        parts = np.concatenate([parts for _, parts in self._settled])
+        while parts.shape[1]:
+            spread = parts[..., 1] - parts[..., 0]
+            low, high = parts.sum(axis=0).T
+            astride = ((low[:, None] < limits) & (limits < high[:, None])).any(axis=1)
+            wanted = np.where(astride, 0.0, MEAN_SHARPNESS * np.abs(low + high) / 2)
+            again: Flags = (spread > wanted / len(pieces)).any(axis=1) & (spread.sum(axis=0) > wanted).any()
+            if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
+                break
+            finer = halves(pieces[again])
+            self.count += len(finer)
+            pieces = np.concatenate([pieces[~again], finer])
+            parts = np.concatenate([parts[~again], self._integrated(finer, self._enclosed(finer))])
+        self._settled = [(pieces, parts)]
+
+    def _integrated(self, pieces: Array, forms: Forms) -> Array:
+        """(P, k, 2) bounds of the integrals over pieces, to which a form's slope adds nothing."""
+        with np.errstate(invalid="ignore"):
+            lower, upper = (
+                np.fmax(forms.lower, forms.middle - forms.error),
+                np.fmin(forms.upper, forms.middle + forms.error),
+            )
+        both = np.stack([lower, upper], axis=-1)[:, len(self._lower) :]
+        return np.asarray(both * (pieces[:, 1] - pieces[:, 0])[:, None, None])
+
+    def _settle(self, pieces: Array, forms: Forms, most: Array, holds: Flags) -> None:
+        self._settled.append((pieces, self._integrated(pieces, forms)))
+        self.most = np.fmax(self.most, most.max(axis=0, initial=-np.inf))
+        for piece, k in zip(*np.nonzero(~holds), strict=True):
+            a, b = pieces[piece].tolist()
+            if k not in self.first or a < self.first[k][0]:
+                self.first[int(k)] = (a, b)
+
+    def _enclosed(self, pieces: Array) -> Forms:
+        inputs = self._values.inputs
+        boxes = np.empty((len(pieces), inputs, 2))
+        boxes[:, : len(self._given)] = self._given[:, None]
+        boxes[:, len(self._given)] = pieces
+        if self._shift is not None:
+            boxes[:, -1] = pieces + self._shift
+        symbols = np.full(inputs, -1)
+        symbols[len(self._given) :] = 0
+        return self._values(boxes, symbols)

@@ -1,0 +1,127 @@
+"""Runs of a method on a problem's NLP in stages of narrowing sigmoid width, each of which starts from the last one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from nlp_gait.backends.interrupts import deferred_interrupts, never
+from nlp_gait.backends.nlp import WIDTHS, NlpModel
+from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
+from nlp_gait.backends.solvers.solver import Solver, counted, judged
+from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
+
+CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+# Sigmoid widths of further stages, which are tried only if the exact functions find the point infeasible.
+NARROWER_WIDTHS = (1e-4, 2e-5)
+
+
+class Method(Protocol):
+    """What minimises an NLP: an ``nlpsol`` of CasADi, or what is called like one."""
+
+    def __call__(self, **arguments: Any) -> Mapping[str, Any]:
+        """From x0, p, bounds lbx, ubx, lbg, ubg and, to start warm, multipliers lam_x0, lam_g0, to x, lam_x, lam_g."""
+
+    def stats(self) -> Mapping[str, Any]:
+        """Of the last call: return_status, iter_count, and n_call_... of each function."""
+
+
+class StagedSolver(Solver):
+    """A method made for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only.
+
+    Attributes:
+        model: the NLP.
+        cold: for the first stage.
+        warm: for the others, and for neighbouring problems.
+        watch: what both ask after each iteration.
+        words: what their statuses mean.
+        time_limit_s: limit of wall time for all stages of a run [s].
+        linear_solver: the one that is really used.
+        compiled: whether compiled functions are called.
+        create_s: time to generate derivatives and methods, and to compile them [s].
+    """
+
+    model: NlpModel
+    cold: Method
+    warm: Method
+    watch: IterationWatch
+    words: Mapping[str, str]
+    time_limit_s: float
+    linear_solver: str
+    compiled: bool
+    create_s: float
+
+    @one_at_a_time
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
+        start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
+        return self._stages(problem, x0, start, self.model.widths, stop, cold=True)
+
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        """The last stage alone, from the outcome of a neighbouring problem; None if that has no multipliers."""
+        guess = near.guess
+        if guess is None:
+            return None
+        x0 = np.clip(near.x, problem.lower, problem.upper)
+        start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
+        return self._stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
+
+    @one_at_a_time
+    def _stages(
+        self,
+        problem: GaitProblem,
+        x0: Array,
+        start: dict[str, Array],
+        widths: tuple[float, ...],
+        stop: Callable[[], bool],
+        cold: bool,
+    ) -> Outcome:
+        """Stages of a run. Where the caller does not ask to stop, Ctrl-C ends the iterations and is raised after them."""
+        model, p = self.model, problem.p
+        bounds = model.bounds(problem)
+        iterations, evaluations = 0, Evaluations()
+        started = time.perf_counter()
+        with deferred_interrupts() if stop is never else nullcontext(stop) as asked:
+            self.watch.begin(asked, started + self.time_limit_s)
+            for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
+                method = self.cold if cold and stage == 0 else self.warm
+                result = method(p=np.append(p, width), **start, **bounds)
+                stats = method.stats()
+                iterations += int(stats["iter_count"])
+                evaluations += counted(stats)
+                z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
+                start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
+                status = self.watch.reason or str(stats["return_status"])
+                if stage + 1 < len(widths) and status not in REASONS:
+                    continue
+                outcome = judged(
+                    self.name,
+                    problem,
+                    x0,
+                    model.point(z),
+                    claimed=status in CONVERGED,
+                    status=self.words.get(status, status.replace("_", " ").lower()),
+                    iterations=iterations,
+                    evaluations=evaluations,
+                    build_s=model.build_s,
+                    compile_s=self.create_s,
+                    time_s=time.perf_counter() - started,
+                    functions="compiled" if self.compiled else "interpreted",
+                    linear_solver=self.linear_solver,
+                    guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
+                )
+                if not outcome.claimed or outcome.violation <= FEASIBILITY_TOLERANCE:
+                    break
+        if stop is never and asked():
+            raise KeyboardInterrupt
+        if outcome.claimed and not outcome.feasible:
+            refused = f"{outcome.status}, but the exact functions find it infeasible"
+            return replace(outcome, claimed=False, status=refused)
+        return outcome

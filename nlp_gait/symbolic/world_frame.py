@@ -1,0 +1,189 @@
+"""Inverse dynamics of an upright biped in world coordinates: the same torques as the recursion, from far fewer nested turns.
+
+Axes and centres of all links are functions of where hips and ankles are, and moments are sums of arms times forces. The
+recursion carries forces through one joint after the other; over a box of gaits that multiplies what is unknown, and bounds of
+torques are many times wider. Here the knee follows from the squared distance of hip and ankle, without an angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, SX
+
+from nlp_gait.robots.robot import Joint
+from nlp_gait.robots.tree import Body
+from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.trajectories import Motion, through
+
+
+class Frame(NamedTuple):
+    """A link's axes and a point of it, in the world.
+
+    Attributes:
+        axes: (3, 3) motion of the rotation from link axes to world axes.
+        origin: (3,) motion of the origin of the link's own frame [m].
+    """
+
+    axes: Motion
+    origin: Motion
+
+
+class LegFrames(NamedTuple):
+    """Links of a leg under an upright pelvis and over a flat sole: rolled ones at hip and ankle, thigh and tibia."""
+
+    hip: Frame
+    thigh: Frame
+    tibia: Frame
+    ankle: Frame
+
+
+def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_cosine: float = 1.0) -> LegFrames:
+    """Frames of a leg's links from its hip joint and its ankle.
+
+    Args:
+        hip: (3,) motion of the hip joint [m].
+        ankle: (3,) of the ankle [m].
+        thigh: hip to knee [m].
+        tibia: knee to ankle [m].
+        largest_cosine: of the knee's angle. A distance beyond is taken as the one there, so that nothing is undefined; what
+            comes out is then right for no gait.
+
+    Source:
+        The pose of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); this form is the package's own.
+    """
+    farthest = thigh**2 + tibia**2 + 2 * thigh * tibia * largest_cosine
+
+    def columns(v: SX) -> SX:
+        """Rolled axes, axes of thigh and tibia, and the knee from the hip, side by side (3, 10)."""
+        x, y, z = ca.vertsplit(v)
+        length_squared = y * y + z * z
+        length = ca.sqrt(length_squared)
+        forward, left, upward = SX(DM([1, 0, 0])), ca.vertcat(0, -z, y) / length, ca.vertcat(0, -y, -z) / length
+        inverse = 1 / ca.fmin(x * x + length_squared, farthest)
+        along = 0.5 + (thigh**2 - tibia**2) / 2 * inverse
+        across = ca.sqrt(thigh**2 * inverse - along**2)
+        out, down = along * x + across * length, along * length - across * x  # of the knee from the hip
+        upper = _pitched(-out / thigh, down / thigh, forward, left, upward)
+        lower = _pitched((out - x) / tibia, (length - down) / tibia, forward, left, upward)
+        return ca.horzcat(forward, left, upward, upper, lower, out * forward - down * upward)
+
+    moved = through(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
+    rolled, upper, lower = (Motion(*(part[:, 3 * i : 3 * i + 3] for part in moved)) for i in range(3))
+    knee = Motion(*(h + part[:, 9] for h, part in zip(hip, moved, strict=True)))
+    return LegFrames(Frame(rolled, hip), Frame(upper, hip), Frame(lower, knee), Frame(rolled, ankle))
+
+
+def _pitched(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
+    """(3, 3) axes turned about the second one."""
+    return ca.horzcat(cosine * forward - sine * upward, left, sine * forward + cosine * upward)
+
+
+def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
+    """Frames of the links of a chain on a link that does not turn.
+
+    Args:
+        joints: of the chain, from the base outwards.
+        angles: motions by joint name [rad].
+        base: (3,) motion of the origin of the link before the first joint [m].
+    """
+    names = [joint.name for joint in joints]
+
+    def columns(q: SX) -> SX:
+        rotation, position, found = SX.eye(3), SX(3, 1), []
+        for i, joint in enumerate(joints):
+            position = position + rotation @ DM(joint.origin_m)
+            rotation = rotation @ axis_rotation(joint.axis, q[i])
+            found.append(ca.horzcat(rotation, position))
+        return ca.horzcat(*found)
+
+    moved = through(columns, Motion(*(ca.vertcat(*(angles[name][order] for name in names)) for order in range(3))))
+    frames = {}
+    for i, joint in enumerate(joints):
+        axes = Motion(*(part[:, 4 * i : 4 * i + 3] for part in moved))
+        frames[joint.child] = Frame(
+            axes, Motion(*(o + part[:, 4 * i + 3] for o, part in zip(base, moved, strict=True)))
+        )
+    return frames
+
+
+def upright(origin: Motion) -> Frame:
+    """Frame of a link that does not turn."""
+    return Frame(Motion(SX.eye(3), SX(3, 3), SX(3, 3)), origin)
+
+
+def world_frame_dynamics(
+    tree: Sequence[Body],
+    frames: Mapping[str, Frame],
+    qdd: Mapping[str, SX],
+    gravity: float,
+    shares: Mapping[str, SX] | None = None,
+) -> tuple[dict[str, SX], Wrench]:
+    """Joint torques of a tree whose first body stands still, as ``dynamics.newton_euler`` gives them.
+
+    Args:
+        tree: bodies, parents first.
+        frames: of all links by name.
+        qdd: joint accelerations by name, where rotors have inertia [rad/s^2].
+        gravity: magnitude, acting along -z [m/s^2].
+        shares: factors on mass and inertia of links by name.
+
+    Returns:
+        Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (15)-(18): a joint's moment is the sum over the links that it carries.
+    """
+    shares = shares or {}
+    below = _carried(tree)
+    centres, forces, spins = [], [], []
+    for body in tree:
+        frame, share = frames[body.link.name], shares.get(body.link.name, 1.0)
+        com, mass = DM(body.link.com_m), body.link.mass_kg
+        centres.append(frame.origin.position + frame.axes.position @ com)
+        acceleration = frame.origin.acceleration + frame.axes.acceleration @ com + SX(DM([0, 0, gravity]))
+        forces.append(share * mass * acceleration)
+        spins.append(share * _spin(frame.axes, body.link.inertia_matrix))
+    references = [_reference(body, frames) for body in tree]
+    torques: dict[str, SX] = {}
+    for i, body in enumerate(tree):
+        if body.joint is None:
+            continue
+        axis = frames[body.link.name].axes.position @ DM(body.joint.axis)
+        torque = SX(0)
+        for k in below[i]:
+            torque += ca.dot(axis, ca.cross(centres[k] - references[i], forces[k]) + spins[k])
+        torques[body.joint.name] = body.direction * torque
+        if body.armature_kgm2:
+            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
+    moments = (ca.cross(c - references[0], f) + s for c, f, s in zip(centres, forces, spins, strict=True))
+    return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
+
+
+def _carried(tree: Sequence[Body]) -> list[list[int]]:
+    """Bodies that each body carries, itself included."""
+    found: list[list[int]] = [[] for _ in tree]
+    for k in range(len(tree)):
+        at = k
+        while at >= 0:
+            found[at].append(k)
+            at = tree[at].parent
+    return found
+
+
+def _reference(body: Body, frames: Mapping[str, Frame]) -> SX:
+    """(3,) joint through which a body is reached: as far from its centre of mass as the tree says [m]."""
+    frame = frames[body.link.name]
+    offset = np.array(body.link.com_m) - np.array(body.com_offset_m)
+    return frame.origin.position + frame.axes.position @ DM(offset)
+
+
+def _spin(axes: Motion, inertia: Any) -> SX:
+    """(3,) rate of a link's angular momentum about its centre of mass: sum of r x r'' over its matter [Nm]."""
+    second = np.trace(inertia) / 2 * np.eye(3) - inertia
+    bent = axes.acceleration @ DM(second)
+    return sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), SX(3, 1))

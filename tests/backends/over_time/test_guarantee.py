@@ -1,0 +1,145 @@
+"""What is proven between samples: true where a fine grid is, with the violation's bounds where it is not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+import nlp_gait
+from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
+from compare.judge import evaluate
+from nlp_gait.backends.kernel import affine
+from nlp_gait.backends.over_time.guarantee import guarantee
+from nlp_gait.errors import CompilerError
+from nlp_gait.gaitbench.known import known
+from nlp_gait.problem import Assembly, Constraint, GaitProblem, Over, Point, Stretch
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import row, toy
+
+SEED = 3
+PEAK = 0.8  # of the toy's row, at half the time
+
+
+def best(instance: str) -> np.ndarray:
+    return np.array(known()[instance].best_x)
+
+
+def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
+    """A toy over two seconds whose row is x sin(pi s) <= limit, sampled where it is zero."""
+
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        wave = point.x[0] * ca.sin(math.pi * phases)
+        names = tuple(f"wave, {k}" for k in range(phases.shape[1]))
+        value, labels = (ca.sum2(wave) / phases.shape[1], ()) if over == "mean" else (wave.T, names)
+        if over == "interval":
+            value, labels = (wave[1:] - wave[:-1]).T, names[1:]
+        rows = Constraint(name="wave", labels=labels, unit="m", scale=1.0, value=value, upper=MX(limit), over=over)
+        return Assembly(objective=MX(0), constraints=(rows,), indexes={"mean_m": ca.sum2(wave) / phases.shape[1]})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (1.0, 3.0), intervals=4, means=("mean_m",))
+    base = toy(lambda x, y, lim, ops: (x, (row(0 * y, lower=MX(0.0)),)))
+    return replace(base, stretches=(stretch,))
+
+
+def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -> None:
+    found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
+    assert found.holds is False
+    (breach,) = found.breaches
+    assert breach.row == "wave[wave]"
+    assert breach.least <= PEAK - 0.5 <= breach.most <= 1.05 * (PEAK - 0.5)
+    begins = 1.0 + 2.0 * math.asin(0.5 / PEAK) / math.pi
+    assert breach.from_s <= begins <= breach.to_s <= begins + 0.01
+    low, high = found.means["mean_m"]
+    assert low <= 2 / math.pi * PEAK <= high <= 1.01 * low
+    assert "wave[wave] fails by 0.299 to 0.3 m" in str(found) and found.word == "no"
+
+
+def test_a_row_that_touches_its_limit_holds() -> None:
+    found = guarantee(waving(PEAK), np.array([PEAK, 0.0]))
+    assert found.holds and not found.breaches and str(found) == "all limits hold at all times"
+
+
+def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
+    largest = PEAK * math.sin(math.pi / 4)  # from zero to a quarter
+    assert guarantee(waving(largest + 1e-5, "interval"), np.array([PEAK, 0.0])).holds
+    found = guarantee(waving(largest - 1e-2, "interval"), np.array([PEAK, 0.0]))
+    assert found.breaches[0].least <= 1e-2 <= found.breaches[0].most and found.breaches[0].from_s == 1.0
+
+
+def test_a_mean_is_that_over_time() -> None:
+    mean = 2 / math.pi * PEAK
+    assert guarantee(waving(mean + 1e-3, "mean"), np.array([PEAK, 0.0])).holds
+    assert guarantee(waving(mean - 1e-3, "mean"), np.array([PEAK, 0.0])).holds is False
+
+
+def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
+    found = guarantee(waving(0.5, None), np.array([PEAK, 0.0]))
+    assert found.holds and found.sampled == ("wave",) and "on samples alone" in str(found)
+
+
+@pytest.mark.parametrize(("name", "instance"), [("nao-ssp", "ssp-v5"), ("walk12", "walk12-w015")])
+def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str, instance: str) -> None:
+    problem, x = nlp_gait.load(name), best(instance)
+    assert guarantee(problem, x).holds
+    gaits = [x, *feasible_gaits(problem, x, 2, np.random.default_rng(SEED))]
+    against, _, holding = contradictions(problem, gaits, 1001)
+    assert not against and holding > 0
+
+
+@pytest.mark.slow
+def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_grid_shows() -> None:
+    problem, x = nlp_gait.load("stairs-plan"), best("stairs-energy")
+    judged = evaluate(problem, x)
+    proven = judged.guaranteed
+    assert judged.feasible and proven is not None
+    worst: dict[str, float] = {}
+    for broken in judged.dense_violations:
+        name = broken.name.rpartition(",")[0] + "]"
+        worst[name] = max(worst.get(name, 0.0), broken.violation)
+    most = {breach.row: breach.most for breach in proven.breaches}
+    for name, violation in worst.items():
+        assert violation <= most[name] <= violation + 1e-3
+    low, high = proven.means["energy_J"]
+    assert low <= evaluate(problem, x).dense["energy_J"] * (1 + 1e-3) and high >= low > 0.0
+
+
+@pytest.mark.slow
+def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() -> None:
+    problem = nlp_gait.load("nao-dsp", trajectory="spline-4")
+    x = np.concatenate([best("dsp-v5"), np.zeros(len(problem.names) - len(best("dsp-v5")))])
+    found = guarantee(problem, x)
+    assert found.holds
+    cubic = guarantee(nlp_gait.load("nao-dsp"), best("dsp-v5"))
+    for name, (low, high) in found.means.items():
+        assert low <= cubic.means[name][1] and cubic.means[name][0] <= high
+
+
+def test_finite_differences_are_sampled_by_definition() -> None:
+    found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best("ssp-v5"))
+    assert found.holds is None and found.reason.startswith("sampled by definition") and found.word == "?"
+
+
+def test_a_change_of_the_mathematics_takes_the_guarantee_away_and_new_values_do_not() -> None:
+    problem = nlp_gait.load("walk12")
+    assert problem.with_values(step_time_s=0.9).stretches
+    assert not problem.derived(change=lambda assembly, point, ops: assembly).stretches
+
+
+def test_without_a_compiler_the_verdict_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise CompilerError("no C++ compiler")
+
+    affine._library.cache_clear()
+    monkeypatch.setattr(affine, "find_compiler", missing)
+    found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
+    assert found.holds is None and "no C++ compiler" in str(found)
+
+
+def test_an_infeasible_point_has_no_guarantee() -> None:
+    problem = nlp_gait.load("walk12")
+    assert evaluate(problem, [0.13, 0.13, 0.001, 0.001]).guaranteed is None

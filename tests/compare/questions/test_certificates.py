@@ -1,0 +1,105 @@
+"""Proofs keep what is feasible, go on where they were killed, and can be checked; a wrong one is never closed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from benchmarks.guarantees.boxes import lost
+from compare.questions.certainty import branch_and_bound, certificate
+from compare.questions.certainty.branch_and_bound import certify
+from compare.questions.certainty.certificate import certificate_file, check, read_certificate
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.gaitbench.known import known
+from nlp_gait.problem import GaitProblem
+from tests.backends.toys import toy
+from tests.compare.questions.test_certainty import two_valleys
+
+SEED = 2
+PROBLEM = toy(two_valleys, limit=-9.0)
+BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
+
+
+def walk() -> tuple[GaitProblem, np.ndarray]:
+    return nlp_gait.load("walk12"), np.array(known()["walk12-w015"].best_x)
+
+
+def test_no_box_loses_a_feasible_point_that_is_better_than_the_target() -> None:
+    problem, best = walk()
+    assert lost(problem, best, 200, np.random.default_rng(SEED)) == 0
+
+
+@pytest.mark.slow
+def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
+    problem, best = walk()
+    proof = certify(problem, best, tolerance=0.02, time_limit_s=120.0)
+    assert proof.closed and proof.gap == pytest.approx(0.02)
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(certificate_file(problem, proof).to_json()))
+    found = check(read_certificate(path), paths=40)
+    assert found.paths == 40 and found.same_code
+    assert 0.2 * proof.boxes < found.boxes < 5 * proof.boxes  # an estimate
+
+
+def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(branch_and_bound, "BATCH", 4)
+    monkeypatch.setattr(branch_and_bound, "CHECKPOINT_S", 0.0)
+    whole = certify(PROBLEM, BEST, tolerance=1e-4)
+    file, told = tmp_path / "open.npz", list[str]()
+
+    def kill(note: str) -> None:
+        told.append(note)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        certify(PROBLEM, BEST, tolerance=1e-4, progress=kill, checkpoint=file)
+    resumed = certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=file)
+    assert resumed.closed and (resumed.boxes, resumed.bound) == (whole.boxes, whole.bound)
+    with pytest.raises(InputError, match="of another proof"):
+        certify(PROBLEM, BEST, tolerance=1e-3, checkpoint=file)
+    file.write_bytes(b"torn")
+    with pytest.raises(InputError, match="damaged"):
+        certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=file)
+
+
+def test_a_wrong_incumbent_is_never_certified() -> None:
+    problem, best = walk()
+    wrong = best + 0.03 * (np.array([0.05, 0.05, 0.05, 0.05]) - best)
+    costs = [exact_model(problem).at(x, problem.p).cost for x in (best, wrong)]
+    assert costs[1] > costs[0] + 0.01 * abs(costs[0])  # worse than the tolerance allows
+    found = certify(problem, wrong, tolerance=1e-3, time_limit_s=0.5)
+    assert not found.closed and -found.bound <= costs[0]
+
+
+def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certificate, "_problem", lambda description: PROBLEM)
+    honest = certify(PROBLEM, BEST, tolerance=1e-3)
+    file = certificate_file(PROBLEM, honest)
+    assert check(file, paths=20).paths == 20
+    valley = np.array([0.987, 0.0])  # the worse one
+    at = exact_model(PROBLEM).at(valley, PROBLEM.p).cost
+    forged = replace(honest, objective=at, bound=at * (1 - 1e-3), x=tuple(valley.tolist()))
+    with pytest.raises(InputError, match="do not end"):
+        check(replace(file, certificate=forged), paths=20)
+    for change, message in (
+        ({"objective": at}, "but its incumbent has"),
+        ({"bound": honest.objective}, "says more than its tolerance"),
+        ({"closed": False}, "has not ended"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check(replace(file, certificate=replace(honest, **change)))
+
+
+def test_a_certificate_of_another_problem_is_refused() -> None:
+    problem, _ = walk()
+    honest = certify(PROBLEM, BEST, tolerance=1e-3)
+    part = {**certificate_file(problem, honest).problem, "sha256": "0" * 64}
+    with pytest.raises(InputError, match="another one today"):
+        check(replace(certificate_file(problem, honest), problem=part))

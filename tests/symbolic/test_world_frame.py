@@ -1,0 +1,59 @@
+"""Dynamics in the world frame: the recursion's torques and wrench for any motion, and far narrower bounds over a box."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from benchmarks.guarantees.bounds import errors
+from nlp_gait.problems.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.nonsmooth import Exact
+from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.symbolic.world_frame import world_frame_dynamics
+
+SEED = 11
+GRAVITY = 9.8
+# Of torques of up to 50 Nm in double precision.
+ROUNDING = 1e-12
+SPREADS = (0.01, 0.1, 0.5)  # of positions [m], velocities [m/s] and accelerations [m/s^2]
+
+
+def moving(name: str, size: int) -> Motion:
+    return Motion(*(SX.sym(f"{name}{order}", size) for order in range(3)))
+
+
+@pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_torques_and_wrench_are_the_recursions(robot: str, share: float) -> None:
+    model = nao(robot, rotational_inertia=True)
+    hip, swing = moving("hip", 3), moving("swing", 3)
+    stance = Motion(SX.sym("stance", 3), SX(3, 1), SX(3, 1))
+    arms = {f"{side}{name}": moving(f"{side}{name}", 1) for side in "LR" for name in ARM_JOINTS}
+    ankles = {"L": stance, "R": swing}
+    tree, shares = tree_from(model, model.feet["left"].link), {model.root: SX(share)}
+    plan = upright_plan(model, hip, ankles, arms, SX(0.01), Exact())
+    q, qd, qdd = ({name: joint[order] for name, joint in plan.joints.items()} for order in range(3))
+    expected = newton_euler(tree, q, qd, qdd, GRAVITY, shares)
+    found = world_frame_dynamics(tree, upright_frames(model, hip, ankles, arms), qdd, GRAVITY, shares)
+    both = [ca.vertcat(*(torques[n] for n in expected[0]), *wrench) for torques, wrench in (expected, found)]
+    symbols = [*hip, stance.position, *swing, *(part for arm in arms.values() for part in arm)]
+    function, rng = ca.Function("both", symbols, both), np.random.default_rng(SEED)
+    for _ in range(20):
+        centres = ((0.01, 0.01, 0.27), (-0.01, -0.05, 0.05))
+        paths = [
+            [(centre if order == 0 else 0.0) + rng.normal(0.0, spread, 3) for order, spread in enumerate(SPREADS)]
+            for centre in (np.array(c) for c in centres)
+        ]
+        swung = [rng.normal(0.0, 1.0, 1) for _ in range(3 * len(arms))]
+        a, b = function(*paths[0], np.array([0.03, 0.05, 0.045]), *paths[1], *swung)
+        np.testing.assert_allclose(np.array(a.full()), np.array(b.full()), atol=50 * ROUNDING)
+
+
+def test_over_a_box_bounds_of_torques_are_a_tenth_as_wide() -> None:
+    recursion, world = errors(2.0**-5)
+    assert world.torque_Nm < 0.1 * recursion.torque_Nm
+    assert world.zmp_m < 0.01 * recursion.zmp_m
