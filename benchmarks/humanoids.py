@@ -1,6 +1,6 @@
 """Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [steps] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+import metaheuristics
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import exact_model
@@ -26,6 +27,7 @@ from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
+SEARCHES = {name: metaheuristics.algorithm(name) for name in ("pso", "ga", "aco")}
 TIME_S = 2.0  # of NAO's single support
 CLOSURE_M = 1e-9
 
@@ -134,6 +136,22 @@ def kernel(files: dict[str, str]) -> Iterator[str]:
         yield cells(name, f"{1e3 * best[name]:.2f}", f"{best[name] / best['nao-ssp']:.2f}")
 
 
+def searches(files: dict[str, str]) -> Iterator[str]:
+    """Searches of 40,000 evaluations, five seeds each: how many end feasible, and the best over IPOPT's best."""
+    yield header("robot", "IPOPT W", *(f"{name}: feasible, best - IPOPT, median" for name in SEARCHES))
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        best = nlp_gait.solve(problem, starts=4, seed=0).objective
+        objective = nlp_gait.compile_objective(problem, threads=1)
+        found = []
+        for search in SEARCHES.values():
+            runs = [metaheuristics.minimize(objective, search, evaluations=40_000, seed=seed) for seed in range(5)]
+            feasible = [run.objective for run in runs if run.feasible]
+            least, middle = (min(feasible), float(np.median(feasible))) if feasible else (np.nan, np.nan)
+            found.append(f"{len(feasible)} of {len(runs)}, {(least - best) / best:+.1e}, {(middle - best) / best:+.1e}")
+        yield cells(name, f"{best:.6g}", *found)
+
+
 def steps(files: dict[str, str]) -> Iterator[str]:
     """Cheapest single supports of NAO's 2 s times the root of lambda, in the model and played: equal Froude numbers."""
     from nlp_gait.simulation.drive import Drive
@@ -228,6 +246,7 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "oracle": oracle,
     "starts": starts,
     "kernel": kernel,
+    "searches": searches,
     "steps": steps,
     "cycles": cycles,
 }
