@@ -42,7 +42,7 @@ ROOMS = (
 )
 # The front doors of packages: what stands in them is for users, and the command line stands above all.
 DOORS = ("nlp_gait", "nlp_gait.__main__", "compare", "compare.__main__")
-FAMILIES = ("nao", "stairs", "walk12")
+FAMILIES = ("humanoid", "nao", "stairs", "walk12")
 MOST_ENTRIES = 16
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import print_json, print_table, stdout
+from compare.cli.common import output_file, print_json, print_table, print_written, stdout
 from compare.cli.options import AsJson
+from nlp_gait.errors import InputError
 from nlp_gait.problem import load, problem_names
 
 
@@ -26,14 +28,26 @@ def list_problems(
     algorithms: Annotated[
         bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
     ] = False,
+    robot: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Show what is understood of a robot: URDF, JSON, or a name.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="With --robot: a picture of the robot and its soles, as PNG and SVG.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List problems, algorithms and robots; or what one problem, algorithm or solver can be told.
+    """List problems, algorithms and robots; or what one problem, algorithm or solver can be told, or is known of a robot.
 
-    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`
+    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
+    `nlp-gait list --robot my_robot.urdf --out my_robot.png`
     """
     from compare.study.task import solver_names
 
+    if robot is not None:
+        _robot(robot, out, as_json)
+        return
+    if out is not None:
+        raise InputError("--out is the picture of a robot; name one with --robot FILE")
     known = solver_names()
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
@@ -57,6 +71,29 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
             print_table(f"{one.name}: settings", ("name", "default", "what"), rows)
         if one.source:
             stdout.print(f"Source: {one.source}\n")
+
+
+def _robot(name: str, out: Path | None, as_json: bool) -> None:
+    from nlp_gait.problems.humanoid.body import humanoid
+    from nlp_gait.problems.humanoid.report import understood_of
+
+    target = None if out is None else output_file(out)
+    body = humanoid(name)
+    facts = understood_of(body)
+    if as_json:
+        print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}})
+    else:
+        print_table(f"What I understood of robot {body.biped.full.name}", ("what", "found"), facts)
+        for note in body.biped.full.notes:
+            stdout.print(f"note: {note}")
+        stdout.print(
+            "anything of it can be said otherwise in the JSON file beside it: docs/custom-robots.md; gaits: humanoid-ssp, "
+            f"humanoid-dsp and humanoid-cycle with --robot {name}"
+        )
+    if target is not None:
+        from compare.drawing.robot_figure import draw_robot
+
+        print_written(*draw_robot(body.biped, target.with_suffix("")))
 
 
 def _overview(as_json: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.naoqi import write_naoqi
+from nlp_gait.export.naoqi import COUPLED, write_naoqi
 from nlp_gait.export.setpoints import SetPoints, set_points
 from nlp_gait.export.tables import write_csv, write_json
 from nlp_gait.export.webots import write_motion
@@ -39,7 +39,14 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     if name == "webots":
         write_motion(path, _motor_set_points(result, period_ms))
     elif name == "naoqi":
-        write_naoqi(path, _motor_set_points(result, period_ms))
+        points = _motor_set_points(result, period_ms)
+        if not set(COUPLED) <= set(points.joints):
+            owner = "the robot" if result.problem.robot is None else f"robot {result.problem.robot.name!r}"
+            raise InputError(
+                f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; {owner} has none of that name: export as "
+                "csv, json, webots or mjcf"
+            )
+        write_naoqi(path, points)
     elif name == "mjcf":
         plan = plan_of(result)
         write_text(path, plan_model(plan, Drive()))

@@ -1,8 +1,9 @@
-"""Read robot files: one JSON object a robot, which may extend another one, or a URDF, and replace some of its records."""
+"""Read robot files: one JSON object a robot, which may extend another one, or a URDF or MJCF, and replace some of its records."""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -13,17 +14,22 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
-from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.errors import GaitError, RobotDataError, unknown
 from nlp_gait.files import refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.perturbation import perturbed, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector
 from nlp_gait.robots.tree import reversed_joint
-from nlp_gait.robots.urdf import urdf_record
+from nlp_gait.robots.understanding import Understood, understood
+from nlp_gait.robots.urdf import collision_points, urdf_record
 
-FILE_ENDINGS = (".json", ".urdf")
+LOG = logging.getLogger("nlp_gait")
+MODEL_ENDINGS = (".urdf",)
+FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
+# What a file says once, in place of what it extends.
+REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "unphysical")
 
 T = TypeVar("T")
 Side = Literal["left", "right"]
@@ -48,6 +54,10 @@ class RobotFile:
     links: Mapping[str, Any] = field(default_factory=dict)
     joints: Mapping[str, Any] = field(default_factory=dict)
     feet: Mapping[str, Any] = field(default_factory=dict)
+    forward: Literal["x", "-x", "y", "-y"] | None = None
+    posture_rad: Mapping[str, float] = field(default_factory=dict)
+    heat_loss_W_per_Nm2: float | None = None
+    unphysical: Literal["refuse", "repair"] | None = None
 
     def __post_init__(self) -> None:
         """Refuse names that cannot be printed."""
@@ -82,7 +92,9 @@ def robot_names() -> tuple[str, ...]:
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf`` with a ``.json`` beside it.
+    """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf``, perhaps with a ``.json`` beside it.
+
+    What a URDF leaves out is derived, see ``robots/understanding.py``; a file of the same name beside it says it otherwise.
 
     Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read anew each
     time: it may have changed, or be another one under the same relative path.
@@ -102,10 +114,7 @@ def is_robot_file(name_or_path: str) -> bool:
 
 def robot_content(path: str) -> str:
     """Hash of all files that a robot from a file is made of; raises as ``load_robot``."""
-    source, _ = split_name(path)
-    return hashlib.sha256(
-        repr(_merged(_beside_urdf(source) if source.endswith(".urdf") else source)).encode()
-    ).hexdigest()
+    return hashlib.sha256(repr(_merged(_described_in(split_name(path)[0]))).encode()).hexdigest()
 
 
 @cache
@@ -115,18 +124,17 @@ def _loaded(name: str) -> Robot:
 
 def _made_from(name_or_path: str) -> Robot:
     source, changes = split_name(name_or_path)
-    path = _beside_urdf(source) if source.endswith(".urdf") else source
+    path = _described_in(source)
     return perturbed(_robot(_merged(path), path), changes)
 
 
-def _beside_urdf(path: str) -> str:
-    """The robot file that extends a URDF and lies beside it under the same name."""
+def _described_in(path: str) -> str:
+    """Where a robot's description begins: for a URDF the robot file of the same name that extends it, if one lies beside it."""
+    if not path.endswith(MODEL_ENDINGS):
+        return path
     partner = Path(path).with_suffix(".json")
     if not os.path.isfile(partner):
-        raise RobotDataError(
-            f"robot file {path!r}: a URDF says nothing about soles; write {str(partner)!r} with "
-            f'{{"schema": 1, "extends": "{Path(path).name}", "feet": {{"left": ..., "right": ...}}}}'
-        )
+        return path
     base = _read(str(partner)).extends
     if base is None or _resolved(base, str(partner)) != os.path.normpath(path):
         raise RobotDataError(
@@ -137,6 +145,8 @@ def _beside_urdf(path: str) -> str:
 
 def _merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
     """Content of a robot file with what it extends; links, joints and feet are ``_Record``."""
+    if source.endswith(MODEL_ENDINGS):
+        return _of_model(source, None)
     own = _read(source)
     file = _with_records(own, source)
     if own.extends is None:
@@ -144,21 +154,26 @@ def _merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
     base_source = _resolved(own.extends, source)
     if base_source in seen or len(seen) >= LONGEST_CHAIN:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {own.extends!r}")
-    if base_source.endswith(".urdf"):
-        about = own.inertia_about
-        with refusing(f"robot file {base_source!r}", RobotDataError):
-            raw = urdf_record(base_source, about_joint=about == "joint")
-            base = _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), base_source)
+    if base_source.endswith(MODEL_ENDINGS):
+        base = _of_model(base_source, own.inertia_about)
     else:
         base = _merged(base_source, (*seen, source))
     return replace(
         base,
-        **{key: getattr(file, key) for key in ("name", "description", "root") if getattr(file, key) is not None},
+        **{key: getattr(file, key) for key in REPLACED if getattr(file, key) is not None},
         sources={**base.sources, **file.sources},
+        posture_rad={**base.posture_rad, **file.posture_rad},
         links={**base.links, **file.links},
         joints={**_renamed(base.joints, file.joint_names, source), **file.joints},
         feet={**base.feet, **file.feet},
     )
+
+
+def _of_model(source: str, about: About) -> RobotFile:
+    """Content of a URDF or MJCF."""
+    with refusing(f"robot file {source!r}", RobotDataError):
+        raw = urdf_record(source, about_joint=about == "joint")
+        return _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), source)
 
 
 def _with_records(file: RobotFile, source: str) -> RobotFile:
@@ -186,7 +201,7 @@ def _renamed(joints: Mapping[str, _Record], names: Mapping[str, str], source: st
 def _resolved(base: str, source: str) -> str:
     """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
     # Normalised, so that two files that extend each other by roundabout paths are recognised.
-    return os.path.normpath(Path(source).parent / base) if base.endswith((".json", ".urdf")) else base
+    return os.path.normpath(Path(source).parent / base) if base.endswith(FILE_ENDINGS) else base
 
 
 def _read(name_or_path: str) -> RobotFile:
@@ -200,17 +215,70 @@ def _robot(file: RobotFile, source: str) -> Robot:
     if file.name is None or file.root is None:
         missing = "name" if file.name is None else "root"
         raise RobotDataError(f"robot file {source!r}: {missing!r} is missing")
+    name, root = file.name, file.root
+    file, notes = _completed(file)
     links = _made(_link, file.links)
-    check_inertias(file.name, [links[name] for name, record in file.links.items() if record.about is None])
+    check_inertias(name, [links[name] for name, record in file.links.items() if record.about is None])
     return Robot(
-        name=file.name,
+        name=name,
         description=file.description or "",
         sources=file.sources,
-        root=file.root,
+        root=root,
         links=links,
         joints=_made(_joint, file.joints),
         feet=_made(lambda side, record: decoded(Foot, record.raw, f"feet.{side}"), file.feet),
+        posture_rad=file.posture_rad,
+        heat_loss_W_per_Nm2=file.heat_loss_W_per_Nm2,
+        notes=notes,
     )
+
+
+def _completed(file: RobotFile) -> tuple[RobotFile, tuple[str, ...]]:
+    """A robot from a URDF or MJCF with its feet, and without the parts that cannot move by themselves; what was done."""
+    models = {record.file for record in file.links.values() if record.file.endswith(MODEL_ENDINGS)}
+    if not models:
+        return file, ()
+    model, name = min(models), str(file.name)
+    records = {**file.links, **file.joints}
+
+    def fault_in(make: Callable[[str, _Record], object]) -> Callable[[str, Mapping[str, Any]], GaitError | None]:
+        def fault(name: str, raw: Mapping[str, Any]) -> GaitError | None:
+            record = records[name]
+            try:
+                _made(make, {name: record._replace(raw=raw)})
+            except GaitError as error:
+                if not record.file.endswith(MODEL_ENDINGS):
+                    raise
+                return error
+            return None
+
+        return fault
+
+    # What a robot file says of itself is checked first; what a URDF says may be passed over.
+    _made(_link, {key: record for key, record in file.links.items() if not record.file.endswith(MODEL_ENDINGS)})
+    _made(_joint, {key: record for key, record in file.joints.items() if not record.file.endswith(MODEL_ENDINGS)})
+    for side, record in file.feet.items():
+        with refusing(f"robot file {record.file!r}", RobotDataError):
+            decoded_value(Mapping[str, Any], record.raw, f"feet.{side}")
+    with refusing(f"robot file {model!r}", RobotDataError):
+        found: Understood = understood(
+            name,
+            {key: record.raw for key, record in file.links.items()},
+            {key: record.raw for key, record in file.joints.items()},
+            {key: record.raw for key, record in file.feet.items()},
+            cloud=lambda link: collision_points(model, link),
+            forward=file.forward,
+            repair=file.unphysical == "repair",
+            fault_of_link=fault_in(_link),
+            fault_of_joint=fault_in(_joint),
+        )
+    for note in found.notes:
+        if "foot:" not in note:
+            LOG.warning("robot %r: %s", name, note)
+    feet = {side: file.feet.get(side, _Record({}, model))._replace(raw=raw) for side, raw in found.feet.items()}
+    links = {key: records[key]._replace(raw=raw) for key, raw in found.links.items()}
+    joints = {key: records[key]._replace(raw=raw) for key, raw in found.joints.items()}
+    return replace(file, links=links, joints=joints, feet=feet), found.notes
 
 
 def _made(make: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:

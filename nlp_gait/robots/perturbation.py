@@ -64,7 +64,7 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
         InputError: the text after the mark is not a list of changes.
     """
     name, mark, listed = text.rpartition(MARK)
-    if not mark or listed.endswith((".json", ".urdf")):  # a mark may be part of a file's path
+    if not mark or listed.endswith((".json", ".urdf", ".xml")):  # a mark may be part of a file's path
         return text, {}
     changes: dict[str, float] = {}
     for item in listed.split(","):

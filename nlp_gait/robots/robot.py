@@ -182,6 +182,9 @@ class Robot:
         feet: ``"left"`` and ``"right"``.
         toes: what lies on the ground beyond a toe joint, by side; its link's frame stands at that joint.
         armatures_kgm2: by joint, inertia of rotors at the joint, where the dynamics take it into account; none by default.
+        posture_rad: angles at which joints are held that a gait does not move; zero, or the nearest limit, where not stated.
+        heat_loss_W_per_Nm2: heat of the motors for each squared torque, if the robot's file says it.
+        notes: what was derived from a file, or changed, when the robot was read; a sentence each.
     """
 
     name: str
@@ -193,6 +196,9 @@ class Robot:
     feet: Mapping[str, Foot]
     toes: Mapping[str, Foot] = field(default_factory=dict)
     armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
+    posture_rad: Mapping[str, float] = field(default_factory=dict)
+    heat_loss_W_per_Nm2: float | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Links and joints form one tree."""

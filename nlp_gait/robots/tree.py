@@ -92,6 +92,64 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
     return replace(robot, links=links, joints=kept)
 
 
+def posed(robot: Robot, angles: Mapping[str, float]) -> Robot:
+    """The same robot with some joints turned: where they stand then is zero, and all links get the root's axes there.
+
+    Args:
+        robot: to begin with; its feet must not turn.
+        angles: by joint [rad].
+    """
+    turns = {robot.root: np.eye(3)}
+    joints: dict[str, Joint] = {}
+    links = dict(robot.links)
+    waiting = [joint for joint in robot.joints.values() if joint.parent == robot.root]
+    while waiting:
+        joint = waiting.pop()
+        before, angle = turns[joint.parent], angles.get(joint.name, 0.0)
+        if angle:
+            turns[joint.child] = before @ _rotation(joint.axis, angle)
+        else:
+            turns[joint.child] = before
+        joints[joint.name] = _seen(joint, before, angle)
+        links[joint.child] = _turned(links[joint.child], turns[joint.child])
+        waiting += [other for other in robot.joints.values() if other.parent == joint.child]
+    return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
+
+
+def _rotation(axis: Vector, angle: float) -> np.ndarray:
+    """(3, 3) rotation about a unit axis."""
+    k = np.cross(np.eye(3), np.array(axis))
+    turn: np.ndarray = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    return turn
+
+
+def _seen(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
+    """A joint whose parent was turned, counted from an angle of its own."""
+    if not angle and np.array_equal(turn, np.eye(3)):
+        return joint
+    axis = turn @ np.array(joint.axis)
+    (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
+    return replace(
+        joint,
+        origin_m=_vector(turn @ np.array(joint.origin_m)),
+        axis=_vector(axis / np.linalg.norm(axis)),
+        limits_rad=(low - angle, high - angle),
+        planning_limits_rad=(plan_low - angle, plan_high - angle),
+    )
+
+
+def _turned(link: Link, turn: np.ndarray) -> Link:
+    if np.array_equal(turn, np.eye(3)):
+        return link
+    tensor = inertia_moments(turn @ link.inertia_matrix @ turn.T)
+    return replace(link, com_m=_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
+
+
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 def reversed_joint(joint: Joint) -> Joint:
     """The same joint with its angle counted the other way round."""
     (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad

@@ -5,7 +5,9 @@ The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses 
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,13 +18,17 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.fields import LARGEST_NUMBER, sound
+from nlp_gait.robots.meshes import mesh_file, mesh_points
 from nlp_gait.robots.tree import inertia_moments, point_inertia
+
+LOG = logging.getLogger("nlp_gait")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # What is read of a URDF; shapes, transmissions and plugins are dropped before parsing.
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
 TURNING = ("revolute", "continuous")
+RIM = 24  # points of a cylinder's edge
 
 
 def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
@@ -40,7 +46,7 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
         RobotDataError: the file cannot be read, or is not a URDF.
         ValueError: its links do not form a tree, or one of its values is missing or not allowed.
     """
-    model = _parsed(path)
+    model = _parsed(_xml(path), path)
     joints = {joint.child: joint for joint in model.joints}
     frames = _zero_pose(model, joints)
     carriers = {name: _carrier(name, joints) for name in frames}
@@ -57,15 +63,94 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
     }
 
 
-def _parsed(path: str) -> Any:
-    """``urdf_parser_py.urdf.Robot`` of a file."""
+def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
+    """Points of all collision shapes that move with a link, from its joint, along the root's axes at zero angles.
+
+    Args:
+        path: of the file.
+        link: as ``urdf_record`` has it.
+
+    Returns:
+        (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m], and meshes that are not there.
+
+    Raises:
+        RobotDataError: as ``urdf_record``, or a mesh that cannot be read.
+        ValueError: likewise.
+    """
+    tree = _xml(path)
+    shapes = {element.get("name"): element.findall("collision") for element in tree.iter("link")}
+    model = _parsed(tree, path)
+    joints = {joint.child: joint for joint in model.joints}
+    frames = _zero_pose(model, joints)
+    found, missing = [np.zeros((0, 3))], []
+    for name, frame in frames.items():
+        if _carrier(name, joints) != link:
+            continue
+        for shape in shapes.get(name, ()):
+            kinds = [kind for geometry in shape.findall("geometry") for kind in geometry]
+            pose = np.linalg.inv(_at(frames[link][:3, 3])) @ frame @ _shape_pose(shape.find("origin"), name)
+            for kind in kinds:
+                points = _shape_points(kind, pose, Path(path), name)
+                if points is None:
+                    missing.append(str(kind.get("filename")))
+                else:
+                    found.append(points)
+    return np.concatenate(found), tuple(missing)
+
+
+def _shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None:
+    """(N, 3) of one shape at a pose (4, 4); None for a mesh that is not there."""
+    if kind.tag == "mesh":
+        mesh = mesh_file(kind.get("filename", ""), file)
+        if mesh is None:
+            return None
+        points = mesh_points(mesh) * _numbers(kind.get("scale", "1 1 1"), 3, link)
+    elif kind.tag == "box":
+        half = np.array(_numbers(kind.get("size", ""), 3, link)) / 2
+        points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+    elif kind.tag == "sphere":
+        centre, (radius,) = pose[:3, 3], _numbers(kind.get("radius", ""), 1, link)
+        return np.array([centre - [0.0, 0.0, radius]])
+    elif kind.tag in ("cylinder", "capsule"):
+        (radius,), (length,) = (_numbers(kind.get(name, ""), 1, link) for name in ("radius", "length"))
+        turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
+        rim = radius * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
+        points = np.concatenate([rim + [0.0, 0.0, end * length / 2] for end in (-1, 1)])
+    else:
+        return np.zeros((0, 3))
+    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
+
+
+def _shape_pose(origin: Any, link: str) -> Array:
+    if origin is None:
+        return np.eye(4)
+    pose = _at(np.array(_numbers(origin.get("xyz", "0 0 0"), 3, link)))
+    roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"), 3, link)
+    pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    return pose
+
+
+def _at(place: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, 3] = place
+    return pose
+
+
+def _numbers(text: str, count: int, link: str) -> list[float]:
+    values = [float(word) for word in text.split()]
+    if len(values) != count or not sound(values):
+        raise ValueError(f"link {link!r}: a collision shape needs {count} finite numbers, got {text[:60]!r}")
+    return values
+
+
+def _xml(path: str) -> Any:
+    """Root element of a file."""
     if find_spec("urdf_parser_py") is None:
         raise MissingExtraError(
             f"robot file {path!r}: URDF files need the package urdf-parser-py, which is not installed: "
             "pip install 'nlp-gait[urdf]'"
         )
     etree = import_module("lxml.etree")
-    parser: Any = import_module("urdf_parser_py.xml_reflection.core")
     data = read_bytes(Path(path), "robot file", error=RobotDataError)
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
@@ -73,6 +158,13 @@ def _parsed(path: str) -> Any:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {' '.join(str(error).split())}") from error
     if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
+    return root
+
+
+def _parsed(root: Any, path: str) -> Any:
+    """``urdf_parser_py.urdf.Robot`` of a root element, from which what is not read is removed."""
+    etree = import_module("lxml.etree")
+    parser: Any = import_module("urdf_parser_py.xml_reflection.core")
     for element in list(root):
         kept = READ.get(element.tag)
         if kept is None:
@@ -81,7 +173,7 @@ def _parsed(path: str) -> Any:
         for part in list(element):
             if part.tag not in kept:
                 element.remove(part)
-    tolerant, parser.on_error = parser.on_error, _refuse
+    tolerant, parser.on_error = parser.on_error, _told(path)
     try:
         return import_module("urdf_parser_py.urdf").URDF.from_xml_string(etree.tostring(root))
     except Exception as error:  # the parser raises its own, KeyError, ValueError and AssertionError
@@ -91,9 +183,15 @@ def _parsed(path: str) -> Any:
         parser.on_error = tolerant
 
 
-def _refuse(message: str) -> None:
-    """Replaces the parser's own answer to unknown tags and attributes and to repeated tags: a line on stderr."""
-    raise RobotDataError(message)
+def _told(path: str) -> Callable[[str], None]:
+    """Replaces the parser's own answer, a line on stderr: an unknown attribute is a warning, anything else an error."""
+
+    def tell(message: str) -> None:
+        if not message.startswith("Unknown attribute"):
+            raise RobotDataError(message)
+        LOG.warning("robot file %r: %s; it is not read, and may be removed", path, message)
+
+    return tell
 
 
 def _zero_pose(model: Any, joints: dict[str, Any]) -> dict[str, Array]:

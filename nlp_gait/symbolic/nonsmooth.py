@@ -1,8 +1,9 @@
-"""The operations at which a gait model is not smooth, in two interpretations.
+"""The operations at which a gait model is not smooth or not explicit, in two interpretations.
 
 A problem is assembled once, against ``Nonsmooth``. ``Exact`` gives what the papers evaluate: it is compiled, searched and
 judged. ``Lifted`` gives an NLP that IPOPT can solve: absolute values and minima become variables with inequalities, an
 exact reformulation where the sense allows it (see ``backends/nlp.py``, which checks the sense); only a true jump is smoothed.
+An equation that has no closed solution is solved by Newton's method under ``Exact``; its unknowns are variables under ``Lifted``.
 """
 
 from __future__ import annotations
@@ -28,8 +29,52 @@ class Angle(NamedTuple):
     second: SX
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Root:
+    """An equation of one instant, residual(unknown, inputs) = 0, and a method that solves it; expressions in, expressions out.
+
+    Attributes:
+        residual: of unknown (n,) and inputs: (n,) in units of 1, zero at the solution.
+        newton: of the inputs: (n,) a guess followed by a fixed number of Newton steps, defined for all inputs.
+        lift: whether ``Lifted`` makes the unknown a variable; else it differentiates through ``newton``.
+    """
+
+    residual: Callable[[SX, SX], SX]
+    newton: Callable[[SX], SX]
+    lift: bool
+
+
+class OpenRoots(NamedTuple):
+    """Equations of one instant that are to be tied by rows, one below the other.
+
+    Attributes:
+        unknowns: (n,) symbols.
+        residual: (n,) that must be zero.
+        start: (n,) what Newton's method finds.
+    """
+
+    unknowns: SX
+    residual: SX
+    start: SX
+
+
 class Nonsmooth(Protocol):
-    """What a problem may use besides smooth functions."""
+    """What a problem may use besides smooth functions.
+
+    Attributes:
+        exact: whether the values are those that are judged; else a solver's on its way.
+    """
+
+    exact: bool
+
+    def root(self, root: Root, inputs: SX) -> SX:
+        """Solution (n,) of an equation of one instant, for its inputs."""
+
+    def open_roots(self) -> OpenRoots | None:
+        """Equations of the instant built last whose unknowns were left as symbols, once; None if there are none."""
+
+    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """Unknowns (n, N) of N instants whose ``open_roots`` are tied by residual(unknowns) = 0, near a start (n, N)."""
 
     def acos(self, argument: SX, margin: SX) -> Angle:
         """acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""
@@ -61,6 +106,20 @@ class Nonsmooth(Protocol):
 
 class Exact:
     """The functions as the papers mean them."""
+
+    exact = True
+
+    def root(self, root: Root, inputs: SX) -> SX:
+        """What Newton's method finds, as part of the instant's expressions."""
+        return root.newton(inputs)
+
+    def open_roots(self) -> OpenRoots | None:
+        """None: all are solved."""
+        return None
+
+    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """The start, which is the solution."""
+        return start
 
     def acos(self, argument: SX, margin: SX) -> Angle:
         """Argument clamped to [-1, 1]: every reachable pose is exact, an unreachable one finite and still."""
@@ -125,10 +184,33 @@ class Lifted:
         width: width of the sigmoid in units of the switch (an NLP parameter).
     """
 
+    exact = False
+
     def __init__(self, width: MX) -> None:
         self.width = width
         self.lifts: list[Lift] = []
         self.smoothed = False
+        self._open: list[OpenRoots] = []
+
+    def root(self, root: Root, inputs: SX) -> SX:
+        """A symbol of the instant, to be tied by a row; or what Newton's method finds, to be differentiated."""
+        found = root.newton(inputs)
+        if not root.lift:
+            return found
+        unknowns = SX.sym(f"unknown_{len(self._open)}", found.shape[0])
+        self._open.append(OpenRoots(unknowns, root.residual(unknowns, inputs), found))
+        return unknowns
+
+    def open_roots(self) -> OpenRoots | None:
+        """All equations of the instant one below the other."""
+        found, self._open = self._open, []
+        return OpenRoots(*(ca.vertcat(*parts) for parts in zip(*found, strict=True))) if found else None
+
+    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """Variables, tied by one equation each."""
+        columns = start.shape
+        lifted = self._lifted("root", ca.vec(start), lambda v: ca.vec(residual(ca.reshape(v, *columns))), tight=True)
+        return ca.reshape(lifted, *columns)
 
     def acos(self, argument: SX, margin: SX) -> Angle:
         """acos continued by its tangents beyond +-(1 - margin): smooth, with a slope that draws a solver back."""

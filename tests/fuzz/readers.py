@@ -22,6 +22,7 @@ from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
 from nlp_gait.problem import load_result
 from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots.biped import biped_of
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
 from tests.fuzz.trial import Misread
 
@@ -113,6 +114,18 @@ def read_urdf(path: Path) -> None:
                 near(wish, found, "limit")
 
 
+def read_biped(path: Path) -> None:
+    """A robot from a URDF alone, as a biped: all masses of the file are in it, and its legs' limits are those of the file."""
+    biped, root = biped_of(load_robot(str(path))), ElementTree.fromstring(path.read_bytes())
+    masses = [float(mass.get("value", "")) for mass in root.iterfind("link/inertial/mass")]
+    near(math.fsum(masses), biped.model.mass_kg, "mass")
+    for name in biped.joints:
+        limit = root.find(f"joint[@name='{name}']/limit")
+        if limit is None:
+            raise Misread(f"joint {name} is not in the file")
+        near(float(limit.get("effort", "")), biped.model.joint(name).torque_limit_Nm, "effort")
+
+
 def read_a_motion(path: Path) -> None:
     """A motion: its times and angles are those of the file, and it is the same when written again."""
     points = read_motion(path)
@@ -148,6 +161,7 @@ FORMATS = (
     Format(name="study", file="study.toml", mutate=mutated_lines, read=read_study),
     Format(name="robot", file="robot.json", mutate=mutated_json, read=read_robot),
     Format(name="urdf", file="robot.urdf", mutate=mutated_xml, read=read_urdf),
+    Format(name="biped", file="robot.urdf", mutate=mutated_xml, read=read_biped),
     Format(name="motion", file="gait.motion", mutate=mutated_lines, read=read_a_motion),
     Format(name="step", file="one.json", mutate=mutated_json, read=read_step),
     Format(name="points", file="points.npz", mutate=mutated_bytes, read=read_archive),

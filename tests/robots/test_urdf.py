@@ -252,12 +252,10 @@ def test_entities_are_refused_unread(tmp_path: Path, definition: str, use: str) 
     assert "hunter2" not in str(error.value)
 
 
-def test_a_urdf_alone_is_answered_with_the_robot_file_to_write(tmp_path: Path) -> None:
+def test_a_urdf_alone_without_shapes_is_answered_with_what_to_write(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()))
     (tmp_path / "robot.json").unlink()
-    with pytest.raises(
-        RobotDataError, match=r"says nothing about soles; write '.*robot\.json' with \{\"schema\": 1, .*feet"
-    ):
+    with pytest.raises(RobotDataError, match=r"no collision shape to take its sole from; write its sole into the JSON"):
         load_robot(path)
 
 

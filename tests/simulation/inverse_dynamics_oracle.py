@@ -10,9 +10,9 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, Result, Signals
+from nlp_gait.problems.biped.double_support import torso_shares
 from nlp_gait.problems.biped.phase import BOTH_FEET
 from nlp_gait.problems.nao.body import GRAVITY
-from nlp_gait.problems.nao.double_support import torso_shares
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import mujoco

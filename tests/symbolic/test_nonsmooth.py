@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlp_gait.problem import Array
-from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Lifted, Nonsmooth
+from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Lifted, Nonsmooth, Root
 
 MARGIN = 0.01
 reals = st.floats(-1e6, 1e6)
@@ -157,3 +157,34 @@ def test_lifts_of_minima_and_absolute_values_leave_freedom_on_one_side() -> None
     ops.abs(MX(1.0))
     ops.min(MX(1.0), MX(2.0))
     assert [(lift.from_above, lift.tight) for lift in ops.lifts] == [(True, False), (False, False)]
+
+
+def test_a_root_is_newtons_result_or_a_variable_that_an_equation_ties() -> None:
+    """x^2 = 2, from 1.5: 1.4142135623730951 after four steps."""
+
+    def newton(inputs: SX) -> SX:
+        x = SX(1.5)
+        for _ in range(4):
+            x = x - (x**2 - inputs) / (2 * x)
+        return x
+
+    root = Root(residual=lambda x, inputs: x**2 - inputs, newton=newton, lift=True)
+    number = SX.sym("number")
+    assert float(ca.Function("f", [number], [Exact().root(root, number)])(2.0)) == pytest.approx(2.0**0.5, abs=1e-15)
+    assert Exact().open_roots() is None
+    ops = Lifted(MX(1e-3))
+    unknown = ops.root(root, number)
+    opened = ops.open_roots()
+    assert opened is not None and ops.open_roots() is None
+    assert unknown.is_symbolic() and float(ca.Function("s", [number], [opened.start])(2.0)) == pytest.approx(2.0**0.5)
+    instant = ca.Function("instant", [opened.unknowns, number], [opened.residual])
+    numbers = ca.DM([[2.0, 3.0]])
+    solved = ops.solved(MX(ca.DM([[1.4, 1.7]])), lambda x: instant.map(2)(x, numbers))
+    assert solved.shape == (1, 2)
+    (lift,) = ops.lifts
+    assert lift.tight
+    rows = ca.Function("rows", [lift.variable], [lift.rows])
+    np.testing.assert_allclose(np.array(rows([2.0**0.5, 3.0**0.5])), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.array(rows([2.0, 2.0])).ravel(), [2.0, 1.0])
+    unlifted = Root(residual=root.residual, newton=newton, lift=False)
+    assert not ops.root(unlifted, number).is_symbolic() and ops.open_roots() is None

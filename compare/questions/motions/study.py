@@ -23,7 +23,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
 from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problems.nao.curves import SPANS
+from nlp_gait.problems.biped.curves import SPANS
 from nlp_gait.problems.nao.single_support_free import fitted_start
 from nlp_gait.symbolic.splines import finer
 

@@ -9,7 +9,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.problem.motion.signals import Array, Signals
 from nlp_gait.robots import Robot
-from nlp_gait.robots.mirror import mirror_sign, partner
+from nlp_gait.robots.mirror import mirror_sign, partners
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
 SIDES_SWAPPED = {
@@ -55,8 +55,9 @@ def step_of(cycle: Signals) -> float:
 
 def mirror_image(signals: Signals, robot: Robot) -> Signals:
     """Time histories with left and right exchanged. Torques are those of a robot that is itself symmetric."""
-    columns = [signals.joints.index(partner(name)) for name in signals.joints]
-    signs = np.array([mirror_sign(robot, name) for name in signals.joints])
+    images = partners(robot)
+    columns = [signals.joints.index(images[name]) for name in signals.joints]
+    signs = np.array([mirror_sign(robot, name, images[name]) for name in signals.joints])
     arrays: dict[str, Array] = {}
     for name, array in signals.arrays.items():
         if name in JOINT_ARRAYS:

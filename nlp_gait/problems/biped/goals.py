@@ -36,13 +36,19 @@ class Goal:
         draw: how the motors draw power; where not as in the paper, the paper's power is an index too.
         figure: of the samples; None for power.
         reads_motion: whether it reads angles or their derivatives.
+        heat: K, with the robot's default.
     """
 
     objective: Objective = POWER
     draw: Draw = paper_draw
     figure: Callable[[Samples], MX] | None = None
     reads_motion: bool = False
-    parameters = (HEAT_LOSS,)
+    heat: Parameter = HEAT_LOSS
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """K alone."""
+        return (self.heat,)
 
     def value(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
         """Scalar, and the indexes that stand before and after those of the parts."""

@@ -23,6 +23,8 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 # foot's load that is too fast by a weight in 0.1 s.
 SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0}
 REACH_MARGIN = "reach_margin"
+TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
+CLOSURE_M = 1e-9  # that a leg may miss its foot by: far below what matters, far above rounding
 
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
 Margins = Callable[[MX, Point, Nonsmooth], tuple[MX, MX]]
@@ -63,11 +65,19 @@ def rows(
     lower: MX | None = None,
     upper: MX | None = None,
     labels: Sequence[str] = (),
+    size: float = 1.0,
     over: Over | None = None,
 ) -> Constraint:
-    """Rows of a part, in which a violation counts as every other in its unit."""
+    """Rows of a part, in which a violation counts as every other in its unit; ``size`` is that of the robot next to NAO's."""
     return Constraint(
-        name=name, labels=tuple(labels), unit=unit, scale=SCALES[unit], value=value, lower=lower, upper=upper, over=over
+        name=name,
+        labels=tuple(labels),
+        unit=unit,
+        scale=size * SCALES[unit],
+        value=value,
+        lower=lower,
+        upper=upper,
+        over=over,
     )
 
 
@@ -93,7 +103,9 @@ class JointLimits(Part):
         limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
         names = labels(self._planned, range(n))
-        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, "instant"),))
+        return Contribution(
+            rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, over="instant"),)
+        )
 
 
 class Reach(Part):
@@ -107,15 +119,83 @@ class Reach(Part):
         """Two-sided rows."""
         limit = 1 - at[REACH_MARGIN]
         names = labels(("left leg", "right leg"), range(samples.steps + 1))
-        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, "instant"),))
+        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, over="instant"),))
+
+
+class Closure(Part):
+    """Legs end at their feet, where their angles come from Newton's method; a solver has these equations as its own.
+
+    Args:
+        legs: names, as in the rows of ``Samples.miss``.
+    """
+
+    def __init__(self, legs: Sequence[str]) -> None:
+        self._legs = tuple(legs)
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Rows with an upper bound, under the exact interpretation alone."""
+        if not ops.exact:
+            return Contribution()
+        names = labels(self._legs, range(samples.steps + 1))
+        return Contribution(
+            rows=(rows("closure", "m", ca.vec(samples.miss), upper=MX(CLOSURE_M), labels=names, over="instant"),)
+        )
+
+
+class DriveLimits(Part):
+    """What a robot's file says that its joints can give: torque and speed, either sign.
+
+    Args:
+        robot: whose joints they are.
+        size: of its torques next to NAO's.
+    """
+
+    reads_motion = True
+
+    def __init__(self, robot: Robot, size: float) -> None:
+        self._robot, self._size = robot, size
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Two-sided rows, and the largest shares of both limits."""
+        n = samples.steps + 1
+        effort = DM([self._robot.joint(joint).torque_limit_Nm for joint in samples.joints])
+        speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in samples.moving])
+        strongest, fastest = (MX(ca.repmat(limit, n, 1)) for limit in (effort, speed))
+        torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
+        return Contribution(
+            rows=(
+                rows(
+                    "effort",
+                    "Nm",
+                    torque,
+                    -strongest,
+                    strongest,
+                    labels(samples.joints, range(n)),
+                    self._size,
+                    "instant",
+                ),
+                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n)), over="instant"),
+            ),
+            indexes={
+                "effort_share": ca.mmax(ca.fabs(torque) / strongest),
+                "speed_share": ca.mmax(ca.fabs(rate) / fastest),
+            },
+        )
 
 
 class TorqueChange(Part):
-    """Change of every torque over an interval of time, limited (sections 4.1 and 4.2)."""
+    """Change of every torque over an interval of time, limited (sections 4.1 and 4.2).
 
-    parameters = table(
-        ("torque_change_limit_Nm", "Nm", 1.2, "largest change of a torque over one interval", 0.0, math.inf)
-    )
+    Args:
+        size: of the robot's torques next to NAO's.
+    """
+
+    def __init__(self, size: float = 1.0) -> None:
+        self._size = size
+        limit = TORQUE_CHANGE_NM if size == 1.0 else float(f"{TORQUE_CHANGE_NM * size:.3g}")
+        self.parameters = table(
+            ("torque_change_limit_Nm", "Nm", limit, "largest change of a torque over one interval", 0.0, math.inf)
+        )
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
         """Two-sided rows, and the largest change."""
@@ -124,7 +204,7 @@ class TorqueChange(Part):
         limit = at["torque_change_limit_Nm"]
         names = labels(samples.joints, range(change.shape[1]))
         return Contribution(
-            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval"),),
+            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, self._size, "interval"),),
             indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
         )
 
@@ -197,7 +277,7 @@ def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> 
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
     )
-    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), "instant")
+    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), over="instant")
 
 
 class FootClearance(Part):

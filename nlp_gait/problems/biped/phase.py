@@ -24,6 +24,7 @@ from nlp_gait.problem import (
     Variable,
     in_space,
 )
+from nlp_gait.problem.motion.playback import PLAYED
 from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Part
 from nlp_gait.problems.biped.samples import LEAST_DURATION, Samples, Trace
@@ -57,6 +58,8 @@ class PlannedInstant(NamedTuple):
         ankles: (3,) positions by side ``"L"``, ``"R"`` [m].
         reach: (2,) cosines of the left and the right knee.
         wrench: (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty where it is not planned.
+        miss: (k,) by how much legs miss their feet [m]; empty where they cannot.
+        attitude: (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright.
     """
 
     joints: Mapping[str, Motion]
@@ -64,6 +67,8 @@ class PlannedInstant(NamedTuple):
     ankles: Mapping[str, SX]
     reach: SX
     wrench: SX = SX(0, 1)
+    miss: SX = SX(0, 1)
+    attitude: SX = SX(0, 1)
 
 
 class Loads(NamedTuple):
@@ -147,11 +152,13 @@ class Phase:
         """
         traces, motion, pressed = self._traces, self._reads_motion, len(BOTH_FEET) * self._reads_wrenches
         if self.derivatives == "analytic":
-            sample = self._sample(ops, motion, pressed > 0, traces)
-            planned, reach, torque, power, zmp, *rest = self._mapped(sample, at, phases)
+            planned, reach, torque, power, zmp, miss, *rest = self._sampled(
+                at, ops, motion, pressed > 0, traces, phases
+            )
             wrenches, moved, seen = rest[:pressed], rest[pressed : pressed + 3 * motion], rest[pressed + 3 * motion :]
         else:
-            q, _, _, hip, planned, reach, world, *seen = self._mapped(self._kinematics(ops, traces), at)
+            q, _, _, hip, planned, reach, world, _, *seen = self._mapped(self._kinematics(ops, traces), at)
+            miss = MX(0, self.grid.parts + 1)
             qd, qdd = self._differences(q, at)
             n = self.grid.parts + 1
             torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
@@ -167,6 +174,7 @@ class Phase:
             torque=torque,
             power=power,
             zmp=zmp,
+            miss=miss,
             motion=tuple(moved),
             wrenches=dict(zip(BOTH_FEET, wrenches, strict=False)),
             traces=dict(zip(traces, seen, strict=True)),
@@ -202,7 +210,7 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world = self._mapped(self._kinematics(Exact(), {}), at)
+        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._kinematics(Exact(), {}), at)
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
@@ -234,7 +242,10 @@ class Phase:
             "right_foot": right,
             **dict(zip(WRENCHES, halves, strict=True)),
         }
-        return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
+        if not attitude.shape[0]:
+            return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
+        arrays["attitude"] = _numbers(attitude)
+        return Signals(joints=self.joints, arrays=arrays, columns={**COLUMNS, "attitude": PLAYED["attitude"]})
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -264,23 +275,51 @@ class Phase:
         at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
         return [x, margin, phase], self.plan(at, phase, ops), at
 
-    def _sample(self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]) -> ca.Function:
-        """One sample with analytic derivatives: (x, margin, phase) to torques and what else is read."""
+    def _sampled(
+        self,
+        at: Point,
+        ops: Nonsmooth,
+        motion: bool,
+        wrenches: bool,
+        traces: Mapping[str, Trace],
+        phases: MX | None = None,
+    ) -> list[Any]:
+        """Outputs of ``_sample`` at all samples, or at other phases (1, k); equations that it leaves open are tied."""
+        inputs, outputs = self._sample(ops, motion, wrenches, traces)
+        roots = ops.open_roots()
+        if roots is None:
+            return self._mapped(ca.Function("sample", inputs, economical(outputs)), at, phases=phases)
+        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at)
+        tied = ca.Function("sample", [roots.unknowns, *inputs], economical([roots.residual, *outputs]))
+        found: list[Any] = []
+
+        def residual(unknowns: MX) -> MX:
+            rows, *rest = self._mapped(tied, at, unknowns)
+            found.extend(rest)
+            return rows
+
+        ops.solved(start, residual)
+        return found
+
+    def _sample(
+        self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]
+    ) -> tuple[list[SX], list[SX]]:
+        """One sample with analytic derivatives: x, margin and phase, and torques and what else is read."""
         inputs, plan, at = self._symbolic_plan(ops)
         loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()}, plan.wrench)
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
         planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
         torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
-        outputs = [planned, plan.reach, torque, power, loads.zmp]
+        outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
         outputs += [loads.wrenches[side] for side in BOTH_FEET] if wrenches else []
         outputs += self._motion(plan) if motion else []
         outputs += [trace(at, inputs[2]) for trace in traces.values()]
-        return ca.Function("sample", inputs, economical(outputs))
+        return inputs, outputs
 
     def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
         """One sample: angles that move with their derivatives, hip, planned angles, reach, and what follows.
 
-        That is the centre of mass with both feet and the planned wrench one below the other, and traces.
+        That is the centre of mass with both feet and the planned wrench one below the other, the attitude, and traces.
         """
         inputs, plan, at = self._symbolic_plan(ops)
         planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
@@ -292,7 +331,8 @@ class Phase:
         ]
         world = ca.vertcat(com, *soles, plan.wrench)
         seen = [trace(at, inputs[2]) for trace in traces.values()]
-        return ca.Function("kinematics", inputs, [*self._motion(plan), plan.hip, planned, plan.reach, world, *seen])
+        known = [plan.hip, planned, plan.reach, world, plan.attitude]
+        return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
 
     def _motion(self, plan: PlannedInstant) -> list[SX]:
         """Angles of the joints that move, and both derivatives."""
@@ -322,14 +362,14 @@ class Phase:
         loads = self.loads({**plan.joints, **moved}, hip, feet, ca.vertcat(*wrench) if wrench else SX(0, 1))
         return [*parts, hip, world], loads
 
-    def _mapped(self, function: ca.Function, at: Point, phases: MX | None = None) -> list[Any]:
-        """A function of (x, margin, phase) at all samples, or at other phases (1, k), one column each."""
+    def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
+        """A function of columns that differ from sample to sample and (x, margin, phase), at all samples or at other phases."""
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         margin = ca.repmat(at[REACH_MARGIN], 1, n)
         if phases is not None:
-            return list(function.map(n)(ca.repmat(at.only(self.names).x, 1, n), margin, phases))
+            return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, phases]))
         function, table = tabulated(function, DM(np.linspace(0.0, 1.0, n)).T)
-        return list(function.map(n)(ca.repmat(at.only(self.names).x, 1, n), margin, table))
+        return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, table]))
 
     def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
         """First and second time derivative of sampled angles (m, N + 1): central, one-sided at the ends, twice.

@@ -35,6 +35,7 @@ class Samples:
         traces: what parts asked to see, by name.
         wrenches: (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty if nobody reads
             them.
+        miss: (k, N + 1) by how much legs miss their feet [m]; empty where they cannot.
     """
 
     joints: tuple[str, ...]
@@ -49,6 +50,7 @@ class Samples:
     motion: tuple[MX, ...]
     traces: Mapping[str, MX]
     wrenches: Mapping[str, MX] = field(default_factory=dict)
+    miss: MX = MX(0, 1)
 
     @property
     def q(self) -> MX:

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from casadi import DM, SX, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import InstantPoint
 from nlp_gait.problems.biped.phase import PlannedInstant
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, at_rest, constant, cubic, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, at_rest, constant, cubic, plus
 from nlp_gait.symbolic.world_frame import Frame, chain_frames, leg_frames, upright
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
@@ -59,31 +58,6 @@ def upright_links(robot: Robot) -> frozenset[str]:
     """Links that keep the world's axes: an upright torso, flat soles, and hips whose yaw-pitch joint is held at zero."""
     hips = (robot.joint(f"{side}HipYawPitch").child for side in "LR")
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
-
-
-def hip_motion(
-    at: InstantPoint, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
-) -> Motion:
-    """Motion of the torso's origin as cubics in x, y and z (3,) [m].
-
-    Args:
-        at: values of the variables that ``legs.hip_variables`` makes.
-        along: x at both ends [m].
-        across: y at both ends [m].
-        duration: of the phase [s].
-        phase: time / duration.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.
-    """
-    height = at["hip_height_m"]
-    ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
-    return stack(
-        *(
-            cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
-            for axis, (start, end) in ends.items()
-        )
-    )
 
 
 def upright_plan(

@@ -6,38 +6,34 @@ torso, which depends on where the hip is between the feet.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Collection, Mapping
 
-from casadi import DM, MX, SX, fmax
+from casadi import DM, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Variable, maker
-from nlp_gait.problems.biped.foot_loads import FootLimits, PlannedWrench, Start, planned_loads
-from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins, Part
-from nlp_gait.problems.biped.phase import BOTH_FEET, Derivatives, Loader, Loads, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.curves import Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.problems.biped.double_support import (
+    LOAD_DEGREE,
+    Point2,
+    Standing,
+    TorsoShare,
+    double_support_margins,
+    double_support_mean_margins,
+    support_box,
+)
+from nlp_gait.problems.biped.parts import REACH_MARGIN
+from nlp_gait.problems.biped.phase import Derivatives, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
-from nlp_gait.problems.nao.curves import (
-    Splines,
-    Trajectory,
-    arm_limits,
-    arm_motions,
-    grid_for,
-    hip_and_arm_units,
-    hip_on_spline,
-)
+from nlp_gait.problems.nao.curves import arm_limits, arm_motions, hip_and_arm_units
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables, leg_geometry
-from nlp_gait.problems.nao.motors import Motors
-from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
+from nlp_gait.problems.nao.motors import nao_motors
+from nlp_gait.problems.nao.problem import paper_parts, phase_problem
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import below, combined_zmp, ground_load, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
-# Section 4.2: least mean margins of 0.08 m, in the box of 0.21 m by 0.18 m around NAO's soles.
-MEAN_DBM_SHARES = (8 / 21, 4 / 9)
 ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
     "LShoulderPitch": (1.0, 1.5),
     "LElbowRoll": (-0.64, -0.50),
@@ -45,12 +41,6 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
     "RElbowRoll": (0.42, 0.50),
 }
 DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
-
-Division = Literal["printed", "lever"]
-TorsoShare = Literal["printed", "lever", "free"]
-LOAD_DEGREE = 4
-Point2: TypeAlias = tuple[float, float]
-Side = TypeVar("Side", float, MX)
 
 
 @maker(
@@ -74,12 +64,12 @@ def nao_dsp(
 ) -> GaitProblem:
     """Double support of NAO; for the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model
     soles = soles_of(model, step_length_m)
     box = support_box(model, soles)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING))
-    sharing = load_sharing(model, torso_share, load_degree)
+    sharing = standing(model).sharing(torso_share, load_degree)
     richer = (arm_limits(model, splines, ARM_SWING, double_support_duration),)
     phase = Phase(
         robot=model,
@@ -110,10 +100,6 @@ def nao_dsp(
     )
 
 
-def _joints_on(side: str) -> tuple[str, ...]:
-    return tuple(joint for joint in JOINTS if joint.startswith(side))
-
-
 def soles_of(robot: Robot, step: float) -> dict[str, Point2]:
     """Ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2)."""
     return {"L": (step, leg_geometry(robot, "L").hip_m[1]), "R": (2 * step, leg_geometry(robot, "R").hip_m[1])}
@@ -141,32 +127,6 @@ def double_support_hip(at: InstantPoint, more: Mapping[str, Motion], soles: Mapp
     return hip_on_spline(at, more, hip_x, hip_y, double_support_duration(at), phase)
 
 
-class Box(NamedTuple, Generic[Side]):
-    """Sides of the rectangle around both soles [m]."""
-
-    back: Side
-    front: Side
-    right: float
-    left: float
-
-
-def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
-    """Rectangle around both soles, whose ankles stand at ``soles`` by side."""
-    feet = {side: robot.feet[foot] for side, foot in BOTH_FEET.items()}
-    return Box(
-        back=min(soles[side][0] - foot.back_m for side, foot in feet.items()),
-        front=max(soles[side][0] + foot.front_m for side, foot in feet.items()),
-        right=min(soles[side][1] - foot.right_m for side, foot in feet.items()),
-        left=max(soles[side][1] + foot.left_m for side, foot in feet.items()),
-    )
-
-
-def double_support_mean_margins(box: Box[float]) -> Point2:
-    """Least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
-    along, across = MEAN_DBM_SHARES
-    return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
-
-
 def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Planner:
     """Motion of hip and arms over standing feet (Table 5), and of the joints by inverse kinematics."""
     ankles = {side: Motion(ankle, SX(3, 1), SX(3, 1)) for side, ankle in standing_ankles(robot, soles).items()}
@@ -181,95 +141,12 @@ def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Pla
     return plan
 
 
-def torso_shares(hip_y: SX, rule: Division, feet_y: Point2 = (0.05, -0.05)) -> dict[str, SX]:
-    """Share of the torso's mass that each leg carries, from the hip's distances to the feet; both add up to 1.
-
-    With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
-
-    Args:
-        hip_y: position of the hip across the walking direction [m].
-        rule: ``"printed"`` is proportional to the distance *from* that leg's own foot, as in the equations; ``"lever"`` to
-            the distance from the other foot, as the text says: the nearer foot carries more.
-        feet_y: of the left and the right foot [m]; by default those of NAO.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), eqs. (28), (29).
-    """
-    from_left, from_right = feet_y[0] - hip_y, hip_y - feet_y[1]
-    width = feet_y[0] - feet_y[1]
-    left, right = from_left / width, from_right / width  # (eqs. 28, 29)
-    return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
-
-
-class Sharing(NamedTuple):
-    """What sharing the load in double support adds to a problem.
-
-    Attributes:
-        variables: of the planned wrench.
-        planned: adds that wrench to a motion.
-        loads: torques and ZMP.
-        parts: that limit it.
-        start_of: start points of variables by name, from those of the others.
-    """
-
-    variables: tuple[Variable, ...]
-    planned: Callable[[Planner], Planner]
-    loads: Loader
-    parts: tuple[Part, ...]
-    start_of: Callable[[Sequence[str], Start | None], Start | None]
-
-
-def load_sharing(robot: Robot, rule: TorsoShare, degree: int, upright: Collection[str] | None = None) -> Sharing:
-    """By a rule of the paper, or planned freely.
-
-    Args:
-        robot: with links welded that never move.
-        rule: see ``torso_shares``; ``"free"`` plans the wrench on the right foot.
-        degree: of that wrench over the phase.
-        upright: as for single support.
-    """
-    if rule != "free":
-        return Sharing((), lambda plan: plan, double_support_loads(robot, rule, upright), (), lambda _, start: start)
-    weight = robot.mass_kg * GRAVITY
-    wrench = PlannedWrench(robot=robot, weight=weight, degree=degree)
-    loads = planned_loads(robot, GRAVITY, upright_links(robot) if upright is None else upright)
-    return Sharing(wrench.variables, wrench.planned, loads, (FootLimits(wrench),), wrench.start_of)
-
-
-def double_support_loads(robot: Robot, rule: Division, upright: Collection[str] | None = None) -> Loader:
-    """Torques of each half from its own foot, and the combined ZMP of both feet; ``upright`` as for single support."""
-    halves = {side: tree_from(robot, robot.feet[foot].link, _joints_on(side)) for side, foot in BOTH_FEET.items()}
-    weight, upright = robot.mass_kg * GRAVITY, upright_links(robot) if upright is None else upright
-    feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
-
-    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
-        q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        shares = torso_shares(hip[1], rule, feet_y)
-        torques: dict[str, SX] = {}
-        zmps, ground_loads, wrenches = [], [], {}
-        for side, tree in halves.items():
-            half, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, {robot.root: shares[side]}, upright)
-            height = robot.feet[BOTH_FEET[side]].ankle_height_m
-            offset = zmp_of_wrench(wrench, height, weight)
-            wrenches[side] = below(wrench, height)
-            torques |= half
-            zmps.append(feet[side] + offset)
-            ground_loads.append(ground_load(wrench, weight))
-        return Loads(torques, combined_zmp(zmps, ground_loads), wrenches)
-
-    return loads
-
-
-def double_support_margins(box: Box[float]) -> Margins:
-    """Balance margins in x and y: distances to the sides of the box around both soles.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), Fig. 8 (b).
-    """
-    return lambda zmp, at, ops: margins_in(box, zmp, ops)
-
-
-def margins_in(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
-    """Distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
-    x, y = zmp[0, :].T, zmp[1, :].T
-    return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
+def standing(robot: Robot, upright: Collection[str] | None = None) -> Standing:
+    """NAO on both feet; ``upright``: links that never turn, None for those under an upright torso."""
+    return Standing(
+        robot=robot,
+        halves={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
+        feet_y=(leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1]),
+        gravity=GRAVITY,
+        upright=upright_links(robot) if upright is None else upright,
+    )

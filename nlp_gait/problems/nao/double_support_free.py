@@ -9,32 +9,28 @@ from casadi import MX, SX
 
 from nlp_gait.problem import GaitProblem, Grid, InstantPoint, Point, maker
 from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.curves import SPLINE_SAMPLES, Splines, Trajectory
+from nlp_gait.problems.biped.double_support import (
+    LOAD_DEGREE,
+    TorsoShare,
+    double_support_margins,
+    double_support_mean_margins,
+    support_box,
+)
 from nlp_gait.problems.biped.parts import REACH_MARGIN, AngleLimits, Contribution, Part, rows
 from nlp_gait.problems.biped.phase import Phase, PlannedInstant
 from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.closed_chain import YAW_PITCHES, check_yaw_pitches, closure, leaning_legs
-from nlp_gait.problems.nao.curves import (
-    SPLINE_SAMPLES,
-    Splines,
-    Trajectory,
-    arm_limits,
-    arm_motions,
-    hip_and_arm_units,
-)
+from nlp_gait.problems.nao.curves import arm_limits, arm_motions, hip_and_arm_units
 from nlp_gait.problems.nao.double_support import (
     ARM_SWING,
     DURATION,
-    LOAD_DEGREE,
-    TorsoShare,
     double_support_duration,
     double_support_hip,
-    double_support_margins,
-    double_support_mean_margins,
-    load_sharing,
     soles_of,
+    standing,
     standing_ankles,
-    support_box,
 )
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables
 from nlp_gait.problems.nao.problem import paper_parts, phase_problem
@@ -70,7 +66,7 @@ def nao_dsp_free(
     model = nao(robot, rotational_inertia)
     check_yaw_pitches(model)
     soles = soles_of(model, step_length_m)
-    sharing = load_sharing(model, torso_share, load_degree, upright=())
+    sharing = standing(model, upright=()).sharing(torso_share, load_degree)
     box, ankles = support_box(model, soles), standing_ankles(model, soles)
     splines = Splines(trajectory=trajectory, units=hip_and_arm_units(ARM_SWING) | dict.fromkeys(LEAN, "rad"))
 
@@ -135,4 +131,4 @@ class FlatSoles(Part):
         """Two-sided rows."""
         names = labels(("left", "right"), range(1, samples.steps))
         turns = ca.vec(samples.traces["sole_turn"][:, 1:-1])
-        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names, "instant"),))
+        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names, over="instant"),))

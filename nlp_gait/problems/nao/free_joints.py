@@ -19,6 +19,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Constraint, InstantPoint, Point, Signals
 from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.curves import Splines, Trajectory
 from nlp_gait.problems.biped.parts import (
     REACH_MARGIN,
     Contribution,
@@ -30,7 +31,6 @@ from nlp_gait.problems.biped.parts import (
 from nlp_gait.problems.biped.phase import Loader, Phase, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
-from nlp_gait.problems.nao.curves import Splines, Trajectory
 from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
@@ -248,7 +248,7 @@ class FreeLimits(Part):
 def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
     """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
     names = labels(corners, range(1, values.shape[1] + 1))
-    return rows(name, "m", ca.vec(values), MX(0.0), None, names, "instant")
+    return rows(name, "m", ca.vec(values), MX(0.0), None, names, over="instant")
 
 
 def free_splines(trajectory: Trajectory) -> Splines:

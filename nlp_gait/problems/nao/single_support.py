@@ -8,31 +8,21 @@ from typing import NamedTuple
 from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
+from nlp_gait.problems.biped.curves import Splines, Trajectory, grid_for, hip_on_spline
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
-from nlp_gait.problems.biped.phase import Derivatives, Loader, Loads, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Derivatives, Loader, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
+from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
-from nlp_gait.problems.nao.curves import (
-    Splines,
-    Trajectory,
-    arm_limits,
-    arm_motions,
-    grid_for,
-    hip_and_arm_units,
-    hip_on_spline,
-)
+from nlp_gait.problems.nao.curves import arm_limits, arm_motions, hip_and_arm_units
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables, leg_geometry
-from nlp_gait.problems.nao.motors import Motors
-from nlp_gait.problems.nao.problem import Criterion, goal_of, paper_parts, phase_problem
+from nlp_gait.problems.nao.motors import nao_motors
+from nlp_gait.problems.nao.problem import paper_parts, phase_problem
 from nlp_gait.robots import Foot, Robot
-from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import below, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, constant, plus, stack
 
-# Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
-MEAN_DBM_SHARES = (1 / 3, 1 / 4)
 ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
     "LShoulderPitch": (2.0, 1.0),
     "LElbowRoll": (-0.42, -0.64),
@@ -65,7 +55,7 @@ def nao_ssp(
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
     check_step_length(step_length_m)
-    real = Motors.parsed(motors, nao(robot, rotational_inertia))
+    real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model
     stance, foot = stance_of(model, step_length_m), model.feet["left"]
     splines = Splines(trajectory=trajectory, units=UNITS)
@@ -120,12 +110,6 @@ def stance_of(robot: Robot, step: float) -> Stance:
     return Stance((step, left), (0.0, 2 * step), right, (step / 2, 1.5 * step), (left / 2, left / 2))
 
 
-def single_support_mean_margins(foot: Foot) -> tuple[float, float]:
-    """Least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
-    along, across = MEAN_DBM_SHARES
-    return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
-
-
 def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Planner:
     """Motion of hip, swing foot and arms (Table 3), and of the joints by inverse kinematics."""
     ankle_heights = [robot.feet[side].ankle_height_m for side in ("left", "right")]
@@ -156,30 +140,9 @@ def _swing(at: InstantPoint, stance: Stance, more: Mapping[str, Motion], ankle_h
     return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
 
 
-def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
-    """Motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
-    forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
-    rise = parabola_lift(forward, start_x, end_x, lift)
-    return stack(forward, constant(y), rise._replace(position=rise.position + ankle_height))
-
-
 def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -> Loader:
-    """Torques of the whole tree from the left foot, which supports it, and the ZMP from the ground's wrench on that foot.
-
-    Args:
-        robot: with links welded that never move.
-        upright: links that never turn; None for those of a robot whose torso is upright and whose soles are flat.
-    """
-    foot = robot.feet["left"]
-    tree, upright = tree_from(robot, foot.link), upright_links(robot) if upright is None else upright
-
-    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
-        q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright)
-        offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
-        return Loads(torques, feet["L"] + offset, {"L": below(wrench, foot.ankle_height_m), "R": SX(6, 1)})
-
-    return loads
+    """Loads of NAO on its left foot; ``upright``: links that never turn, None for those under an upright torso."""
+    return loads_on_left(robot, GRAVITY, upright_links(robot) if upright is None else upright)
 
 
 def single_support_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:

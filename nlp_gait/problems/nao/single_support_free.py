@@ -9,8 +9,9 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Grid, maker
+from nlp_gait.problems.biped.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory
+from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory
 from nlp_gait.problems.nao.free_joints import FreeLimits, FreeMotion, FreePhase, free_splines, joint_coefficients
 from nlp_gait.problems.nao.legs import check_step_length, hip_variables
 from nlp_gait.problems.nao.problem import paper_parts, phase_problem
@@ -22,7 +23,6 @@ from nlp_gait.problems.nao.single_support import (
     single_support_duration,
     single_support_loads,
     single_support_margins,
-    single_support_mean_margins,
     single_support_plan,
     stance_of,
 )

@@ -12,7 +12,7 @@ import pytest
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, load
-from nlp_gait.problems.nao.curves import SPANS
+from nlp_gait.problems.biped.curves import SPANS
 from nlp_gait.symbolic.splines import finer
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated

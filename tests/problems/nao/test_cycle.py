@@ -7,11 +7,12 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, GaitProblem, Signals, load
+from nlp_gait.problems.biped.double_support import LOAD_DEGREE
 from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle.problem import walking_cycle
-from nlp_gait.problems.nao.double_support import LOAD_DEGREE, load_sharing
-from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.double_support import standing
+from nlp_gait.problems.nao.motors import nao_motors
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
@@ -74,11 +75,10 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     """Single and double support, both with their samples at the switch."""
-    real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
-    sharing = load_sharing(real.model, problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
+    real = nao_motors("", nao("nao-v5", rotational_inertia=True))
+    sharing = standing(real.model).sharing(problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
     assert problem.grid is not None
-    at_given_speed = problem.options["objective"] == "power"
-    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=at_given_speed)
+    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

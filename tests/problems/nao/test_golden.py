@@ -15,7 +15,7 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import load
-from nlp_gait.problems.nao.double_support import TorsoShare, torso_shares
+from nlp_gait.problems.biped.double_support import TorsoShare, torso_shares
 from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))

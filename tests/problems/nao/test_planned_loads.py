@@ -18,8 +18,8 @@ from nlp_gait.problems.biped.foot_loads import RAMP_SHARE, load_basis
 from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.nao.body import GRAVITY, nao
 from nlp_gait.problems.nao.cycle.problem import walking_cycle
-from nlp_gait.problems.nao.double_support import load_sharing
-from nlp_gait.problems.nao.motors import Motors
+from nlp_gait.problems.nao.double_support import standing
+from nlp_gait.problems.nao.motors import nao_motors
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.balance import sole_limits
 from tests.backends.toys import row_violations
@@ -66,9 +66,9 @@ def double_support(name: str, x: Array) -> Signals:
     problem = problem_of(name)
     if name != "nao-cycle":
         return problem.signals(x)
-    real = Motors.parsed("", nao("nao-v5", rotational_inertia=True))
+    real = nao_motors("", nao("nao-v5", rotational_inertia=True))
     assert problem.grid is not None
-    cycle = walking_cycle(real, load_sharing(real.model, "free", 4), problem.grid, Goal(), at_given_speed=True)
+    cycle = walking_cycle(real, standing(real.model).sharing("free", 4), problem.grid, Goal(), at_given_speed=True)
     return cycle.signals(problem.at(x))["dsp"]
 
 

@@ -20,12 +20,12 @@ from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, finely_sampled
+from nlp_gait.problems.biped.single_support import swing_foot
 from nlp_gait.problems.nao.body import JOINTS, nao, upright_plan
 from nlp_gait.problems.nao.cycle.preview_control import PREVIEW_S, PreviewController
 from nlp_gait.problems.nao.legs import leg_geometry
 from nlp_gait.problems.nao.recorded.motion import LEFT_OUT, JointAngles
 from nlp_gait.problems.nao.recorded.problem import Recorded, recorded
-from nlp_gait.problems.nao.single_support import swing_foot
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
 from nlp_gait.symbolic.trajectories import Motion, constant, stack

@@ -8,36 +8,27 @@ and the step length are variables, and the cycle repeats after mirroring left to
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
 
 import numpy as np
 
-from nlp_gait.problem import Array, GaitProblem, Grid, Objective, maker
+from nlp_gait.problem import Array, GaitProblem, Grid, Variable, maker
+from nlp_gait.problems.biped.curves import grid_for
+from nlp_gait.problems.biped.cycle import CycleGoal, WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle_motion import TIMES
+from nlp_gait.problems.biped.double_support import LOAD_DEGREE, Sharing, TorsoShare
 from nlp_gait.problems.biped.goals import Goal
+from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.phase import Phase
-from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.curves import grid_for
-from nlp_gait.problems.nao.cycle.motion import (
-    TIMES,
-    cycle_variables,
-    double_support_planner,
-    single_support_planner,
-)
-from nlp_gait.problems.nao.cycle.rows import (
-    WalkingCycle,
-    double_margins,
-    joined,
-    mean_margins,
-    single_margins,
-    start_at_speed,
-)
-from nlp_gait.problems.nao.double_support import LOAD_DEGREE, Sharing, TorsoShare, load_sharing
-from nlp_gait.problems.nao.motors import Motors
-from nlp_gait.problems.nao.problem import goal_of, paper_parts, with_robot
+from nlp_gait.problems.biped.problem import goal_of
+from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
+from nlp_gait.problems.nao.cycle.rows import double_margins, mean_margins, single_margins
+from nlp_gait.problems.nao.double_support import standing
+from nlp_gait.problems.nao.motors import nao_motors
+from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.single_support import single_support_loads
-
-CycleGoal = Literal["energy-per-metre", "power", "torque"]
-ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
+from nlp_gait.robots import Robot
+from nlp_gait.robots.mirror import partner
 
 
 @maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
@@ -68,11 +59,10 @@ def nao_cycle(
         load_degree: of the planned wrench over double support.
     """
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    real, at_given_speed = Motors.parsed(motors, nao(robot, rotational_inertia)), objective != "energy-per-metre"
-    sharing = load_sharing(real.model, torso_share, load_degree)
+    real, at_given_speed = nao_motors(motors, nao(robot, rotational_inertia)), objective != "energy-per-metre"
+    sharing = standing(real.model).sharing(torso_share, load_degree)
     goal = goal_of("torque" if objective == "torque" else "power", real)
     cycle = walking_cycle(real, sharing, grid, goal, at_given_speed=at_given_speed)
-    least = goal.objective if at_given_speed else ENERGY_PER_METRE
     names = tuple(variable.name for variable in cycle.decisions)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -80,10 +70,10 @@ def nao_cycle(
 
     problem = GaitProblem(
         name="nao-cycle",
-        title=f"NAO, walking cycle: least {least.name.replace('_', ' ')}",
+        title=f"NAO, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=least,
+        objective=cycle.objective,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),
@@ -100,13 +90,13 @@ def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, a
 
     Args:
         motors: of a robot as ``nao`` makes it.
-        sharing: of load in double support, see ``double_support.load_sharing``.
+        sharing: of load in double support, see ``biped.double_support``.
         grid: of each phase.
         goal: of each phase; the cycle's is their mean over time, or energy per metre.
         at_given_speed: the step length follows from the speed.
     """
     model = motors.model
-    *motion, step = cycle_variables(model)
+    *motion, step = nao_cycle_variables(model)
     variables, means = (*motion, *sharing.variables, step), mean_margins(model)
     double = sharing.planned(double_support_planner(model))
     halves = {
@@ -128,4 +118,18 @@ def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, a
         )
         for name, (plan, loads, margins, more) in halves.items()
     }
-    return WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=at_given_speed)
+    return nao_cycle_of(model, variables, phases, at_given_speed=at_given_speed)
+
+
+def nao_cycle_of(
+    model: Robot, variables: tuple[Variable, ...], phases: Mapping[str, Phase], *, at_given_speed: bool
+) -> WalkingCycle:
+    """A cycle of NAO from both phases; see ``WalkingCycle``."""
+    return WalkingCycle(
+        robot=model,
+        images=tuple(map(partner, JOINTS)),
+        gravity=GRAVITY,
+        variables=variables,
+        phases=phases,
+        at_given_speed=at_given_speed,
+    )

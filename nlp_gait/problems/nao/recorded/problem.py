@@ -10,35 +10,22 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
+from nlp_gait.problems.biped.cycle import joined
+from nlp_gait.problems.biped.cycle_motion import STEP, TIMES
+from nlp_gait.problems.biped.double_support import double_support_margins, double_support_mean_margins, support_box
 from nlp_gait.problems.biped.parts import Part
 from nlp_gait.problems.biped.phase import Loader
+from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
-from nlp_gait.problems.nao.cycle.motion import (
-    STEP,
-    TIMES,
-    cycle_variables,
-    double_support_planner,
-    single_support_planner,
-)
-from nlp_gait.problems.nao.cycle.problem import ENERGY_PER_METRE
-from nlp_gait.problems.nao.cycle.rows import WalkingCycle, double_margins, joined, mean_margins, single_margins
-from nlp_gait.problems.nao.double_support import (
-    DURATION,
-    double_support_loads,
-    double_support_margins,
-    double_support_mean_margins,
-    support_box,
-)
+from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
+from nlp_gait.problems.nao.cycle.problem import nao_cycle_of
+from nlp_gait.problems.nao.cycle.rows import double_margins, mean_margins, single_margins
+from nlp_gait.problems.nao.double_support import DURATION, standing
 from nlp_gait.problems.nao.legs import hip_variables
 from nlp_gait.problems.nao.problem import paper_parts, with_robot
 from nlp_gait.problems.nao.recorded.motion import JointAngles, Motion, motion_of
 from nlp_gait.problems.nao.recorded.phase import HipLimits, RecordedPhase, StandingLimits, SwingLimits, mean_place
-from nlp_gait.problems.nao.single_support import (
-    OWN_VARIABLES,
-    single_support_loads,
-    single_support_margins,
-    single_support_mean_margins,
-)
+from nlp_gait.problems.nao.single_support import OWN_VARIABLES, single_support_loads, single_support_margins
 from nlp_gait.robots import Robot
 
 Gait = Literal["nao-ssp", "nao-dsp", "nao-cycle"]
@@ -124,8 +111,7 @@ def recorded(
         problem = _cycle(model, parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
         options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
         problem = replace(problem, options=options, refine=lambda by: built(factor * by))
-        repeats = len(parts) > 1 and motion.repeats
-        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
+        return with_robot(problem, robot, model.armatures_kgm2)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     times: tuple[float, ...]
@@ -161,7 +147,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
             SwingLimits(motion, lift),
         )
     else:
-        duration, loads = DURATION, double_support_loads(model, "printed", upright=())
+        duration, loads = DURATION, standing(model, upright=()).loads("printed")
         right = mean_place(motion)
         box = support_box(model, {"L": motion.support[:2], "R": (float(right[0]), float(right[1]))})
         own = (
@@ -189,7 +175,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
 
 def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem:
     """Problem of a cycle: both phases, and the rows that join them."""
-    known = {variable.name: variable for variable in cycle_variables(model)}
+    known = {variable.name: variable for variable in nao_cycle_variables(model)}
     variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
     means = mean_margins(model)
 
@@ -203,7 +189,7 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         "ssp": (at_ends, SwingLimits(parts["ssp"], OWN_VARIABLES[0])),
         "dsp": (StandingLimits(),),
     }
-    loads = {"ssp": single_support_loads(model, upright=()), "dsp": double_support_loads(model, "lever", upright=())}
+    loads = {"ssp": single_support_loads(model, upright=()), "dsp": standing(model, upright=()).loads("lever")}
     margins = {"ssp": single_margins(model), "dsp": double_margins(model)}
     phases = {
         name: _recorded_phase(
@@ -217,13 +203,13 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         )
         for name, motion in parts.items()
     }
-    cycle = WalkingCycle(robot=model, variables=variables, phases=phases, at_given_speed=False)
+    cycle = nao_cycle_of(model, variables, phases, at_given_speed=False)
     return GaitProblem(
         name="recorded-cycle",
         title="A recorded gait of NAO, a walking cycle",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
-        objective=ENERGY_PER_METRE,
+        objective=cycle.objective,
         assemble=cycle.assemble,
         grid=grid,
         motion=lambda at: joined(cycle.signals(at)),

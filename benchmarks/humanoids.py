@@ -1,0 +1,220 @@
+"""Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
+
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [cycles] [--robots jvrc,g1,...]
+
+Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+import nlp_gait
+from benchmarks.engine.markdown import cells, header
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.problem import Array, GaitProblem, Result
+from nlp_gait.problems.humanoid.body import GRAVITY
+from tests.pinocchio_oracle import floating_model, stand
+
+SHARE = "share/example-robot-data/robots"
+CANDIDATES, STARTS, STEPS = 200, 10, 4
+CLOSURE_M = 1e-9
+
+
+def robots() -> dict[str, str]:
+    """Files by name; NAO is a general leg here."""
+    found = {"nao": "nao-v5"}
+    jvrc = find_spec("jvrc_description")
+    if jvrc is not None and jvrc.origin is not None:
+        found["jvrc"] = str(Path(jvrc.origin).parent / "urdf/jvrc1.urdf")
+    for folder in sys.path:
+        root = Path(folder) / "cmeel.prefix" / SHARE
+        if root.is_dir():
+            found["g1"] = str(root / "g1_description/urdf/g1_29dof_rev_1_0.urdf")
+            found["talos"] = str(root / "talos_data/robots/talos_full_v2.urdf")
+            found["romeo"] = str(root / "romeo_description/urdf/romeo.urdf")
+            break
+    for name in ("jvrc", "g1", "talos", "romeo"):
+        if name not in found:
+            print(f"{name} is left out: pip install jvrc-description example-robot-data", file=sys.stderr)
+    return found
+
+
+def oracle(files: dict[str, str]) -> Iterator[str]:
+    """Torques and ZMP of random reachable candidates against Pinocchio."""
+    yield header("robot", "candidates", "torque, of the largest", "ZMP m", "reached, share of draws")
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        playback = problem.playback
+        assert playback is not None
+        robot = playback.robot
+        model, ankle = floating_model(robot), robot.joint_to[robot.feet["left"].link].name
+        worst_torque, worst_zmp = 0.0, 0.0
+        chosen, share = reachable(problem)
+        rng = np.random.default_rng(1)
+        for x in chosen:
+            signals = problem.signals(x)
+            k = int(rng.integers(len(signals.arrays["t"])))
+            at = {
+                a: dict(zip(signals.joints, map(float, signals.arrays[a][k]), strict=True)) for a in ("q", "qd", "qdd")
+            }
+            foot = signals.arrays["left_foot"][k] + [0.0, 0.0, robot.feet["left"].ankle_height_m]
+            found = stand(model, ankle, foot, at["q"], at["qd"], at["qdd"], GRAVITY)
+            torque = np.array([found.torques[joint] for joint in signals.joints])
+            error = np.abs(torque - signals.arrays["tau"][k]).max() / np.abs(torque).max()
+            worst_torque = max(worst_torque, float(error))
+            worst_zmp = max(worst_zmp, float(np.abs(found.zmp - signals.arrays["zmp"][k]).max()))
+        yield cells(name, f"{len(chosen)}", f"{worst_torque:.1e}", f"{worst_zmp:.1e}", f"{share:.2f}")
+
+
+def reachable(problem: GaitProblem) -> tuple[Array, float]:
+    """Random candidates whose legs reach their feet, and how many of all do."""
+    model, rng = exact_model(problem), np.random.default_rng(0)
+    rows = [i for i, name in enumerate(model.row_names) if name.startswith("closure")]
+    found: list[Array] = []
+    draws = 0
+    while len(found) < CANDIDATES:
+        x = rng.uniform(problem.lower, problem.upper)
+        draws += 1
+        if model.at(x, problem.p).g[rows].max() < CLOSURE_M:
+            found.append(x)
+    return np.array(found), len(found) / draws
+
+
+def starts(files: dict[str, str]) -> Iterator[str]:
+    """Single support from random starts: how many end feasible, closure, and the lifted objective against the exact one."""
+    from casadi import Function
+
+    yield header("robot", "feasible", "iterations", "best W", "closure m", "lifted against exact", "binding")
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        solution = nlp_gait.solve(problem, starts=STARTS, seed=0)
+        x, model, nlp = np.array(list(solution.x.values())), exact_model(problem), nlp_model(problem)
+        values = model.at(x, problem.p)
+        rows = [i for i, row in enumerate(model.row_names) if row.startswith("closure")]
+        width = nlp.widths[-1]
+        cost = Function("cost", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])
+        lifted = float(cost(nlp.start(problem, x, width), np.append(problem.p, width)))
+        yield cells(
+            name,
+            f"{sum(start.success for start in solution.starts)} of {STARTS}",
+            f"{np.median([start.iterations for start in solution.starts]):.0f}",
+            f"{solution.objective:.6g}",
+            f"{values.g[rows].max():.1e}",
+            f"{abs(lifted - values.cost) / values.cost:.1e}",
+            ", ".join(active.name for active in solution.active_constraints[:4]),
+        )
+
+
+def kernel(files: dict[str, str]) -> Iterator[str]:
+    """A candidate's time against nao-ssp's, in turns, processor time, one thread."""
+    import time
+
+    problems = {"nao-ssp": nlp_gait.load("nao-ssp")}
+    problems |= {name: nlp_gait.load("humanoid-ssp", robot=file) for name, file in files.items()}
+    objectives = {n: nlp_gait.compile_objective(p, require_compiler=True, threads=1) for n, p in problems.items()}
+    points = {n: np.random.default_rng(0).uniform(p.lower, p.upper, (1000, len(p.names))) for n, p in problems.items()}
+    best = dict.fromkeys(problems, np.inf)
+    for _ in range(25):
+        for name, objective in objectives.items():
+            started = time.process_time()
+            objective(points[name])
+            best[name] = min(best[name], time.process_time() - started)
+    yield header("problem", "us a candidate", "times nao-ssp", "instructions of the exact function's sample")
+    for name, problem in problems.items():
+        function = exact_model(problem).function
+        samples = [f for f in map(function.find_function, function.get_function()) if "sample" in f.name()]
+        count = max((f.n_instructions() for f in samples), default=0)
+        yield cells(name, f"{1e3 * best[name]:.2f}", f"{best[name] / best['nao-ssp']:.2f}", f"{count}")
+
+
+def cycles(files: dict[str, str]) -> Iterator[str]:
+    """Cheapest cycles at NAO's 0.03 m/s times the root of lambda, in the model and over some steps in the engine."""
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.plan import plan_of
+    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.walking import measure_walk
+
+    yield header(
+        "robot",
+        "leg m",
+        "mass kg",
+        "speed m/s",
+        "step m",
+        "power W",
+        "cost of transport",
+        "margins mm",
+        "binding",
+        "engine",
+    )
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-cycle", robot=file, objective="power")
+        solution = nlp_gait.solve(problem, starts=4, seed=0)
+        x = np.array(list(solution.x.values()))
+        indexes = exact_model(problem).at(x, problem.p).indexes
+        robot, played = problem.robot, "-"
+        assert robot is not None
+        if solution.success:
+            plan = plan_of(Result(problem=problem, x=x), STEPS)
+            walked = measure_walk(plan, play(plan), Drive(), STEPS)
+            m = walked.measurements
+            played = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"{walked.steps_done} steps"
+            if walked.engine_J_per_planned_m is not None:
+                played += f", {walked.engine_J_per_planned_m / (robot.mass_kg * GRAVITY):.3f}"
+        margins = [1e3 * indexes[f"ssp_dbm_{axis}_min_m"] for axis in "xy"]
+        leg = problem.skeleton and nlp_gait_leg(problem)
+        yield cells(
+            name,
+            f"{leg:.3f}",
+            f"{robot.mass_kg:.1f}",
+            f"{indexes['speed_m_s']:.4f}",
+            f"{indexes['step_length_m']:.3f}",
+            f"{indexes['power_W']:.3f}" if solution.success else "not feasible",
+            f"{indexes['cost_of_transport']:.3f}",
+            ", ".join(f"{margin:.0f}" for margin in margins),
+            ", ".join(active.name for active in solution.active_constraints[:3]),
+            played,
+        )
+
+
+def nlp_gait_leg(problem: GaitProblem) -> float:
+    """Length of a leg [m]."""
+    from nlp_gait.robots.biped import biped_of
+
+    assert problem.robot is not None
+    return biped_of(problem.robot).leg_length_m
+
+
+GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
+    "oracle": oracle,
+    "starts": starts,
+    "kernel": kernel,
+    "cycles": cycles,
+}
+
+
+def main() -> None:
+    """Run the groups that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "groups", nargs="*", metavar="GROUP", default=[], help=f"of {', '.join(GROUPS)}; all by default"
+    )
+    parser.add_argument("--robots", default="", help="names, separated by commas")
+    arguments = parser.parse_args()
+    wanted = set(filter(None, arguments.robots.split(",")))
+    files = {name: file for name, file in robots().items() if not wanted or name in wanted}
+    for group in arguments.groups or GROUPS:
+        print(f"\n{GROUPS[group].__doc__}\n", flush=True)
+        for line in GROUPS[group](files):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""A robot as it was understood: from the front and from the side at zero angles, and its soles from above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from compare.drawing.figures import new_figure, save, style
+from nlp_gait.robots.biped import SIDES, Biped
+
+COLOURS = {"left": "#0072B2", "right": "#D55E00"}
+OTHERS = "#999999"
+
+
+def draw_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
+    """Write ``<stem>.png`` and ``<stem>.svg``; returns both paths.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    robot = biped.full
+    with style():
+        canvas = new_figure(9.0, 4.4)
+        front, aside, above = canvas.subplots(1, 3)
+        for joint in robot.joints.values():
+            end = np.sum([part.origin_m for part in robot.path_to_root(joint.child)], axis=0)
+            start = end - np.array(joint.origin_m)
+            side = next((s for s in SIDES if joint.name in biped.legs[s].joints), None)
+            look = {"color": COLOURS[side] if side else OTHERS, "lw": 2.0 if side else 1.0, "marker": "o", "ms": 2.5}
+            front.plot(*zip(start[1:], end[1:], strict=True), **look)
+            aside.plot(*zip(start[[0, 2]], end[[0, 2]], strict=True), **look)
+        for side in SIDES:
+            leg, foot = biped.legs[side], robot.feet[side]
+            x, y, z = leg.foot_m
+            z -= foot.ankle_height_m
+            front.plot([y - foot.right_m, y + foot.left_m], [z, z], color=COLOURS[side], lw=3.0)
+            aside.plot([x - foot.back_m, x + foot.front_m], [z, z], color=COLOURS[side], lw=3.0)
+            corners = [(-foot.back_m, -foot.right_m), (foot.front_m, -foot.right_m), (foot.front_m, foot.left_m)]
+            corners += [(-foot.back_m, foot.left_m), (-foot.back_m, -foot.right_m)]
+            above.plot(*(np.array(corners) + [x, y]).T, color=COLOURS[side], label=f"{side} sole")
+            above.plot(x, y, "o", color=COLOURS[side], ms=4)
+            above.plot(*leg.hip_m[:2], "x", color=COLOURS[side], ms=6)
+        front.invert_xaxis()  # seen from behind: left is left
+        for axes, across, up in ((front, "y", "z"), (aside, "x", "z"), (above, "x", "y")):
+            axes.set_xlabel(f"{across} [m]")
+            axes.set_ylabel(f"{up} [m]")
+            axes.set_aspect("equal", adjustable="datalim")
+        above.legend(loc="center")
+        above.set_title("soles, joints (o) and hips (x)")
+        front.set_title("from behind")
+        aside.set_title("from the right")
+        canvas.suptitle(robot.name)
+        return save(canvas, stem)

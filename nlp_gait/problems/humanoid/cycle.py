@@ -1,0 +1,221 @@
+"""Walking cycle of any humanoid: both phases that fit together, at least energy per metre or least power at a speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+from casadi import MX, SX
+
+from nlp_gait.problem import Array, GaitProblem, InstantPoint, Point, Variable, maker
+from nlp_gait.problems.biped.curves import grid_for
+from nlp_gait.problems.biped.cycle import SPEED, CycleGoal, WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle_motion import (
+    LIFT,
+    STEP,
+    TIMES,
+    Coordinate,
+    between,
+    cycle_from,
+    cycle_variables,
+)
+from nlp_gait.problems.biped.double_support import (
+    LOAD_DEGREE,
+    Box,
+    Sharing,
+    double_support_mean_margins,
+    margins_in,
+    support_box,
+)
+from nlp_gait.problems.biped.motors import Motors
+from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
+from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.problem import goal_of
+from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
+from nlp_gait.problems.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL, Humanoid, humanoid
+from nlp_gait.problems.humanoid.double_support import Share, standing
+from nlp_gait.problems.humanoid.problem import humanoid_motors, parts_of, with_body, within_reach
+from nlp_gait.problems.humanoid.single_support import sole_margins
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, constant, stack
+
+LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
+SPEED_M_S = 0.03  # NAO's
+
+
+@maker()
+def humanoid_cycle(
+    *,
+    robot: str = "nao-v5",
+    objective: CycleGoal = "energy-per-metre",
+    intervals: int = 10,
+    torso_share: Share = "lever",
+    samples_per_interval: int = 0,
+    drive_limits: bool = True,
+    motors: str = "",
+    load_degree: int = LOAD_DEGREE,
+) -> GaitProblem:
+    """Walking cycle: one step, whose mirror image is the next one; for the options see ``problems.humanoid``.
+
+    ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
+    parameter: the step length follows from it.
+    """
+    body = humanoid(robot)
+    grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    real, at_given_speed = humanoid_motors(motors, body), objective != "energy-per-metre"
+    sharing = standing(body, real.model).sharing(torso_share, load_degree)
+    *motion, step = _variables(body)
+    variables = (*motion, *sharing.variables, step)
+    means = _mean_margins(body)
+    halves = {
+        "ssp": (_single_planner(body), loads_on_left(real.model, GRAVITY, body.upright_feet), _single(body), ()),
+        "dsp": (sharing.planned(_double_planner(body)), sharing.loads, _double_margins(body), sharing.parts),
+    }
+    phases = {
+        name: Phase(
+            robot=real.model,
+            joints=body.biped.joints,
+            planned=body.biped.joints,
+            variables=variables,
+            duration=TIMES[name],
+            plan=plan,
+            loads=loads,
+            grid=grid,
+            parts=(*parts_of(body, margins, means[name], drive_limits=drive_limits), *real.parts, *more),
+            goal=goal_of("torque" if objective == "torque" else "power", real, body.heat),
+        )
+        for name, (plan, loads, margins, more) in halves.items()
+    }
+    cycle = _cycle(body, real, variables, phases, at_given_speed)
+    return _problem(body, cycle, sharing, at_given_speed)
+
+
+def _cycle(
+    body: Humanoid, motors: Motors, variables: tuple[Variable, ...], phases: Mapping[str, Phase], at_given_speed: bool
+) -> WalkingCycle:
+    return WalkingCycle(
+        robot=motors.model,
+        images=tuple(body.biped.images[joint] for joint in body.biped.joints),
+        gravity=GRAVITY,
+        torque_size=body.biped.torque_scale,
+        speed_m_s=body.velocity(SPEED_M_S),
+        variables=variables,
+        phases=phases,
+        at_given_speed=at_given_speed,
+    )
+
+
+def _problem(body: Humanoid, cycle: WalkingCycle, sharing: Sharing, at_given_speed: bool) -> GaitProblem:
+    names = tuple(variable.name for variable in cycle.decisions)
+
+    def reach(at: Point) -> MX:
+        return ca.horzcat(*(phase.samples(cycle.motion(at), Exact()).reach for phase in cycle.phases.values()))
+
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return start_at_speed(names, parameters, rng)
+
+    own = sharing.start_of(names, start if at_given_speed else None)
+    problem = GaitProblem(
+        name="humanoid-cycle",
+        title=f"{body.biped.full.name}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
+        variables=cycle.decisions,
+        own_parameters=cycle.parameters,
+        objective=cycle.objective,
+        assemble=cycle.assemble,
+        grid=cycle.phases["ssp"].grid,
+        motion=lambda at: joined(cycle.signals(at)),
+        start=within_reach(names, (REACH_MARGIN, *((SPEED,) if at_given_speed else ())), reach, own),
+        durations=tuple(TIMES.values()),
+        long_derivatives=bool(sharing.variables),
+    )
+    return with_body(problem, body, cycle.robot.armatures_kgm2, repeats=True)
+
+
+def _coordinates(body: Humanoid) -> tuple[Coordinate, ...]:
+    """Lean of the torso; a mirrored motion rolls the other way."""
+    rate = float(f"{LARGEST_LEAN_RATE / body.biped.time_scale:.4g}")
+    return tuple(
+        Coordinate(
+            name=name,
+            rate=f"{name}_rate",
+            bounds=(-largest, largest),
+            largest_rate=rate,
+            image=image,
+            words=name.replace("_", " "),
+            rate_words=f"rate of the {name.replace('_', ' ')}",
+        )
+        for name, largest, image in (("torso_roll", LARGEST_ROLL, -1.0), ("torso_pitch", LARGEST_PITCH, 1.0))
+    )
+
+
+def _variables(body: Humanoid) -> tuple[Variable, ...]:
+    leg_m, point = body.biped.leg_length_m, "middle of both hips"
+    rows = (
+        (LIFT, "m", body.length(0.015), body.length(0.03), "highest point of the swing foot"),
+        (TIMES["ssp"], "s", body.time(0.4), body.time(4.0), "from lift-off to touch-down"),
+        (TIMES["dsp"], "s", body.time(0.2), body.time(2.0), "from touch-down to the next lift-off"),
+    )
+    own = tuple(Variable(name=n, unit=u, lower=low, upper=high, description=text) for n, u, low, high, text in rows)
+    return cycle_variables(body.hip_variables, leg_m, body.foot_y("left"), _coordinates(body), own, point)
+
+
+def _standing_foot(body: Humanoid, side: str) -> Motion:
+    """Origin of a standing foot's link (3,) at x = 0 [m]."""
+    return stack(*map(constant, (0.0, body.foot_y(side), body.ankle_height(side))))
+
+
+def _single_planner(body: Humanoid) -> Planner:
+    """From lift-off to touch-down over the left foot."""
+    coordinates, left = _coordinates(body), _standing_foot(body, "left")
+    right_y, right_z = body.foot_y("right"), body.ankle_height("right")
+
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
+        cycle = cycle_from(at, coordinates)
+        swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
+        hip, (roll, pitch) = between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
+        return body.plan(hip, (roll, pitch), {"L": left, "R": swing}, at[REACH_MARGIN], ops)
+
+    return plan
+
+
+def _double_planner(body: Humanoid) -> Planner:
+    """From touch-down to the mirror image of lift-off over both feet."""
+    coordinates = _coordinates(body)
+    left, right = _standing_foot(body, "left"), _standing_foot(body, "right")
+
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
+        cycle = cycle_from(at, coordinates)
+        ahead = right._replace(position=right.position + ca.vertcat(cycle.step, 0, 0))
+        hip, (roll, pitch) = between(cycle.touch_down, cycle.end, cycle.double, phase)
+        return body.plan(hip, (roll, pitch), {"L": left, "R": ahead}, at[REACH_MARGIN], ops)
+
+    return plan
+
+
+def _single(body: Humanoid) -> Margins:
+    return sole_margins((0.0, body.foot_y("left")), body.biped.model.feet["left"])
+
+
+def _double_margins(body: Humanoid) -> Margins:
+    """In the box around the left foot and the right one a step ahead."""
+    feet = body.biped.model.feet
+    fixed = support_box(body.biped.model, {"L": (0.0, body.foot_y("left")), "R": (0.0, body.foot_y("right"))})
+
+    def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        step = at[STEP]
+        back = ca.fmin(-feet["left"].back_m, step - feet["right"].back_m)
+        front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
+        return margins_in(Box(back=back, front=front, right=fixed.right, left=fixed.left), zmp, ops)
+
+    return margins
+
+
+def _mean_margins(body: Humanoid) -> dict[str, tuple[float, float]]:
+    """Default of the least mean margins of each phase in x and y [m]."""
+    model = body.biped.model
+    box = support_box(model, {"L": (0.0, body.foot_y("left")), "R": (body.step_length(0.0), body.foot_y("right"))})
+    return {
+        "ssp": single_support_mean_margins(model.feet["left"]),
+        "dsp": double_support_mean_margins(box),
+    }

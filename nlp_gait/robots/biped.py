@@ -1,0 +1,150 @@
+"""A robot as a biped: two legs of six turning joints, everything else one body in a posture, and its size next to NAO's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg, leg_of
+from nlp_gait.robots.robot import Joint, Robot
+from nlp_gait.robots.tree import posed, weld
+
+SIDES = ("left", "right")
+# NAO V5: a leg from hip to ankle [m], the mass [kg], and the heat constant K of the paper [W/(Nm)^2].
+NAO_LEG_M, NAO_MASS_KG, NAO_HEAT_W_PER_NM2 = 0.2029, 5.30535, 0.025
+# Both legs are alike to this [m], and both ankles equally high.
+ALIKE_M = 2e-3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Biped:
+    """A robot as gaits of any humanoid take it.
+
+    Attributes:
+        full: with all its joints, those that are held at zero in the posture.
+        model: with the joints of the legs alone, all others held in the posture.
+        legs: ``"left"`` and ``"right"``.
+        posture_rad: angles of the joints that are held.
+    """
+
+    full: Robot
+    model: Robot
+    legs: Mapping[str, Leg]
+    posture_rad: Mapping[str, float]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Of both legs, the left one's first."""
+        return tuple(name for side in SIDES for name in self.legs[side].joints)
+
+    @cached_property
+    def images(self) -> Mapping[str, str]:
+        """Joint of the other leg that is the image of each."""
+        left, right = (self.legs[side].joints for side in SIDES)
+        return dict(zip((*left, *right), (*right, *left), strict=True))
+
+    @cached_property
+    def leg_length_m(self) -> float:
+        """Greatest distance of hip and ankle."""
+        return self.legs["left"].length_m
+
+    @cached_property
+    def hip_middle_m(self) -> np.ndarray:
+        """(3,) middle between both hips, from the root's origin."""
+        return np.asarray((self.legs["left"].hip_m + self.legs["right"].hip_m) / 2)
+
+    @property
+    def length_scale(self) -> float:
+        """Lambda: leg length over NAO's."""
+        return self.leg_length_m / NAO_LEG_M
+
+    @property
+    def mass_scale(self) -> float:
+        """Mu: mass over NAO's."""
+        return self.full.mass_kg / NAO_MASS_KG
+
+    @property
+    def time_scale(self) -> float:
+        """Of times, and of velocities: equal Froude numbers."""
+        return math.sqrt(self.length_scale)
+
+    @property
+    def torque_scale(self) -> float:
+        """Of torques."""
+        return self.length_scale * self.mass_scale
+
+    @property
+    def heat_W_per_Nm2(self) -> float:
+        """K: what the robot's file says, else NAO's by the scale of power over squared torque."""
+        if self.full.heat_loss_W_per_Nm2 is not None:
+            return self.full.heat_loss_W_per_Nm2
+        power_scale = self.mass_scale * self.time_scale  # weight times velocity
+        return NAO_HEAT_W_PER_NM2 * power_scale / self.torque_scale**2
+
+    @property
+    def heat_source(self) -> str:
+        """Where K comes from, in words."""
+        if self.full.heat_loss_W_per_Nm2 is not None:
+            return "of the robot's file"
+        return "NAO's, scaled by power over squared torque: no URDF has it"
+
+
+def biped_of(robot: Robot) -> Biped:
+    """A robot as a biped.
+
+    Raises:
+        InputError: its legs are not two of six turning joints that mirror each other, or a held joint is unknown.
+    """
+    feet = [robot.feet[side].link for side in SIDES]
+    paths = [robot.path_to_root(foot) for foot in feet]
+    shared = {joint.name for joint in paths[0]} & {joint.name for joint in paths[1]}
+    own = [[joint for joint in path if joint.name not in shared] for path in paths]
+    for side, path in zip(SIDES, own, strict=True):
+        if len(path) != LEG_JOINT_COUNT:
+            raise InputError(
+                f"robot {robot.name!r}: the {side} leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to "
+                f"the foot, it has {len(path)}: {', '.join(joint.name for joint in reversed(path)) or 'none'}"
+            )
+    moving = {joint.name for path in own for joint in path}
+    held = {name: _held(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving}
+    for name in robot.posture_rad:
+        if name not in held:
+            raise InputError(
+                f"robot {robot.name!r}: posture_rad names {name!r}, which is "
+                f"{'a joint of a leg' if name in moving else 'no joint'}"
+            )
+    turned = [name for name in shared if held[name]]
+    if turned:
+        raise InputError(f"robot {robot.name!r}: posture_rad must leave joint {turned[0]!r} above both legs at zero")
+    full = posed(robot, held)
+    model = weld(full, list(held))
+    legs = {side: leg_of(model, side) for side in SIDES}
+    _check_alike(robot.name, legs)
+    return Biped(full=full, model=model, legs=legs, posture_rad=held)
+
+
+def _held(joint: Joint, posture: Mapping[str, float]) -> float:
+    """Angle of a held joint: as stated, else zero or the nearest limit."""
+    low, high = joint.limits_rad
+    angle = posture.get(joint.name)
+    if angle is None:
+        return min(max(0.0, low), high)
+    if not low <= angle <= high:
+        raise InputError(f"posture_rad of {joint.name!r} must be within [{low:g}, {high:g}] rad, got {angle:g}")
+    return angle
+
+
+def _check_alike(name: str, legs: Mapping[str, Leg]) -> None:
+    left, right = (legs[side] for side in SIDES)
+    image = np.array([1.0, -1.0, 1.0])
+    for mine, other, joint in zip(left.points, right.points, left.joints, strict=True):
+        if math.dist(image * mine, other) > ALIKE_M:
+            raise InputError(
+                f"robot {name!r}: legs must be mirror images to {1e3 * ALIKE_M:g} mm, joint {joint!r} is at {mine.tolist()}, its "
+                f"image at {other.tolist()}"
+            )

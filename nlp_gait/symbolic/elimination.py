@@ -1,0 +1,132 @@
+"""Linear equations of a few unknowns as expressions: elimination whose pivots are chosen once, from numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+Array = np.ndarray[Any, Any]
+
+# A pivot at least this share of the largest one left may be taken for its sparsity.
+THRESHOLD = 0.2
+# Matrices whose own orders are tried, and the share of the best least pivot with which less work decides.
+CANDIDATES, NEARLY_BEST = 60, 0.8
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Factors:
+    """A matrix taken apart: rows and columns in the order of elimination.
+
+    Attributes:
+        order: (row, column) of each pivot.
+        factors: (n, n) multipliers below the pivots and what is left above them, in the matrix's own places.
+        inverses: of the pivots.
+    """
+
+    order: tuple[tuple[int, int], ...]
+    factors: Sequence[Sequence[SX]]
+    inverses: Sequence[SX]
+
+    def solve(self, right: SX) -> SX:
+        """Solution (n,) for a right-hand side (n,)."""
+        b = ca.vertsplit(right)
+        for k, (row, column) in enumerate(self.order):
+            for below, _ in self.order[k + 1 :]:
+                b[below] = b[below] - self.factors[below][column] * b[row]
+        x = [SX(0)] * len(b)
+        for k in reversed(range(len(self.order))):
+            row, column = self.order[k]
+            known = sum((self.factors[row][later] * x[later] for _, later in self.order[k + 1 :]), SX(0))
+            x[column] = (b[row] - known) * self.inverses[k]
+        return ca.vertcat(*x)
+
+
+def sound_order(matrices: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
+    """Order of elimination whose pivots stay away from zero for all of some matrices of numbers, with little work.
+
+    Args:
+        matrices: (N, n, n) of what is to be solved.
+        pattern: (n, n) whether an entry is ever not zero.
+    """
+    orders = {_order_for(matrix, pattern) for matrix in matrices[:: max(1, len(matrices) // CANDIDATES)]}
+    least = {order: _least_pivot(matrices, order) for order in orders}
+    best = max(least.values())
+    return min(
+        (order for order in orders if least[order] >= NEARLY_BEST * best),
+        key=lambda order: (_work(pattern, order), -least[order], order),
+    )
+
+
+def _order_for(matrix: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
+    """Order that is sound for one matrix."""
+    left, filled = matrix.copy(), pattern.copy()
+    rows, columns = list(range(len(matrix))), list(range(len(matrix)))
+    order: list[tuple[int, int]] = []
+    while rows:
+        block = np.abs(left[np.ix_(rows, columns)])
+        used = filled[np.ix_(rows, columns)]
+        able = np.argwhere((block >= THRESHOLD * block.max()) & used)
+        work = [(used[:, c].sum() - 1) * (used[r].sum() - 1) for r, c in able]
+        best = min(range(len(able)), key=lambda k: (work[k], -block[tuple(able[k])]))
+        row, column = rows[able[best][0]], columns[able[best][1]]
+        rows.remove(row)
+        columns.remove(column)
+        order.append((row, column))
+        for below in rows:
+            left[below, columns] -= left[below, column] / left[row, column] * left[row, columns]
+            if filled[below, column]:
+                filled[below, columns] |= filled[row, columns]
+    return tuple(order)
+
+
+def _least_pivot(matrices: Array, order: Sequence[tuple[int, int]]) -> float:
+    """Smallest pivot over all matrices."""
+    left, least = matrices.copy(), np.inf
+    rows = [row for row, _ in order]
+    for k, (row, column) in enumerate(order):
+        pivot = left[:, row, column]
+        least = min(least, float(np.abs(pivot).min()))
+        if least == 0.0:
+            return 0.0
+        for below in rows[k + 1 :]:
+            left[:, below] -= (left[:, below, column] / pivot)[:, None] * left[:, row]
+    return least
+
+
+def _work(pattern: Array, order: Sequence[tuple[int, int]]) -> int:
+    """Multiplications of the elimination."""
+    filled, work = pattern.copy(), 0
+    for k, (row, column) in enumerate(order):
+        later = [c for _, c in order[k + 1 :]]
+        for below, _ in order[k + 1 :]:
+            if filled[below, column]:
+                work += 1 + int(filled[row, later].sum())
+                filled[below, later] |= filled[row, later]
+    return work
+
+
+def factorised(matrix: SX, order: Sequence[tuple[int, int]], least_pivot: float) -> Factors:
+    """A matrix (n, n) taken apart in a given order, finite for every matrix.
+
+    Args:
+        matrix: expressions; zeros among them cost nothing.
+        order: see ``sound_order``.
+        least_pivot: a pivot nearer to zero is taken as this far from it.
+    """
+    n = len(order)
+    entries = [[matrix[i, j] for j in range(n)] for i in range(n)]
+    inverses = []
+    for k, (row, column) in enumerate(order):
+        pivot = entries[row][column]
+        sign = 2 * (pivot >= 0) - 1
+        inverses.append(sign / ca.fmax(ca.fabs(pivot), least_pivot))
+        for below, _ in order[k + 1 :]:
+            entries[below][column] = entries[below][column] * inverses[k]
+            for _, later in order[k + 1 :]:
+                entries[below][later] = entries[below][later] - entries[below][column] * entries[row][later]
+    return Factors(order=tuple(order), factors=entries, inverses=inverses)

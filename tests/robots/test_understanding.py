@@ -1,0 +1,189 @@
+"""What is found in a URDF by itself: feet, soles, forward, sides; what is passed over with a warning; what is asked for."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import GaitError, InputError, RobotDataError
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.mirror import partner, partners
+from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
+
+pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+
+HAND_KG = 0.1
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return load_robot(crooked(tmp_path_factory.mktemp("crooked")))
+
+
+def beside(path: str, **record: object) -> str:
+    """Write the robot file beside a URDF."""
+    own = {"schema": 1, "extends": Path(path).name, **record}
+    Path(path).with_suffix(".json").write_text(json.dumps(own), encoding="utf-8")
+    return path
+
+
+def test_feet_soles_and_sides_are_found_by_geometry(robot: Robot) -> None:
+    left, right = robot.feet["left"], robot.feet["right"]
+    assert (left.link, right.link) == ("A_ankle_roll_link", "B_ankle_roll_link")
+    half = SOLE_M[0] / 2
+    for foot in (left, right):
+        assert foot.ankle_height_m == ANKLE_M
+        assert (foot.front_m, foot.back_m) == pytest.approx((half + SOLE_AHEAD_M, half - SOLE_AHEAD_M))
+    assert (left.left_m, left.right_m) == (right.right_m, right.left_m) == pytest.approx((0.048, 0.042))
+
+
+def test_a_biped_is_its_legs_and_one_body_in_a_posture(robot: Robot) -> None:
+    """Arms are held at the nearest limit, 0.2 rad; the finger without mass and the hand with a bad tensor are part of them."""
+    biped = biped_of(robot)
+    assert biped.joints == tuple(f"{prefix}_{name}" for prefix in "AB" for name in LEG)
+    assert biped.posture_rad == {"A_shoulder": 0.2, "B_shoulder": 0.2}
+    assert len(biped.model.links) == 13
+    assert biped.model.mass_kg == pytest.approx(TORSO_KG + 2 * (ARM_KG + HAND_KG + sum(MASSES)))
+    arm = np.array([0.0, 0.2, 0.3]) + np.array([-np.sin(0.2), 0.0, -np.cos(0.2)]) * (0.15 * ARM_KG + 0.3 * HAND_KG) / (
+        ARM_KG + HAND_KG
+    )
+    base = biped.model.links["base"]
+    expected = (TORSO_KG * 0.15 + 2 * (ARM_KG + HAND_KG) * arm[2]) / base.mass_kg
+    assert base.com_m[2] == pytest.approx(expected)
+    assert base.com_m[0] == pytest.approx(2 * (ARM_KG + HAND_KG) * arm[0] / base.mass_kg)
+
+
+def test_what_was_passed_over_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    text = crooked_urdf().replace('<joint name="A_knee"', '<joint dont_collapse="true" name="A_knee"')
+    with caplog.at_level(logging.WARNING, logger="nlp_gait"):
+        found = load_robot(crooked(tmp_path, text))
+    assert "dont_collapse" in caplog.text
+    assert any("'A_finger' is one with 'A_arm'" in note for note in found.notes)
+    assert any("'B_hand' is one with 'B_arm'" in note for note in found.notes)
+
+
+def test_images_are_found_where_names_mislead(robot: Robot) -> None:
+    images = partners(robot)
+    assert images["A_knee"] == "B_knee" and images["B_shoulder"] == "A_shoulder"
+    assert partner("A_knee") == "A_knee"
+    nao = load_robot("nao-v6")
+    assert partners(nao) == {name: partner(name) for name in nao.joints}
+
+
+@pytest.mark.parametrize("turn", [90, 180, 270])
+def test_a_root_that_looks_elsewhere_is_turned(tmp_path: Path, robot: Robot, turn: int) -> None:
+    """A base above the torso, on which it stands turned about z: the same robot comes out."""
+    angle = float(np.radians(turn))
+    text = crooked_urdf().replace(
+        "</robot>",
+        f'<link name="odd"/><joint name="on" type="fixed"><origin rpy="0 0 {angle!r}"/><parent link="odd"/>'
+        '<child link="base"/></joint></robot>',
+    )
+    found = load_robot(crooked(tmp_path, text))
+    assert found.feet == robot.feet
+    for name, joint in robot.joints.items():
+        np.testing.assert_allclose(found.joints[name].origin_m, joint.origin_m, atol=1e-12)
+        np.testing.assert_allclose(found.joints[name].axis, joint.axis, atol=1e-12)
+    for name in set(robot.links) - {"base"}:
+        np.testing.assert_allclose(found.links[name].inertia_matrix, robot.links[name].inertia_matrix, atol=1e-12)
+
+
+def test_the_file_beside_says_what_it_knows_better(tmp_path: Path) -> None:
+    path = beside(
+        crooked(tmp_path),
+        feet={"left": {"link": "A_ankle_roll_link", "front_m": 0.2}, "right": {"link": "B_ankle_roll_link"}},
+        posture_rad={"A_shoulder": 1.0},
+        heat_loss_W_per_Nm2=0.001,
+    )
+    biped = biped_of(load_robot(path))
+    assert biped.model.feet["left"].front_m == 0.2 and biped.model.feet["right"].front_m == pytest.approx(0.105)
+    assert biped.posture_rad == {"A_shoulder": 1.0, "B_shoulder": 0.2}
+    assert biped.heat_W_per_Nm2 == 0.001 and biped.heat_source == "of the robot's file"
+
+
+def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> None:
+    text = crooked_urdf().replace("<box size", '<mesh filename="package://feet/sole.stl" size')
+    path = crooked(tmp_path, text)
+    with pytest.raises(
+        RobotDataError, match=r"mesh 'package://feet/sole\.stl', which is not there; put it there, name its"
+    ):
+        load_robot(path)
+    corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (0.0, 0.01)]
+    folder = tmp_path / "feet"
+    folder.mkdir()
+    (folder / "sole.stl").write_text("\n".join(f"vertex {x} {y} {z}" for x, y, z in corners))
+    foot = load_robot(path).feet["left"]
+    assert foot.front_m + foot.back_m == pytest.approx(0.2)
+    (folder / "sole.stl").unlink()
+    extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
+    feet = {side: {"link": f"{letter}_ankle_roll_link", **extents} for side, letter in (("left", "A"), ("right", "B"))}
+    assert load_robot(beside(path, feet=feet)).feet["right"].back_m == 0.05
+
+
+def change(old: str, new: str) -> Callable[[str], str]:
+    def changed(text: str) -> str:
+        assert old in text
+        return text.replace(old, new)
+
+    return changed
+
+
+ASKED = [
+    (change("<collision>", "<visual>"), r"not a URDF|is not valid XML"),
+    (
+        lambda text: crooked_urdf(sole=False),
+        r"'A_ankle_roll_link' has no collision shape .* write its sole into the JSON",
+    ),
+    (change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'), r"no flat sole; write its sole"),
+    (change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'), r"knees .* do not agree on which way is forward"),
+    (change('<joint name="A_knee" type="revolute">', '<joint name="A_knee" type="fixed">'), r"no feet found"),
+    (
+        change('<mass value="1.1"/>', '<mass value="0"/>'),
+        r"mass_kg must be > 0, got 0\.0\. It moves in every gait.*\"unphysical\": \"repair\"",
+    ),
+]
+
+
+@pytest.mark.parametrize(("damage", "message"), ASKED, ids=[message[:30] for _, message in ASKED])
+def test_what_cannot_be_known_is_asked_for(tmp_path: Path, damage: Callable[[str], str], message: str) -> None:
+    with pytest.raises(RobotDataError, match=message):
+        load_robot(crooked(tmp_path, damage(crooked_urdf())))
+
+
+def test_what_matters_is_repaired_where_that_is_asked_for(tmp_path: Path) -> None:
+    text = crooked_urdf().replace('<mass value="1.1"/>', '<mass value="0"/>')
+    robot = load_robot(beside(crooked(tmp_path, text), unphysical="repair"))
+    assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
+    assert sum("repaired as asked" in note for note in robot.notes) == 2
+
+
+def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
+    feet = {"left": {"link": "B_ankle_roll_link"}, "right": {"link": "A_ankle_roll_link"}}
+    with pytest.raises(RobotDataError, match=r"named the left foot, but it is on the right"):
+        load_robot(beside(crooked(tmp_path), feet=feet))
+
+
+@pytest.mark.parametrize(
+    ("posture", "message"),
+    [
+        ({"A_shoulder": 3.0}, r"posture_rad of 'A_shoulder' must be within \[0\.2, 2\] rad, got 3"),
+        ({"A_knee": 0.1}, r"names 'A_knee', which is a joint of a leg"),
+        ({"tail": 0.1}, r"names 'tail', which is no joint"),
+    ],
+)
+def test_a_posture_that_cannot_be_is_refused(tmp_path: Path, posture: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        biped_of(load_robot(beside(crooked(tmp_path), posture_rad=posture)))
+
+
+def test_five_joints_are_no_leg(tmp_path: Path) -> None:
+    extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
+    feet = {side: {"link": f"{x}_ankle_pitch_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
+    with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* it has 5"):
+        biped_of(load_robot(beside(crooked(tmp_path), feet=feet)))

@@ -1,0 +1,155 @@
+"""A leg of any six turning joints: its foot is where it should be, its rates are right, and NAO's is the closed form's."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import DM, SX
+from scipy.spatial.transform import Rotation
+
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array
+from nlp_gait.problems.humanoid.newton import newton_steps
+from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.leg import Leg
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion
+from nlp_gait.symbolic.inverse_kinematics import leg_angles
+from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics
+from nlp_gait.symbolic.leg_poses import flat_foot_poses
+from nlp_gait.symbolic.nonsmooth import Exact
+from nlp_gait.symbolic.trajectories import Motion
+from tests.robots.crooked import crooked
+
+POSES = 50
+# Legs of half a metre: rounding of some twenty rotations, and what Newton's last step leaves.
+PLACE_TOLERANCE = 1e-13
+# Central differences with a step of 1e-4 s: truncation 1e-8 on accelerations of some rad/s^2.
+STEP_S, DIFFERENCE_TOLERANCE = 1e-4, 1e-5
+
+
+@cache
+def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
+    """From the hips' middle over the foot's origin with both derivatives, and roll and pitch likewise, to the leg's motion."""
+    leg = biped_of(robot).legs[side]
+    place = Motion(*(SX.sym(name, 3) for name in ("p", "v", "a")))
+    roll, pitch = (Motion(*(SX.sym(f"{angle}{k}") for k in range(3))) for angle in ("roll", "pitch"))
+    turn = axis_rotation((0, 1, 0), pitch.position)
+    rotation = turn @ axis_rotation((1, 0, 0), roll.position)
+    about, y = turn @ DM([1, 0, 0]), SX(DM([0, 1, 0]))
+    spin = y * pitch.velocity + about * roll.velocity
+    rate = y * pitch.acceleration + about * roll.acceleration + ca.cross(y, about) * pitch.velocity * roll.velocity
+    torso = TorsoMotion(rotation, spin, rate, np.zeros(3), place)
+    found = leg_motion(leg, newton_steps(leg), torso, SX(0.01), Exact(), held=True)
+    return leg, ca.Function("leg", [*place, *roll, *pitch], [*found.joints, found.miss, found.reach])
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Robot]:
+    pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+    return {
+        "nao": load_robot("nao-v5"),
+        "crooked": load_robot(crooked(tmp_path_factory.mktemp("crooked"))),
+    }
+
+
+def pose(leg: Leg, k: int) -> tuple[Array, float, float]:
+    """Place of the torso's origin over the foot's [m], roll and pitch, of one of the poses."""
+    column = flat_foot_poses(leg, POSES)[:, k]
+    rotation = column[3:].reshape(3, 3).T
+    pitch, roll = float(np.arctan2(-rotation[2, 0], rotation[0, 0])), float(np.arctan2(-rotation[1, 2], rotation[1, 1]))
+    return column[:3] - rotation @ leg.hip_m, roll, pitch
+
+
+@pytest.mark.parametrize("name", ["nao", "crooked"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_foot_is_flat_and_where_it_is_asked_for(robots: dict[str, Robot], name: str, side: str) -> None:
+    """By forward kinematics of the whole robot, from the torso down."""
+    robot = robots[name]
+    leg, solve = leg_function(robot, side)
+    model = biped_of(robot).model
+    q, tree = SX.sym("q", 6), tree_from(model, model.root)
+    angles = {joint: SX(0) for joint in model.joints} | {joint: q[i] for i, joint in enumerate(leg.joints)}
+    found = forward_kinematics(tree, angles, SX.zeros(3))[[b.link.name for b in tree].index(model.feet[side].link)]
+    ahead = ca.Function("ahead", [q], [found.rotation, found.position])
+    for k in range(POSES):
+        place, roll, pitch = pose(leg, k)
+        solved = solve(place, np.zeros(3), np.zeros(3), roll, 0, 0, pitch, 0, 0)
+        rotation, position = (np.array(part) for part in ahead(solved[0]))
+        torso = Rotation.from_euler("YX", (pitch, roll)).as_matrix()
+        np.testing.assert_allclose(torso @ rotation, np.eye(3), rtol=0, atol=PLACE_TOLERANCE)
+        np.testing.assert_allclose(place + torso @ position.ravel(), 0.0, rtol=0, atol=PLACE_TOLERANCE)
+        assert float(solved[3]) < PLACE_TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["nao", "crooked"])
+def test_rates_are_the_derivatives_of_the_angles(robots: dict[str, Robot], name: str) -> None:
+    leg, solve = leg_function(robots[name], "left")
+    rng = np.random.default_rng(0)
+    for k in range(3):
+        place, roll, pitch = pose(leg, k)
+        v, a = 0.2 * rng.standard_normal(3), rng.standard_normal(3)
+        (dr, ddr), (dp, ddp) = 0.3 * rng.standard_normal((2, 2))
+
+        def at(t: float) -> list[Array]:
+            h = t * t / 2
+            turned = (roll + dr * t + ddr * h, dr + ddr * t, ddr, pitch + dp * t + ddp * h, dp + ddp * t, ddp)  # noqa: B023
+            found = solve(place + v * t + a * h, v + a * t, a, *turned)  # noqa: B023
+            return [np.array(part).ravel() for part in found]
+
+        before, now, after = at(-STEP_S), at(0.0), at(STEP_S)
+        for order in (0, 1):
+            slope = (after[order] - before[order]) / (2 * STEP_S)
+            np.testing.assert_allclose(now[order + 1], slope, rtol=DIFFERENCE_TOLERANCE, atol=DIFFERENCE_TOLERANCE)
+
+
+def test_naos_leg_is_the_closed_forms() -> None:
+    """To 5e-15 rad in angles; accelerations to the rounding of a system of six equations."""
+    robot = load_robot("nao-v5")
+    leg, solve = leg_function(robot, "left")
+    geometry = leg_geometry(robot, "L")
+    motion = Motion(*(SX.sym(name, 3) for name in ("p", "v", "a")))
+    closed = leg_angles(motion, geometry.thigh_m, geometry.tibia_m, SX(0.01), Exact())
+    form = ca.Function("form", list(motion), list(closed.joints))
+    rng = np.random.default_rng(1)
+    for k in range(POSES):
+        place, _, _ = pose(leg, k)
+        v, a = 0.1 * rng.standard_normal((2, 3))
+        general = solve(place, v, a, *[0.0] * 6)
+        expected = form(-place - np.array(geometry.hip_m), -v, -a)
+        if not float(general[4]) < 0.99:  # lean and hip offset have moved this pose out of reach
+            continue
+        for order, tolerance in ((0, 5e-15), (1, 1e-12), (2, 5e-12)):
+            found = np.array(general[order]).ravel()
+            assert found[0] == pytest.approx(0.0, abs=tolerance)  # the yaw-pitch joint
+            np.testing.assert_allclose(found[1:], np.array(expected[order]).ravel(), rtol=0, atol=tolerance)
+    assert leg.joints[1:] == tuple(f"L{name}" for name in LEG_JOINTS)
+
+
+def test_nothing_is_ever_nan_and_a_leg_out_of_reach_stands_still(robots: dict[str, Robot]) -> None:
+    leg, solve = leg_function(robots["crooked"], "left")
+    rng = np.random.default_rng(2)
+    for size in (0.0, 1e-3, 1.0, 10.0, 1e3):
+        for _ in range(10):
+            values = size * rng.standard_normal(15)
+            found = solve(values[:3], values[3:6], values[6:9], *values[9:15])
+            assert all(np.isfinite(np.array(part)).all() for part in found)
+    far = solve([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], *[0.0] * 6)
+    assert float(far[3]) > 0.1 * leg.length_m and float(far[4]) > 1.0
+    assert not np.array(far[1]).any() and not np.array(far[2]).any()
+
+
+def test_what_is_no_leg_is_refused(robots: dict[str, Robot]) -> None:
+    leg = biped_of(robots["crooked"]).legs["left"]
+    parallel = leg.axes.copy()
+    parallel[5] = parallel[4]
+    flat = leg.axes.copy()
+    flat[2] = flat[0]
+    for axes, message in ((parallel, "last two must not be parallel"), (flat, "must not lie in one plane")):
+        with pytest.raises(InputError, match=message):
+            Leg(joints=leg.joints, axes=axes, points=leg.points, foot_m=leg.foot_m, limits_rad=leg.limits_rad)
