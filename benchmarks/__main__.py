@@ -11,7 +11,7 @@ import platform
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import ipopt, kernel, process, search
+from benchmarks import derivatives, ipopt, kernel, process, search
 from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
@@ -32,6 +32,8 @@ def main() -> None:
         lambda: kernel.torques(rounds),
         lambda: kernel.growth(rounds),
         lambda: search.swarms(max(3, rounds // 5)),
+        lambda: derivatives.iteration(rounds),
+        lambda: [] if arguments.quick else derivatives.long_starts(),
         lambda: ipopt.compiled_derivatives(starts),
         lambda: ipopt.formulations(starts),
         lambda: process.starts(rounds),

@@ -41,16 +41,18 @@ class Row:
         return self.value <= self.required if self.at_most else self.value >= self.required
 
 
-def side_by_side(functions: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, Array]:
-    """Wall times [s] of functions that take turns, (rounds,) each, after one call to warm up."""
+def side_by_side(
+    functions: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, Array]:
+    """Times [s] by a clock of functions that take turns, (rounds,) each, after one call to warm up."""
     for function in functions.values():
         function()
     times: dict[str, list[float]] = {name: [] for name in functions}
     for _ in range(rounds):
         for name, function in functions.items():
-            started = time.perf_counter()
+            started = clock()
             function()
-            times[name].append(time.perf_counter() - started)
+            times[name].append(clock() - started)
     return {name: np.array(values) for name, values in times.items()}
 
 

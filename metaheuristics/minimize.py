@@ -16,7 +16,9 @@ from metaheuristics.interface import Algorithm, BatchObjective
 from metaheuristics.preparation import (
     check_helpers,
     check_limits,
+    check_search,
     checked_points,
+    checked_reasons,
     checked_seed,
     entropy,
     prepared,
@@ -71,6 +73,8 @@ def minimize(
     sequence = checked_seed(seed)
     start = prepared(objective, algorithm.population, evaluations, sequence, initial)
     search = algorithm.start(start)
+    if not isinstance(search, FunctionSearch):
+        check_search(search, algorithm)
     evaluate = Evaluator(objective, observe, thinned=isinstance(search, FunctionSearch))  # which calls point by point
     initial_violation: Array | None = None
 
@@ -120,7 +124,7 @@ def minimize(
             reasons = limits_reached()
             if not reasons:
                 search.tell(X, f, violation, rule)
-                reasons = list(search.stop())
+                reasons = checked_reasons(search.stop())
             if reasons:
                 return result(reasons)
     except KeyboardInterrupt as interrupt:

@@ -10,6 +10,7 @@ from typing import Any
 from metaheuristics.adapters.function import ARGUMENTS, PlainFunction, takes_function_arguments
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm
+from metaheuristics.preparation import check_population
 
 
 def as_algorithm(own: Any, name: str, settings: Mapping[str, Any] | None = None) -> Algorithm:
@@ -55,8 +56,6 @@ def checked_algorithm(made: Any, name: str) -> Algorithm:
             f"{name!r} must be an algorithm with `population` and `start`, or a plain function of ({', '.join(ARGUMENTS)}); "
             f"got {type(made).__name__}"
         )
-    population = getattr(made, "population", None)
-    if isinstance(population, bool) or not isinstance(population, int) or population < 1:
-        raise SearchError(f"algorithm {name!r}: population must be a whole number >= 1, got {population!r}")
+    check_population(made, name)
     algorithm: Algorithm = made
     return algorithm

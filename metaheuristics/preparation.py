@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from metaheuristics.array import Array, real_array
-from metaheuristics.errors import SearchError
+from metaheuristics.errors import SearchError, shown
 from metaheuristics.interface import Algorithm, Bounded, Start
 
-LONGEST_VALUE = 80  # characters of a value in a message
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 
 
@@ -47,8 +46,11 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
         SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
     """
     if not callable(objective) or not all(hasattr(objective, part) for part in ("names", "lower", "upper")):
-        raise SearchError(f"objective must be a function of X with names, lower and upper, got {_shown(objective)}")
-    names = tuple(objective.names)
+        raise SearchError(f"objective must be a function of X with names, lower and upper, got {shown(objective)}")
+    try:
+        names = tuple(objective.names)
+    except TypeError:
+        raise SearchError(f"names must be one for each variable, got {shown(objective.names)}") from None
     try:
         lower, upper = np.array(real_array(objective.lower)), np.array(real_array(objective.upper))
     except (TypeError, ValueError) as error:
@@ -91,28 +93,54 @@ def check_limits(
     if isinstance(algorithm, type) or not (
         hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
     ):
-        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {_shown(algorithm)}")
+        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {shown(algorithm)}")
+    check_population(algorithm)
     if not _whole(evaluations) or evaluations < algorithm.population:
         raise SearchError(
             f"evaluations must be a whole number >= the population of {called(algorithm)!r}, {algorithm.population}, got "
-            f"{evaluations!r}: raise the budget or take a smaller population"
+            f"{shown(evaluations)}: raise the budget or take a smaller population"
         )
     if target is not None and (not _number(target) or math.isnan(target)):
-        raise SearchError(f"target must be a number or None, got {_shown(target)}")
+        raise SearchError(f"target must be a number or None, got {shown(target)}")
     if stagnation is not None and (not _whole(stagnation) or stagnation < 1):
         raise SearchError(
-            f"stagnation must be a whole number of generations >= 1, or None for never, got {stagnation!r}"
+            f"stagnation must be a whole number of generations >= 1, or None for never, got {shown(stagnation)}"
         )
     if time_limit_s is not None and not (_number(time_limit_s) and time_limit_s > 0.0):
-        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {_shown(time_limit_s)}")
+        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {shown(time_limit_s)}")
+
+
+def check_population(algorithm: Algorithm, name: str = "") -> None:
+    """Raise SearchError unless an algorithm has at least one point."""
+    population = getattr(algorithm, "population", None)
+    if not isinstance(population, Integral) or isinstance(population, bool) or population < 1:
+        raise SearchError(
+            f"algorithm {name or called(algorithm)!r}: population must be a whole number >= 1, got {shown(population)}"
+        )
+
+
+def check_search(search: object, algorithm: Algorithm) -> None:
+    """Raise SearchError unless what an algorithm has started can be asked and told."""
+    missing = [part for part in ("ask", "tell", "stop") if not callable(getattr(search, part, None))]
+    if missing:
+        raise SearchError(
+            f"algorithm {called(algorithm)!r}: start must return a search with {', '.join(missing)}, got {shown(search)}"
+        )
+
+
+def checked_reasons(reasons: object) -> list[str]:
+    """Why a search stops; SearchError unless these are texts."""
+    if not isinstance(reasons, (list, tuple)) or not all(isinstance(reason, str) for reason in reasons):
+        raise SearchError(f"stop must return a list of reasons as texts, empty to go on, got {shown(reasons)}")
+    return list(reasons)
 
 
 def check_helpers(handling: object, observe: object) -> None:
     """Raise SearchError unless these are a constraint handling and, if there is one, a function."""
     if isinstance(handling, type) or not callable(getattr(handling, "rule", None)):
-        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {_shown(handling)}")
+        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {shown(handling)}")
     if observe is not None and not callable(observe):
-        raise SearchError(f"observe must be a function of X, f and violation, got {_shown(observe)}")
+        raise SearchError(f"observe must be a function of X, f and violation, got {shown(observe)}")
 
 
 def _whole(value: object) -> bool:
@@ -121,11 +149,6 @@ def _whole(value: object) -> bool:
 
 def _number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
 
 
 def called(algorithm: Algorithm) -> str:
@@ -173,7 +196,7 @@ def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
     if isinstance(seed, np.random.SeedSequence):
         return seed
     if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
-        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {seed!r}")
+        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {shown(seed)}")
     return np.random.SeedSequence(int(seed))
 
 
@@ -213,7 +236,7 @@ def starting_points(
         try:
             rows = np.array(real_array(given))
         except (TypeError, ValueError, OverflowError) as error:
-            raise SearchError(f"initial must be rows of numbers, got {_shown(given)}: {error}") from error
+            raise SearchError(f"initial must be rows of numbers, got {shown(given)}: {error}") from error
         if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
             raise SearchError(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "

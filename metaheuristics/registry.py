@@ -18,7 +18,7 @@ from metaheuristics.algorithms.genetic import GeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
-from metaheuristics.errors import SearchError
+from metaheuristics.errors import SearchError, shown
 from metaheuristics.interface import Algorithm
 from metaheuristics.settings import check_installed
 
@@ -76,7 +76,7 @@ def handling(name: str, /, **settings: object) -> ConstraintHandling:
 
 def _made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
     if not isinstance(name, str):
-        raise SearchError(f"the name of a {kind} must be a text, got {name!r}")
+        raise SearchError(f"the name of a {kind} must be a text, got {shown(name)}")
     if name not in factories:
         raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
     factory = factories[name]

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from nlp_gait.errors import GaitError, unknown
+from nlp_gait.errors import GaitError, shown, unknown
 from nlp_gait.files import read_json, refusing
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ def decoded(
         ValueError: with the place: a key is missing or unknown, or a value has another type.
     """
     if not isinstance(raw, Mapping):
-        raise ValueError(f"{where or 'it'} must be an object, got {_shown(raw)}")
+        raise ValueError(f"{where or 'it'} must be an object, got {shown(raw)}")
     values = dict(given or {})
     known = {name: field for name, field in _fields(cls).items() if name not in values}
     for name, (kind, needed) in known.items():
@@ -94,14 +94,14 @@ def decoded_value(kind: Any, raw: Any, where: str) -> Any:
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Literal:
         if not any(raw == part and type(raw) is type(part) for part in parts):
-            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {_shown(raw)}")
+            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {shown(raw)}")
         return raw
     if origin is tuple:
         return _tuple(parts, raw, where)
     if origin in (Union, UnionType):
         return _of_union(parts, raw, where)
     if not isinstance(raw, Mapping):
-        raise ValueError(f"{where} must be an object, got {_shown(raw)}")
+        raise ValueError(f"{where} must be an object, got {shown(raw)}")
     keys, values = parts
     return {
         decoded_value(keys, key, f"a key of {where}"): decoded_value(values, value, f"{where}.{key}")
@@ -114,7 +114,7 @@ def _tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
     any_length = parts[-1] is ...
     if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
         count = "" if any_length else f" of {len(parts)} values"
-        raise ValueError(f"{where} must be a list{count}, got {_shown(raw)}")
+        raise ValueError(f"{where} must be a list{count}, got {shown(raw)}")
     kinds = parts[:1] * len(raw) if any_length else parts
     return tuple(
         decoded_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
@@ -126,7 +126,7 @@ def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
         return raw
     others = [part for part in parts if part is not NoneType]
     if all(part in WORDS for part in parts) and not (float in parts and type(raw) in (int, NoneType)):
-        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {_shown(raw)}")
+        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {shown(raw)}")
     for part in others[:-1]:
         try:
             return decoded_value(part, raw, where)
@@ -137,10 +137,5 @@ def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
 
 def _checked(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:
     if not isinstance(raw, kinds) or (isinstance(raw, bool) and bool not in kinds):
-        raise ValueError(f"{where} must be {wanted}, got {_shown(raw)}")
+        raise ValueError(f"{where} must be {wanted}, got {shown(raw)}")
     return raw
-
-
-def _shown(raw: Any) -> str:
-    text = repr(raw)
-    return text if len(text) <= 60 else f"{text[:60]} ..."

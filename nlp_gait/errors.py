@@ -10,7 +10,10 @@ LONGEST_VALUE = 80  # characters of a value in a message
 
 
 class GaitError(Exception):
-    """Root of every error that this package raises on purpose."""
+    """Root of every error that this package raises on purpose; its message is one line, whatever the values in it are."""
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*(" ".join(part.splitlines()) if isinstance(part, str) else part for part in arguments))
 
 
 class UnknownNameError(GaitError):

@@ -56,7 +56,8 @@ def built_once() -> Iterator[None]:
 
         @wraps(make)
         def shared(**options: Any) -> GaitProblem:
-            if is_robot_file(str(options.get("robot", ""))):
+            robot = options.get("robot", "")
+            if isinstance(robot, str) and is_robot_file(robot):
                 return make(**options)
             registry.check(make, options)  # first, for what is not hashable
             return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))

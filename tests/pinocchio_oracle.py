@@ -10,10 +10,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
+import pytest
 
 from nlp_gait.problem import Array, Signals
 from nlp_gait.robots import Link, Robot
+
+pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
 
 class Standing(NamedTuple):

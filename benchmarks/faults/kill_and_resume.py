@@ -24,7 +24,10 @@ from pathlib import Path
 from typing import Any
 
 SMALL = ("nao-ssp", "--intervals", "2", "--starts", "1")
-FIXED = ("hip_height_m=0.31", "hip_vz_start_m_s=-0.00122", "hip_vz_end_m_s=0.0035", "hip_vx_start_m_s=0.01243")
+FIXED = (
+    *("hip_height_m=0.31", "hip_vz_start_m_s=-0.00122", "hip_vz_end_m_s=0.0035", "hip_vx_start_m_s=0.01243"),
+    *("hip_vx_end_m_s=0.001", "swing_height_m=0.015"),
+)
 WALKS = ("walk12", "--runs", "4", "--evaluations", "3000")
 # {out} is the folder of the case; {gait} a result that was made before.
 CASES: dict[str, tuple[str, ...]] = {
@@ -53,7 +56,22 @@ CASES: dict[str, tuple[str, ...]] = {
     ),
     "walk": ("walk", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2", "--out", "{out}"),
     "pareto": (
-        *("pareto", *SMALL, "--points", "5", "--objectives", "power,speed", "--search", "NSGA2=1000", "--runs", "2"),
+        *(
+            "pareto",
+            "nao-ssp",
+            "--intervals",
+            "4",
+            "--starts",
+            "1",
+            "--points",
+            "5",
+            "--objectives",
+            "power,speed",
+            "--search",
+            "NSGA2=1000",
+            "--runs",
+            "2",
+        ),
         *(f"--fix={fixed}" for fixed in FIXED),
         *("--out", "{out}"),
     ),

@@ -1,9 +1,11 @@
 """Mutation testing: small errors put into the code one at a time; a test that stands for that code must find each.
 
     python -m benchmarks.faults.mutants compare/analysis/statistics --tests tests/compare/analysis
+    python -m benchmarks.faults.mutants --sample 15 [NAME ...]
 
-Works in a copy of the tree. Prints every survivor with its line; exit status 1 if there is one. Some survivors are equivalent
-to the original, which only a reader can tell.
+With ``--sample`` so many mutants are drawn of each module of ``BELONGING``, or of those whose path holds a name, and the tests
+are those that belong to it. Works in a copy of the tree. Prints every survivor with its line; exit status 1 if there is one. Some
+survivors are equivalent to the original, which only a reader can tell.
 """
 
 from __future__ import annotations
@@ -12,16 +14,43 @@ import argparse
 import ast
 import copy
 import os
+import random
+import resource
 import shutil
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-TIME_LIMIT_S = 60.0
+# Of processor time; a mutant that needs more is counted as killed, and the machine's load does not count.
+TIME_LIMIT_S = 60
+# Tests that stand for a module, by its path: those of the formulas and of what came after the first run.
+BELONGING: dict[str, tuple[str, ...]] = {
+    "nlp_gait/symbolic/splines.py": ("tests/symbolic/test_splines.py", "tests/problems/nao/test_curves.py"),
+    "nlp_gait/symbolic/quantised.py": ("tests/symbolic/test_quantised.py", "tests/problems/stairs/test_track.py"),
+    "nlp_gait/problems/stairs/formulas": (
+        "tests/problems/stairs/test_gait.py",
+        "tests/problems/stairs/test_network.py",
+    ),
+    "nlp_gait/problems/stairs/stair.py": ("tests/problems/stairs/test_plan.py", "tests/problems/stairs/test_gait.py"),
+    "nlp_gait/problems/nao/motors.py": ("tests/problems/nao/test_motors.py",),
+    "nlp_gait/problems/nao/cycle_motion.py": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/problems/nao/cycle_rows.py": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/simulation/drive.py": ("tests/simulation/test_drive.py", "tests/simulation/test_playback.py"),
+    "nlp_gait/simulation/measurements.py": ("tests/simulation/test_playback.py", "tests/simulation/test_walking.py"),
+    "nlp_gait/references.py": ("tests/compare/cli/test_own_code.py", "tests/problem/test_own_problems.py"),
+    "nlp_gait/problem/locking.py": ("tests/faults/test_together.py",),
+    "nlp_gait/gaitbench/instance.py": ("tests/gaitbench/test_instances.py",),
+    "nlp_gait/disk.py": ("tests/faults/test_power_cuts.py",),
+    "compare/study/apart.py": ("tests/faults/test_hostile_plugins.py",),
+    "compare/study/imported.py": ("tests/compare/study/test_imported.py",),
+    "compare/study/steps.py": ("tests/compare/study/test_steps.py",),
+    "compare/logs": ("tests/compare/logs/test_logs.py",),
+    "compare/questions/kept.py": ("tests/compare/questions/test_resuming.py",),
+}
 OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,),
     ast.Sub: (ast.Add,),
@@ -101,18 +130,23 @@ def mutants(text: str) -> Iterator[tuple[int, str, str]]:
                     _put(node, name, i, child)
 
 
-def survives(tests: list[str]) -> bool:
+def survives(tests: Sequence[str], marks: str) -> bool:
     """Whether the tests pass in a process of its own, in time."""
     child = os.fork()
     if child == 0:
         os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT_S, TIME_LIMIT_S))
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
-        import pytest
+        status = 1
+        try:
+            import pytest
 
-        os._exit(int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests])))
-    end = time.monotonic() + TIME_LIMIT_S
+            status = int(pytest.main(["-x", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", marks, *tests]))
+        finally:
+            os._exit(status)
+    end = time.monotonic() + 20 * TIME_LIMIT_S  # of one that waits for ever
     while time.monotonic() < end:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
@@ -123,13 +157,47 @@ def survives(tests: list[str]) -> bool:
     return False
 
 
+def tried(
+    module: str, tests: Sequence[str], marks: str, sample: int | None, seed: int, wanted: set[str] | None
+) -> tuple[int, int]:
+    """How many mutants of a file or folder were tried, and how many survived; each of these is printed."""
+    if not survives(tests, marks):
+        raise SystemExit(f"{module}: the tests fail without any mutant")
+    paths = sorted(Path(module).rglob("*.py")) if Path(module).is_dir() else [Path(module)]
+    originals = {path: path.read_text(encoding="utf-8") for path in paths}
+    found = [(path, *mutant) for path in paths for mutant in mutants(originals[path])]
+    if sample is not None and sample < len(found):
+        found = random.Random(f"{module} {seed}").sample(found, sample)
+    if wanted is not None:
+        found = [m for m in found if f"{m[0]}:{m[1]}: {m[2]}" in wanted]
+    survivors = 0
+    for path, line, change, text in found:
+        path.write_text(text, encoding="utf-8")
+        if survives(tests, marks):
+            survivors += 1
+            print(f"{path}:{line}: {change}", flush=True)
+        path.write_text(originals[path], encoding="utf-8")
+    print(f"{module}: {len(found)} mutants, {len(found) - survivors} killed, {survivors} survived", flush=True)
+    return len(found), survivors
+
+
 def main() -> None:
-    """Try all mutants of the modules."""
+    """Try all mutants of the modules, or some."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("modules", nargs="+", help="files or folders, relative to the root of the tree")
-    parser.add_argument("--tests", nargs="+", required=True)
+    parser.add_argument("modules", nargs="*", help="files or folders, relative to the root of the tree")
+    parser.add_argument("--tests", nargs="+")
+    parser.add_argument("--sample", type=int, help="mutants of each module, with the tests that belong to it")
+    parser.add_argument("--seed", type=int, default=0, help="of the sample")
+    parser.add_argument("--fast", action="store_true", help="without the tests that are marked as slow")
     parser.add_argument("--again", type=Path, help="output of an earlier run: try its survivors only")
     arguments = parser.parse_args()
+    if arguments.tests and arguments.modules:
+        chosen = dict.fromkeys(arguments.modules, tuple(arguments.tests))
+    elif arguments.tests:
+        raise SystemExit("--tests needs the modules that they stand for")
+    else:
+        names = arguments.modules or [""]
+        chosen = {module: tests for module, tests in BELONGING.items() if any(name in module for name in names)}
     wanted = set(arguments.again.read_text().splitlines()) if arguments.again else None
     import casadi  # noqa: F401  # once, for all forks
     import pytest  # noqa: F401
@@ -141,27 +209,10 @@ def main() -> None:
         os.chdir(tree)
         sys.dont_write_bytecode = True
         sys.path[:0] = [str(tree)]
-        if not survives(arguments.tests):
-            raise SystemExit("the tests fail without any mutant")
-        total, survivors = 0, 0
-        paths = [
-            p
-            for name in arguments.modules
-            for p in (sorted(Path(name).rglob("*.py")) if Path(name).is_dir() else [Path(name)])
-        ]
-        for path in paths:
-            original = path.read_text(encoding="utf-8")
-            for line, change, text in mutants(original):
-                name = f"{path}:{line}: {change}"
-                if wanted is not None and name not in wanted:
-                    continue
-                path.write_text(text, encoding="utf-8")
-                total += 1
-                if survives(arguments.tests):
-                    survivors += 1
-                    print(name, flush=True)
-            path.write_text(original, encoding="utf-8")
-        print(f"{total} mutants, {total - survivors} killed, {survivors} survived")
+        marks = "not slow" if arguments.fast else ""
+        counts = [tried(m, tests, marks, arguments.sample, arguments.seed, wanted) for m, tests in chosen.items()]
+    total, survivors = (sum(column) for column in zip(*counts, strict=True))
+    print(f"{total} mutants, {total - survivors} killed, {survivors} survived")
     if survivors:
         raise SystemExit(1)
 

@@ -2,7 +2,7 @@
 
 From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
 result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``. To and from other packages: ``import | bench | logs | export-objective``.
+robust``. To and from other packages: ``import | bench | logs | export-objective | export-solver``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -21,6 +21,7 @@ from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.exchange.bench import bench
 from compare.cli.exchange.export_objective import export_objective
+from compare.cli.exchange.export_solver import export_solver
 from compare.cli.exchange.import_results import import_results
 from compare.cli.exchange.logs import logs
 from compare.cli.export import export
@@ -43,7 +44,7 @@ PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, search),
     "Comparison": (compare, import_results, report, reproduce, bench),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
-    "Show and share": (simulate, animate, export, logs, export_objective),
+    "Show and share": (simulate, animate, export, logs, export_objective, export_solver),
 }
 
 app = typer.Typer(
@@ -71,7 +72,12 @@ def options_of_all(
 
 
 # Commands whose names Python has taken, or does not allow.
-NAMES = {list_problems: "list", import_results: "import", export_objective: "export-objective"}
+NAMES = {
+    list_problems: "list",
+    import_results: "import",
+    export_objective: "export-objective",
+    export_solver: "export-solver",
+}
 for panel, functions in PANELS.items():
     for function in functions:
         app.command(NAMES.get(function, function.__name__), rich_help_panel=panel)(function)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,8 +21,10 @@ from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers import ipopt
+from nlp_gait.backends.solvers.derivatives import WORTHWHILE_SOLVES
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.errors import CompilerError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
 
@@ -119,11 +121,15 @@ class _KeptSolver(Solver):
         stop: Callable[[], bool],
         run: Callable[[Solver], Outcome | None],
     ) -> Outcome | None:
-        settings = self._solver.settled(problem, self._solves)
+        settings = self._pinned(problem)
         inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.plain(), **start}
 
         def compute() -> Any:
-            outcome = run(self._solver.ready_for(problem, self._solves))
+            try:
+                ready = settings.ready_for(problem, self._solves)
+            except CompilerError:
+                ready = self._solver.ready_for(problem, self._solves)
+            outcome = run(ready)
             if stop():
                 raise _Interrupted(outcome)
             return None if outcome is None else _plain(outcome)
@@ -133,6 +139,16 @@ class _KeptSolver(Solver):
         except _Interrupted as interrupted:
             return interrupted.outcome
         return None if kept is None else _outcome(kept)
+
+    def _pinned(self, problem: GaitProblem) -> Solver:
+        """The solver with its settings, of which none depends on what the cache of compiled functions holds by now.
+
+        Compiled and interpreted functions differ in the last bits, and a question that goes on must not change between them.
+        """
+        settings = self._solver.settled(problem, self._solves)
+        if isinstance(settings, IpoptSettings) and settings.compiled is None:
+            return replace(settings, compiled=problem.long_derivatives or self._solves >= WORTHWHILE_SOLVES)
+        return settings
 
 
 def _plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, check_name
 from nlp_gait.gaitbench.adapters import check_installed
 from nlp_gait.gaitbench.definitions import Definition, definition_of
 from nlp_gait.gaitbench.known import Evidence, Known, known
@@ -229,7 +229,6 @@ class Instance:
         return np.asarray(self._physical(array))
 
 
-@lru_cache(maxsize=128)
 def load(id: str, *, unit_cube: bool = False) -> Instance:
     """An instance of GaitBench.
 
@@ -240,6 +239,12 @@ def load(id: str, *, unit_cube: bool = False) -> Instance:
     Raises:
         UnknownNameError: no such instance.
     """
+    check_name("instance", id)
+    return _loaded(id, bool(unit_cube))
+
+
+@lru_cache(maxsize=128)
+def _loaded(id: str, unit_cube: bool) -> Instance:
     with _BUILDING:
         return Instance(id, unit_cube=unit_cube)
 

@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError, shown, unknown
 from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
 from nlp_gait.problem.locking import CASADI, one_at_a_time
 from nlp_gait.problem.motion.grid import Grid
@@ -156,7 +156,7 @@ class GaitProblem:
         for name, value in values.items():
             parameter = self._parameter(name)
             if not is_number(value):
-                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {value!r}")
+                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {shown(value)}")
             if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
@@ -177,7 +177,7 @@ class GaitProblem:
             i = self.variable_index(name)
             if not (is_number(value) and self.lower[i] <= value <= self.upper[i]):
                 raise InputError(
-                    f"variable {name!r} cannot be fixed at {value!r}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
+                    f"variable {name!r} cannot be fixed at {shown(value)}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
                     f"{self.variables[i].unit}; widen them with --set {name}.lower=... or --set {name}.upper=..."
                 )
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
@@ -358,7 +358,7 @@ class GaitProblem:
 
     def _parameter(self, name: str) -> Parameter:
         for parameter in self.parameters:
-            if parameter.name == name:
+            if isinstance(name, str) and parameter.name == name:
                 return parameter
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from numbers import Real
 from typing import TypeGuard
 
@@ -30,7 +31,9 @@ def real_numbers(what: str, values: object) -> Array:
     Raises:
         InputError: complex numbers, masked ones, texts, dates, true or false: NumPy would make doubles of them in silence.
     """
-    if np.ma.is_masked(values):
+    if "numpy.ma" in sys.modules and np.ma.is_masked(
+        values
+    ):  # imported here it would cost every process a tenth of its start
         raise InputError(f"{what} must be numbers, got a masked array; fill what is masked, or leave it out")
     try:
         array = np.asarray(values)

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from nlp_gait.errors import InputError, check_name, kind_name, unknown
+from nlp_gait.errors import InputError, check_name, kind_name, shown, unknown
 from nlp_gait.problem.checks import check_mathematics
 from nlp_gait.problem.gait_problem import GaitProblem
 from nlp_gait.problem.locking import one_at_a_time
@@ -180,11 +180,11 @@ def check(make: Maker, options: Mapping[str, Any]) -> None:
         expected = type(known[option].default)
         right = type(value) is expected or (expected is float and type(value) is int)
         if not right or (expected is float and not is_number(value)):
-            raise InputError(f"option {option} must be {kind_name(expected)}, got {value!r}")
+            raise InputError(f"option {option} must be {kind_name(expected)}, got {shown(value)}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
         if option in allowed and value not in allowed[option]:
-            raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {value!r}")
+            raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {shown(value)}")
     whole = [name for name, option in known.items() if type(option.default) is int]
     counts = {name: _plain(options.get(name, known[name].default)) for name in GRID if name in whole}
     if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
-from nlp_gait.errors import GaitError, RobotDataError, unknown
+from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown
 from nlp_gait.files import refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
+from nlp_gait.robots.mjcf import mjcf_points, mjcf_record
 from nlp_gait.robots.perturbation import perturbed, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector
 from nlp_gait.robots.tree import reversed_joint
@@ -25,7 +26,7 @@ from nlp_gait.robots.understanding import Understood, understood
 from nlp_gait.robots.urdf import collision_points, urdf_record
 
 LOG = logging.getLogger("nlp_gait")
-MODEL_ENDINGS = (".urdf",)
+MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
 # What a file says once, in place of what it extends.
@@ -92,9 +93,10 @@ def robot_names() -> tuple[str, ...]:
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Robot by its name, or from a file: a path that ends in ``.json``, or in ``.urdf``, perhaps with a ``.json`` beside it.
+    """Robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
 
-    What a URDF leaves out is derived, see ``robots/understanding.py``; a file of the same name beside it says it otherwise.
+    What such a file leaves out is derived, see ``robots/understanding.py``;
+    a ``.json`` of the same name beside it says it otherwise.
 
     Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read anew each
     time: it may have changed, or be another one under the same relative path.
@@ -104,6 +106,8 @@ def load_robot(name_or_path: str) -> Robot:
         RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
         MissingExtraError: a URDF cannot be read without its extra.
     """
+    if not isinstance(name_or_path, str):
+        raise UnknownNameError(f"the name of a robot must be a text, got {shown(name_or_path)}")
     return _made_from(name_or_path) if is_robot_file(name_or_path) else _loaded(name_or_path)
 
 
@@ -172,8 +176,13 @@ def _merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
 def _of_model(source: str, about: About) -> RobotFile:
     """Content of a URDF or MJCF."""
     with refusing(f"robot file {source!r}", RobotDataError):
-        raw = urdf_record(source, about_joint=about == "joint")
+        raw = mjcf_record(source) if is_mjcf(source) else urdf_record(source, about_joint=about == "joint")
         return _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), source)
+
+
+def is_mjcf(source: str) -> bool:
+    """Whether a file is MuJoCo's, by its ending."""
+    return source.endswith(".xml")
 
 
 def _with_records(file: RobotFile, source: str) -> RobotFile:
@@ -266,7 +275,7 @@ def _completed(file: RobotFile) -> tuple[RobotFile, tuple[str, ...]]:
             {key: record.raw for key, record in file.links.items()},
             {key: record.raw for key, record in file.joints.items()},
             {key: record.raw for key, record in file.feet.items()},
-            cloud=lambda link: collision_points(model, link),
+            cloud=lambda link: mjcf_points(model, link) if is_mjcf(model) else collision_points(model, link),
             forward=file.forward,
             repair=file.unphysical == "repair",
             fault_of_link=fault_in(_link),

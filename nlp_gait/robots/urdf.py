@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -29,6 +30,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
 TURNING = ("revolute", "continuous")
 RIM = 24  # points of a cylinder's edge
+# The parser's words for an unknown attribute of what holds no number itself.
+OWNER = re.compile(r"^Unknown attribute .* in (/robot[^/]*)?/?(robot|link|joint)(\[[^\]]*\])?$")
 
 
 def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
@@ -184,10 +187,13 @@ def _parsed(root: Any, path: str) -> Any:
 
 
 def _told(path: str) -> Callable[[str], None]:
-    """Replaces the parser's own answer, a line on stderr: an unknown attribute is a warning, anything else an error."""
+    """Replaces the parser's own answer, a line on stderr: an unknown attribute of a link or joint is a warning.
+
+    One of a limit or an origin is an error, as anything else: it may be a misspelt number.
+    """
 
     def tell(message: str) -> None:
-        if not message.startswith("Unknown attribute"):
+        if not OWNER.search(message):
             raise RobotDataError(message)
         LOG.warning("robot file %r: %s; it is not read, and may be removed", path, message)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 import pytest
 from casadi import SX
 
@@ -14,6 +13,8 @@ from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, tree_from, weld
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from tests.pinocchio_oracle import floating_model, inertia
+
+pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
 ROBOT = load_robot("nao-v5")
 HEAD = ("HeadYaw", "HeadPitch")

@@ -1,16 +1,40 @@
-"""One quantum of time: the brake on links that turn too fast for it is felt by these only."""
+"""One quantum of time, implicit and as printed, against the same balance of forces in NumPy."""
 
 from __future__ import annotations
 
 import casadi as ca
+import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.symbolic.contact import Ground, solve_definite
+from nlp_gait.problem import Array
+from nlp_gait.symbolic.contact import Contact, Ground, solve_definite
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
-from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, implicit_quantum
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, explicit_quantum, implicit_quantum
 
 QUANTUM = 0.01
+# Two links in numbers that have nothing in common.
+M, C, G = np.array([[2.0, 0.3], [0.3, 1.5]]), np.array([[0.4, -1.1], [0.7, 0.2]]), np.array([5.0, -3.0])
+Q, V, DISTURBANCE = np.array([0.1, -0.2]), np.array([30.0, 40.0]), np.array([0.6, -0.9])
+AIM_Q, AIM_V, KP, KD, SHARE = (
+    np.array([0.35, 0.05]),
+    np.array([25.0, 43.0]),
+    np.array([70.0, 90.0]),
+    np.array([3.0, 4.0]),
+    0.4,
+)
+MOTION = EquationsOfMotion(ca.SX(M), ca.SX(C), ca.SX(G))
+STATE, AIM = QuantisedState(ca.SX(Q), ca.SX(V)), QuantisedState(ca.SX(AIM_Q), ca.SX(AIM_V))
+CONTROL = Controller(ca.SX(KP), ca.SX(KD), ca.SX(SHARE))
+
+
+def numbers(expression: SX) -> Array:
+    return np.array(ca.evalf(expression)).ravel()
+
+
+def driving(q: Array, v: Array) -> Array:
+    """Controller, Coriolis, gravity and disturbance at a state."""
+    return KP * (AIM_Q - q) + KD * (AIM_V - v) + SHARE * G - C @ v - G + DISTURBANCE
 
 
 @pytest.mark.parametrize(("rate", "kept"), [(1.0, 1.0), (10.0, 1.0 - 1e-8), (100.0, 0.5), (1000.0, 1e-8)])
@@ -21,3 +45,29 @@ def test_a_free_link_keeps_its_rate_unless_it_turns_by_a_radian_in_a_quantum(rat
     equations = implicit_quantum(motion, state, nothing, state, [], ground, SX(0), QUANTUM)
     following = after(state, solve_definite(*equations), QUANTUM)
     assert float(ca.evalf(following.v)) / rate == pytest.approx(kept, rel=1e-6)
+
+
+def test_all_forces_balance_at_the_end_of_the_quantum() -> None:
+    ground = Ground(SX(0), SX(0), SX(0))
+    equations = implicit_quantum(MOTION, STATE, CONTROL, AIM, [], ground, ca.SX(DISTURBANCE), QUANTUM)
+    a = np.linalg.solve(np.array(ca.evalf(equations.mass)), numbers(equations.force))
+    q, v = Q + V * QUANTUM + a * QUANTUM**2 / 2, V + a * QUANTUM
+    brake = np.diag(M) * (QUANTUM * V) ** 8 * v / QUANTUM
+    assert np.abs(brake).max() > 0.01
+    assert M @ a == pytest.approx(driving(q, v) - brake, rel=1e-12)
+
+
+def test_the_printed_scheme_acts_at_the_start_and_contacts_press_only_below_the_ground() -> None:
+    normals, tangents = (
+        np.array([[0.8, -0.4], [0.3, 0.9], [-0.2, 0.5]]),
+        np.array([[0.1, 0.7], [-0.6, -0.2], [0.5, 0.5]]),
+    )
+    heights, stiffness, damping, friction = (-0.02, 0.0, 0.01), 2000.0, 15.0, 0.6
+    contacts = [Contact(SX(h), ca.SX(n), ca.SX(t)) for h, n, t in zip(heights, normals, tangents, strict=True)]
+    ground = Ground(SX(stiffness), SX(damping), SX(friction))
+    equations = explicit_quantum(MOTION, STATE, CONTROL, AIM, contacts, ground, ca.SX(DISTURBANCE))
+    force = driving(Q, V)
+    for h, n, t in zip(heights[:2], normals, tangents, strict=False):  # the third is above it, the second just touches
+        force += (-stiffness * h - damping * (n @ V)) * (n - friction * np.sign(t @ V) * t)
+    assert numbers(equations.force) == pytest.approx(force, rel=1e-12)
+    assert np.array(ca.evalf(equations.mass)) == pytest.approx(M)

@@ -14,7 +14,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.backends.derivatives.assembly import plan_of
-from nlp_gait.backends.derivatives.source import nlp_source
+from nlp_gait.backends.derivatives.source import casadi_source
 from nlp_gait.backends.derivatives.structure import structure_of
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.library_cache import is_cached, load_library
@@ -52,7 +52,7 @@ class CompiledNlp:
         names = [*VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
 
         def source() -> str:
-            return nlp_source(plan_of(structure_of(nlp), second=second))
+            return casadi_source(plan_of(structure_of(nlp), second=second))
 
         _, library = load_library(known, compiler, flags, names, source)
         self.functions = {name: ca.external(name, str(library)) for name in names}

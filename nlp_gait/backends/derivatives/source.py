@@ -17,7 +17,7 @@ BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
 
 
 def nlp_source(found: NlpPlan) -> str:
-    """C++ of an NLP's functions with CasADi's interface; the lane count is the macro LANES."""
+    """C++ of an NLP's functions (see ``native/nlp.hpp``); the lane count is the macro LANES."""
     plan = found.plan
     m, n = found.jacobian.shape
     sizes = {
@@ -57,11 +57,11 @@ def nlp_source(found: NlpPlan) -> str:
             *(f"enum {{ {name} = {size} }};" for name, size in sizes.items() if name != "HAS_SECOND"),
             f"#define HAS_SECOND {sizes['HAS_SECOND']}",
             *(straight_line(f"function_{i}", function) for i, function in enumerate(plan.functions)),
-            _table("int", "initial_place", plan.initial),
-            _table("double", "initial_value", (number(value) for value in plan.initial.values())),
-            _table("int", "jacobian_place", found.jacobian_places.tolist()),
-            _table("long long int", "jacobian_sparsity", _compact(found.jacobian)),
-            _table("long long int", "hessian_sparsity", _compact(found.hessian)),
+            table("int", "initial_place", plan.initial),
+            table("double", "initial_value", (number(value) for value in plan.initial.values())),
+            table("int", "jacobian_place", found.jacobian_places.tolist()),
+            table("long long int", "jacobian_sparsity", _compact(found.jacobian)),
+            table("long long int", "hessian_sparsity", _compact(found.hessian)),
             _rows("tape", 4, plan.tape),
             _rows("runs", 4, plan.runs),
             _rows("products", 5, plan.products),
@@ -72,9 +72,14 @@ def nlp_source(found: NlpPlan) -> str:
             _calls(found),
             f"#define OPERATIONS {cases}",
             (native / "nlp.hpp").read_text(encoding="utf-8"),
-            (native / "casadi.hpp").read_text(encoding="utf-8"),
         ]
     )
+
+
+def casadi_source(found: NlpPlan) -> str:
+    """The same with CasADi's interface."""
+    native = files("nlp_gait.backends.derivatives") / "native"
+    return f"{nlp_source(found)}\n{(native / 'casadi.hpp').read_text(encoding='utf-8')}"
 
 
 def _rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
@@ -87,7 +92,7 @@ def _braces(row: Iterable[object]) -> str:
     return f"{{{','.join(map(str, row))}}}"
 
 
-def _table(kind: str, name: str, values: Iterable[object]) -> str:
+def table(kind: str, name: str, values: Iterable[object]) -> str:
     """A constant array."""
     return f"static const {kind} {name}[] = {{{','.join(map(str, values)) or '0'}}};"
 
@@ -104,9 +109,9 @@ def _calls(found: NlpPlan) -> str:
     ]
     rows = []
     for i, call in enumerate(found.plan.calls):
-        lines.append(_table("Block", f"blocks_{i}", [_braces(block) for block in call.inputs + call.outputs]))
+        lines.append(table("Block", f"blocks_{i}", [_braces(block) for block in call.inputs + call.outputs]))
         if call.directions is not None:
-            lines.append(_table("int", f"directions_{i}", call.directions.tolist()))
+            lines.append(table("int", f"directions_{i}", call.directions.tolist()))
         directions = "nullptr" if call.directions is None else f"directions_{i}"
         split, end = len(call.inputs), len(call.inputs + call.outputs)
         rows.append(

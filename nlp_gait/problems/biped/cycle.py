@@ -131,6 +131,13 @@ class WalkingCycle:
             },
         )
 
+    def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
+        limit, joints = motion["torque_jump_limit_Nm"], self.phases["ssp"].joints
+        return tuple(
+            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.torque_size)
+            for switch, jump in jumps.items()
+        )
+
     @property
     def stretches(self) -> tuple[Stretch, ...]:
         """Both phases as functions of time."""
@@ -138,8 +145,13 @@ class WalkingCycle:
         begins: tuple[str, ...] = ()
         for name, phase in self.phases.items():
             for stretch in phase.stretch(name, begins):
-                means = tuple(f"{name}_{index}" for index in stretch.means)
-                found.append(replace(stretch, assemble=partial(self._assemble_at, name), means=means))
+                found.append(
+                    replace(
+                        stretch,
+                        assemble=partial(self._assemble_at, name),
+                        means=tuple(f"{name}_{index}" for index in stretch.means),
+                    )
+                )
             begins = (*begins, phase.duration)
         return tuple(found)
 
@@ -151,13 +163,6 @@ class WalkingCycle:
             objective=part.objective,
             constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
             indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
-        )
-
-    def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
-        limit, joints = motion["torque_jump_limit_Nm"], self.phases["ssp"].joints
-        return tuple(
-            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, self.torque_size, "once")
-            for switch, jump in jumps.items()
         )
 
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:

@@ -189,7 +189,7 @@ class FootLimits(Part):
             kinds = self._bearing(foot).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
                 found.append(
-                    rows(f"{foot}_{name}", unit, ca.vec(values), MX(0.0), None, labels(names, range(n)), over="instant")
+                    rows(f"{foot}_{name}", unit, ca.vec(values), MX(0.0), None, labels(names, range(n)), "instant")
                 )
             loads[foot] = samples.wrenches[side][2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
@@ -203,7 +203,7 @@ class FootLimits(Part):
         return Contribution(
             rows=(
                 *found,
-                rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, over="samples"),
+                rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
                 rows(
                     "switch_load",
                     "1",

@@ -189,12 +189,12 @@ class MotorLimits(Part):
         drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
         speed = DM([self._motors.robot.joint(joint).velocity_limit_rad_s for joint in moving])
         fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
-        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, labels(moving, range(n)), over="instant")
+        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, labels(moving, range(n)), "instant")
         too_weak = [
-            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, labels(names, range(n)), over="instant")
+            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, labels(names, range(n)), "instant")
             for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
         rms = ca.sqrt(time_mean(loads**2))
-        too_hot = rows("continuous_torque", "Nm", rms, upper=continuous, labels=names, over="root-mean-square")
+        too_hot = rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
         return Contribution(rows=(too_fast, *too_weak, too_hot))

@@ -65,8 +65,8 @@ def rows(
     lower: MX | None = None,
     upper: MX | None = None,
     labels: Sequence[str] = (),
-    size: float = 1.0,
     over: Over | None = None,
+    size: float = 1.0,
 ) -> Constraint:
     """Rows of a part, in which a violation counts as every other in its unit; ``size`` is that of the robot next to NAO's."""
     return Constraint(
@@ -103,9 +103,7 @@ class JointLimits(Part):
         limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
         names = labels(self._planned, range(n))
-        return Contribution(
-            rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, over="instant"),)
-        )
+        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, "instant"),))
 
 
 class Reach(Part):
@@ -119,7 +117,7 @@ class Reach(Part):
         """Two-sided rows."""
         limit = 1 - at[REACH_MARGIN]
         names = labels(("left leg", "right leg"), range(samples.steps + 1))
-        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, over="instant"),))
+        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, "instant"),))
 
 
 class Closure(Part):
@@ -133,13 +131,11 @@ class Closure(Part):
         self._legs = tuple(legs)
 
     def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with an upper bound, under the exact interpretation alone."""
-        if not ops.exact:
-            return Contribution()
-        names = labels(self._legs, range(samples.steps + 1))
-        return Contribution(
-            rows=(rows("closure", "m", ca.vec(samples.miss), upper=MX(CLOSURE_M), labels=names, over="instant"),)
-        )
+        """Rows with an upper bound; a solver, which must have the same rows in the same places, sees them far below it."""
+        columns = samples.steps + 1
+        miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(self._legs) * columns)
+        names = labels(self._legs, range(columns))
+        return Contribution(rows=(rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant"),))
 
 
 class DriveLimits(Part):
@@ -171,10 +167,10 @@ class DriveLimits(Part):
                     -strongest,
                     strongest,
                     labels(samples.joints, range(n)),
-                    self._size,
                     "instant",
+                    self._size,
                 ),
-                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n)), over="instant"),
+                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n)), "instant"),
             ),
             indexes={
                 "effort_share": ca.mmax(ca.fabs(torque) / strongest),
@@ -204,7 +200,7 @@ class TorqueChange(Part):
         limit = at["torque_change_limit_Nm"]
         names = labels(samples.joints, range(change.shape[1]))
         return Contribution(
-            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, self._size, "interval"),),
+            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size),),
             indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
         )
 
@@ -277,7 +273,7 @@ def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> 
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
     )
-    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), over="instant")
+    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), "instant")
 
 
 class FootClearance(Part):

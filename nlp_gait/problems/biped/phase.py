@@ -210,14 +210,12 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._kinematics(Exact(), {}), at)
+        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._exact_kinematics, at)
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
         torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
         wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
-        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
-        held = np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
         rows = [self.joints.index(name) for name in self.moving]
 
         def full(moved: Any, others: Array) -> Array:
@@ -231,7 +229,7 @@ class Phase:
         halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
             "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            "q": full(q, held),
+            "q": full(q, self._held),
             "qd": full(qd, still_rates),
             "qdd": full(qdd, still_rates),
             "tau": _numbers(torque),
@@ -252,6 +250,16 @@ class Phase:
         """Joints whose angle changes over the phase."""
         joints = self._symbolic_plan(Exact())[1].joints
         return tuple(name for name in self.joints if not joints[name].velocity.is_zero())
+
+    @cached_property
+    def _held(self) -> Array:
+        """(J,) angles of the joints that stand still, zero for the others [rad]."""
+        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
+        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
+
+    @cached_property
+    def _exact_kinematics(self) -> ca.Function:
+        return self._kinematics(Exact(), {})
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -282,19 +290,19 @@ class Phase:
         motion: bool,
         wrenches: bool,
         traces: Mapping[str, Trace],
-        phases: MX | None = None,
+        phases: MX | None,
     ) -> list[Any]:
-        """Outputs of ``_sample`` at all samples, or at other phases (1, k); equations that it leaves open are tied."""
+        """Outputs of ``_sample`` at all samples, or at other phases; equations that it leaves open are tied."""
         inputs, outputs = self._sample(ops, motion, wrenches, traces)
         roots = ops.open_roots()
         if roots is None:
             return self._mapped(ca.Function("sample", inputs, economical(outputs)), at, phases=phases)
-        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at)
+        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], economical([roots.residual, *outputs]))
         found: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *rest = self._mapped(tied, at, unknowns)
+            rows, *rest = self._mapped(tied, at, unknowns, phases=phases)
             found.extend(rest)
             return rows
 
@@ -363,7 +371,10 @@ class Phase:
         return [*parts, hip, world], loads
 
     def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
-        """A function of columns that differ from sample to sample and (x, margin, phase), at all samples or at other phases."""
+        """A function of columns and (x, margin, phase) at all samples, or at other phases (1, k), one column each.
+
+        Columns are those of its inputs that differ from sample to sample.
+        """
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         margin = ca.repmat(at[REACH_MARGIN], 1, n)
         if phases is not None:

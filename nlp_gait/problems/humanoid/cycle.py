@@ -68,6 +68,7 @@ def humanoid_cycle(
     *motion, step = _variables(body)
     variables = (*motion, *sharing.variables, step)
     means = _mean_margins(body)
+    goal = goal_of("torque" if objective == "torque" else "power", real, body.heat)
     halves = {
         "ssp": (_single_planner(body), loads_on_left(real.model, GRAVITY, body.upright_feet), _single(body), ()),
         "dsp": (sharing.planned(_double_planner(body)), sharing.loads, _double_margins(body), sharing.parts),
@@ -83,7 +84,7 @@ def humanoid_cycle(
             loads=loads,
             grid=grid,
             parts=(*parts_of(body, margins, means[name], drive_limits=drive_limits), *real.parts, *more),
-            goal=goal_of("torque" if objective == "torque" else "power", real, body.heat),
+            goal=goal,
         )
         for name, (plan, loads, margins, more) in halves.items()
     }

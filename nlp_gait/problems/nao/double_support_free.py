@@ -131,4 +131,4 @@ class FlatSoles(Part):
         """Two-sided rows."""
         names = labels(("left", "right"), range(1, samples.steps))
         turns = ca.vec(samples.traces["sole_turn"][:, 1:-1])
-        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names, over="instant"),))
+        return Contribution(rows=(rows("sole_turn", "rad", turns, MX(-FLAT), MX(FLAT), names, "instant"),))

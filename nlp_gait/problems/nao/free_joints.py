@@ -248,7 +248,7 @@ class FreeLimits(Part):
 def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
     """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
     names = labels(corners, range(1, values.shape[1] + 1))
-    return rows(name, "m", ca.vec(values), MX(0.0), None, names, over="instant")
+    return rows(name, "m", ca.vec(values), MX(0.0), None, names, "instant")
 
 
 def free_splines(trajectory: Trajectory) -> Splines:

@@ -50,8 +50,8 @@ class AnkleCoupling(Part):
             pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
             least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
             found += [
-                rows(f"{side}AnkleRoll_least", "rad", roll - least, lower=MX(0.0), labels=names),
-                rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, upper=MX(0.0), labels=names),
+                rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
+                rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
             ]
         return Contribution(rows=tuple(found))
 

@@ -34,8 +34,7 @@ def phase_problem(
 ) -> GaitProblem:
     """Problem of one phase of NAO; ``robot`` is its name or file, the others are those of ``problem_of``."""
     problem = problem_of(name, title, phase, start=start, searchable=searchable, long_derivatives=long_derivatives)
-    problem = replace(problem, stretches=phase.stretch())
-    return with_robot(problem, robot, phase.robot.armatures_kgm2)
+    return with_robot(replace(problem, stretches=phase.stretch()), robot, phase.robot.armatures_kgm2)
 
 
 def with_robot(

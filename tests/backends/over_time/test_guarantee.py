@@ -123,7 +123,9 @@ def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> Non
     def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         pole = 1 / (phases - math.sqrt(0.5))
         names = tuple(f"pole, {k}" for k in range(phases.shape[1]))
-        rows = Constraint(name="pole", labels=names, unit="m", scale=1.0, value=-(pole**2).T, upper=MX(0.0), over="instant")
+        rows = Constraint(
+            name="pole", labels=names, unit="m", scale=1.0, value=-(pole**2).T, upper=MX(0.0), over="instant"
+        )
         wild = Constraint(name="wild", labels=names, unit="m", scale=1.0, value=pole.T, upper=MX(1e6), over="instant")
         mean = Constraint(name="mean", unit="m", scale=1.0, value=ca.sum2(pole), upper=MX(0.0), over="mean")
         return Assembly(objective=MX(0), constraints=(rows, wild, mean), indexes={"mean_m": ca.sum2(pole)})

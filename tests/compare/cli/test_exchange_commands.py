@@ -1,4 +1,4 @@
-"""``bench``, ``logs`` and ``export-objective`` as users call them."""
+"""``bench``, ``logs``, ``export-objective`` and ``export-solver`` as users call them."""
 
 from __future__ import annotations
 
@@ -125,6 +125,12 @@ def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
     assert {Path(name).suffix for name in found["files"]} == {".cpp", ".h", ".c", ".m", ".jl", ".sh"}
     assert all(Path(name).is_file() for name in found["files"])
     assert "did you mean 'walk12-w015'" in one_sentence("export-objective", "walk12-w15", "--to", tmp_path)
+
+
+def test_export_solver_writes_and_says_what(tmp_path: Path) -> None:
+    found = as_json("export-solver", "walk12", "--to", tmp_path / "c")
+    assert sorted(Path(name).suffix for name in found["files"]) == [".c", ".cpp", ".h", ".sh"]
+    assert all(Path(name).is_file() for name in found["files"])
 
 
 def test_an_instance_is_a_problem_of_every_command(tmp_path: Path) -> None:

@@ -114,7 +114,9 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
     assert other.value("torque_change_limit_Nm") > 1.2 * biped_scale
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", ["humanoid-ssp", "humanoid-dsp", pytest.param("humanoid-cycle", marks=pytest.mark.slow)]
+)
 def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str, name: str) -> None:
     problem = load(name, robot=path)
     x = (problem.lower + problem.upper) / 2
@@ -130,7 +132,7 @@ def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str
 
 
 def test_steps_of_another_length_and_motions_of_more_coefficients(path: str) -> None:
-    longer = load("humanoid-ssp", robot=path, step_length_m=0.15, trajectory="spline-2")
+    longer = load("humanoid-ssp", robot=path, step_length_m=0.15, trajectory="spline-2", samples_per_interval=1)
     arrays = longer.signals((longer.lower + longer.upper) / 2).arrays
     assert arrays["right_foot"][-1, 0] == pytest.approx(0.3)
     assert len(longer.names) == 13 + 7 * 3

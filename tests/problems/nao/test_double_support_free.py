@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from nlp_gait.errors import InputError
@@ -17,6 +16,8 @@ from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
+
+pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
 TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSE_TOLERANCE = 1e-8, 1e-8, 1e-9

@@ -1,0 +1,131 @@
+"""A problem's NLP with its derivatives as plain C++ with a C header, for a solver on board: no dependency but libc and libm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from nlp_gait.backends.derivatives.assembly import NlpPlan, plan_of
+from nlp_gait.backends.derivatives.compiled import FLAGS
+from nlp_gait.backends.derivatives.source import nlp_source, table
+from nlp_gait.backends.derivatives.straight_line import number
+from nlp_gait.backends.derivatives.structure import structure_of
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.files import writable_folder, write_text
+from nlp_gait.problem import GaitProblem
+from nlp_gait.problem.locking import one_at_a_time
+
+# Files of the export by the template that each is made from; the C++ file is put together from the plan.
+TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
+BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"}
+WRAPPERS = """
+extern "C" long long @_bytes(void) { return nlp_gait_bytes(); }
+extern "C" void @_prepare(void* memory) { nlp_gait_prepare(memory); }
+extern "C" void @_values(void* memory, const double* w, const double* p, double* f, double* g) {
+  nlp_gait_values(memory, w, p, f, g);
+}
+extern "C" void @_first(void* memory, const double* w, const double* p, double* gradient, double* jacobian) {
+  nlp_gait_first(memory, w, p, gradient, jacobian);
+}
+extern "C" void @_second(void* memory, const double* w, const double* p, double f_weight, const double* g_weights,
+                         double* hessian) {
+  nlp_gait_second(memory, w, p, f_weight, g_weights, hessian);
+}
+"""
+
+
+@one_at_a_time
+def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
+    """Write source, header, example and build line of a problem's NLP; returns the files.
+
+    Args:
+        problem: with the parameter values that bounds and start are written for.
+        folder: made if it is missing.
+
+    Raises:
+        CompilerError: the NLP holds what has no C++ here.
+        OutputError: the folder cannot be written to.
+    """
+    model = nlp_model(problem)
+    found = plan_of(structure_of(model.nlp))
+    prefix = f"{problem.name.replace('-', '_')}_nlp"
+    words = _words(problem, model, found, prefix)
+    native = files("nlp_gait.export") / "native"
+    texts = {f"{prefix}.cpp": _source(problem, model, found, prefix)}
+    for name, template in TEMPLATES.items():
+        text = (native / template).read_text(encoding="utf-8")
+        for word, value in words.items():
+            text = text.replace(f"@{word}@", value)
+        texts[name.format(prefix=prefix)] = text
+    written = []
+    for name, text in texts.items():
+        written.append(writable_folder(folder) / name)
+        write_text(written[-1], text)
+    return written
+
+
+def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
+    """The whole C++ file: the plan and what works through it, constants, the functions of the header."""
+    width = model.widths[-1]
+    bounds = model.bounds(problem)
+    constants = {
+        "p": np.append(problem.p, width),
+        "w_start": model.start(problem, (problem.lower + problem.upper) / 2, width),
+        **{name: bounds[end] for name, end in BOUNDS.items()},
+        "offset": model.offset,
+        "scale": model.scale,
+    }
+    sparsities = {"jacobian": found.jacobian, "hessian": found.hessian}
+    starts = {f"{name}_starts": sparsity.colind() for name, sparsity in sparsities.items()}
+    rows = {f"{name}_rows": [*sparsity.row(), 0] for name, sparsity in sparsities.items()}
+    return "\n".join(
+        [
+            f"// The NLP of {problem.address}; see {prefix}.h. Generated: change nothing here.",
+            f'#pragma GCC visibility push(default)\n#include "{prefix}.h"\n#pragma GCC visibility pop',
+            "#ifndef LANES\n#define LANES 1  // pairs of a sample and a direction at a time: 1, 2, 4 or 8\n#endif",
+            "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
+            "namespace {  // so that several problems can stand in one program",
+            nlp_source(found).replace('extern "C" EXPORT', "static"),
+            "}  // namespace",
+            *(
+                _constant("double", f"{prefix}_{name}", map(number, values.tolist()))
+                for name, values in constants.items()
+            ),
+            *(_constant("long long", f"{prefix}_{name}", values) for name, values in {**starts, **rows}.items()),
+            WRAPPERS.replace("@", prefix),
+        ]
+    )
+
+
+def _constant(kind: str, name: str, values: Iterable[object]) -> str:
+    return table(kind, name, values).replace("static const", 'extern "C" const', 1)
+
+
+def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
+    """What stands for each place in the templates."""
+    m, n = found.jacobian.shape
+    return {
+        "WHAT": f"{problem.address}: {problem.title}",
+        "N": str(n),
+        "M": str(m),
+        "K": str(found.parameters),
+        "VARIABLES_COUNT": str(model.variables),
+        "WIDTH": repr(WIDTHS[-1]),
+        "JACOBIAN": str(found.jacobian.nnz()),
+        "HESSIAN": str(found.hessian.nnz()),
+        "PREFIX": prefix,
+        "GUARD": f"{prefix.upper()}_H",
+        "FLAGS": " ".join(FLAGS),
+        "VARIABLES": _comment(f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)),
+        "PARAMETERS": _comment(
+            f"{k:4d}  {q.name} = {value:g} [{q.unit}]: {q.description}"
+            for k, (q, value) in enumerate(zip(problem.parameters, problem.p, strict=True))
+        ),
+    }
+
+
+def _comment(lines: Iterable[str]) -> str:
+    return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)

@@ -1,0 +1,211 @@
+"""Robots from MJCF files, in the form of a JSON robot file; MuJoCo itself reads them, with all that they include."""
+
+from __future__ import annotations
+
+import math
+import os
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.files import read_bytes
+from nlp_gait.robots.fields import sound
+from nlp_gait.robots.tree import inertia_moments, point_inertia
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+RIM = 24  # points of a cylinder's edge
+UNLIMITED_RAD_S = 1000.0  # MJCF knows no limit of speed
+
+
+def mjcf_record(path: str) -> dict[str, Any]:
+    """Links and joints of an MJCF file by the schema of a robot file, without feet.
+
+    The robot is the heaviest tree of bodies on the world. All frames get its root's axes at the reference pose, where all angles
+    count as zero. Bodies that do not turn against each other become one.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        RobotDataError: it does not read the file.
+        ValueError: there is no robot in it, or a body with several hinges.
+    """
+    model = _compiled(path)
+    root, frames, carriers = _tree(model, path)
+    names = {i: model.body(i).name or f"body {i}" for i in frames}
+    if len(set(names.values())) < len(names):
+        raise ValueError("two bodies have one name")
+    origins = {i: _joint_place(model, frames, i) for i in set(carriers.values())}
+    links = {}
+    for carrier, origin in origins.items():
+        parts = [_matter(model, i, frames[i]) for i in frames if carriers[i] == carrier]
+        mass = sum(part[0] for part in parts)
+        com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass if mass > 0.0 else origin
+        tensor = sum((about + point_inertia(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
+        links[names[carrier]] = {
+            "mass_kg": float(mass),
+            "com_m": (com - origin).tolist(),
+            "inertia_com_kgm2": list(inertia_moments(tensor)),
+        }
+    joints = {}
+    for carrier in sorted(set(carriers.values()) - {root}):
+        parent = carriers[int(model.body_parentid[carrier])]
+        joint = _hinges(model, carrier)[0]
+        low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
+        limited = bool(model.jnt_limited[joint])
+        joints[model.joint(joint).name or f"joint {joint}"] = {
+            "parent": names[parent],
+            "child": names[carrier],
+            "origin_m": (origins[carrier] - origins[parent]).tolist(),
+            "axis": (frames[carrier][:3, :3] @ model.jnt_axis[joint]).tolist(),
+            "limits_rad": [float(low), float(high)] if limited else [-math.pi, math.pi],
+            "velocity_limit_rad_s": UNLIMITED_RAD_S,
+            "torque_limit_Nm": _torque_limit(model, joint),
+        }
+    name = Path(path).stem
+    return {
+        "schema": 1,
+        "name": name,
+        "description": f"from {Path(path).name}",
+        "root": names[root],
+        "links": links,
+        "joints": joints,
+    }
+
+
+def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
+    """Points of all collision shapes that move with a link, as ``urdf.collision_points``; MuJoCo has read every mesh."""
+    model = _compiled(path)
+    _, frames, carriers = _tree(model, path)
+    found = [np.zeros((0, 3))]
+    for i, frame in frames.items():
+        if (model.body(carriers[i]).name or f"body {carriers[i]}") != link:
+            continue
+        origin = _joint_place(model, frames, carriers[i])
+        for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
+            if model.geom_contype[geom] or model.geom_conaffinity[geom]:
+                pose = frame @ _pose(model.geom_pos[geom], model.geom_quat[geom])
+                found.append(_shape_points(model, geom, pose) - origin)
+    return np.concatenate(found), ()
+
+
+def _compiled(path: str) -> Any:
+    """MuJoCo's model of a file, read anew where the file has changed."""
+    if find_spec("mujoco") is None:
+        raise MissingExtraError(
+            f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
+        )
+    read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses what is no regular file
+    return _read(path, os.stat(path).st_mtime_ns)
+
+
+@cache
+def _read(path: str, changed_ns: int) -> Any:
+    mujoco = import_module("mujoco")
+    try:
+        return mujoco.MjModel.from_xml_path(path)
+    except Exception as error:  # ValueError, and whatever a plugin or decoder raises
+        said = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {said}") from error
+
+
+def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]:
+    """Root body, poses (4, 4) of its tree in its own axes at its origin, and the body with the hinge that carries each."""
+    tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
+    if not tops:
+        raise ValueError("there is no body in it")
+    root = max(tops, key=lambda i: float(model.body_subtreemass[i]))
+    frames: dict[int, Array] = {root: np.eye(4)}
+    carriers = {root: root}
+    for i in range(root + 1, model.nbody):
+        parent = int(model.body_parentid[i])
+        if parent not in frames:
+            continue
+        frames[i] = frames[parent] @ _pose(model.body_pos[i], model.body_quat[i])
+        hinges = _hinges(model, i)
+        if len(hinges) > 1:
+            raise ValueError(
+                f"body {model.body(i).name!r} has {len(hinges)} hinges; give each a body of its own, with a little mass"
+            )
+        carriers[i] = i if hinges else carriers[parent]
+    return root, frames, carriers
+
+
+def _hinges(model: Any, body: int) -> list[int]:
+    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+    hinge = int(import_module("mujoco").mjtJoint.mjJNT_HINGE)
+    return [j for j in range(first, first + count) if model.jnt_type[j] == hinge]
+
+
+def _joint_place(model: Any, frames: dict[int, Array], body: int) -> Array:
+    """(3,) of the joint that carries a body; of the root its origin."""
+    hinges = _hinges(model, body)
+    local = model.jnt_pos[hinges[0]] if hinges and model.body_parentid[body] else np.zeros(3)
+    return np.asarray(frames[body][:3, :3] @ local + frames[body][:3, 3])
+
+
+def _matter(model: Any, body: int, frame: Array) -> tuple[float, Array, Array]:
+    """Mass, centre of mass (3,) and tensor about it (3, 3), in the root's frame."""
+    pose = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
+    tensor = pose[:3, :3] @ np.diag(model.body_inertia[body]) @ pose[:3, :3].T
+    return float(model.body_mass[body]), pose[:3, 3], tensor
+
+
+def _torque_limit(model: Any, joint: int) -> float:
+    """Of the joint, else of its actuator [Nm]; 0 if neither has one."""
+    if model.jnt_actfrclimited[joint]:
+        return float(np.abs(model.jnt_actfrcrange[joint]).max())
+    for k in range(model.nu):
+        if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] == 0:
+            gear = abs(float(model.actuator_gear[k, 0]))
+            if model.actuator_forcelimited[k]:
+                return gear * float(np.abs(model.actuator_forcerange[k]).max())
+            if model.actuator_ctrllimited[k] and not model.actuator_biasprm[k].any():  # a motor, no servo
+                gain = abs(float(model.actuator_gainprm[k, 0]))
+                return gear * gain * float(np.abs(model.actuator_ctrlrange[k]).max())
+    return 0.0
+
+
+def _shape_points(model: Any, geom: int, pose: Array) -> Array:
+    """(N, 3) of a shape at a pose (4, 4): corners, edges, or of round shapes the lowest points."""
+    kinds = import_module("mujoco").mjtGeom
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == int(kinds.mjGEOM_MESH):
+        mesh = int(model.geom_dataid[geom])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        points = np.array(model.mesh_vert[first : first + count], dtype=float)
+    elif kind == int(kinds.mjGEOM_BOX):
+        points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size
+    elif kind == int(kinds.mjGEOM_SPHERE):
+        return np.array([pose[:3, 3] - [0.0, 0.0, size[0]]])
+    elif kind == int(kinds.mjGEOM_CAPSULE):
+        ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]) @ pose[:3, :3].T + pose[:3, 3]
+        return np.asarray(ends - [0.0, 0.0, size[0]])
+    elif kind == int(kinds.mjGEOM_CYLINDER):
+        turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
+        rim = size[0] * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
+        points = np.concatenate([rim + [0.0, 0.0, end * size[1]] for end in (-1, 1)])
+    else:
+        return np.zeros((0, 3))
+    placed = np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
+    return placed if sound(placed) else np.zeros((0, 3))
+
+
+def _pose(place: Array, quaternion: Array) -> Array:
+    """(4, 4) from a place and (w, x, y, z)."""
+    w, x, y, z = (float(part) for part in quaternion)
+    pose = np.eye(4)
+    pose[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    pose[:3, 3] = place
+    return pose

@@ -1,0 +1,78 @@
+"""Robots from MJCF: MuJoCo's own translation of a URDF is the same robot, and a message for what cannot be read."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.robots import load_robot, mjcf
+from nlp_gait.robots.biped import biped_of
+from tests.robots.crooked import crooked, crooked_urdf
+
+mujoco = pytest.importorskip("mujoco", reason="extra sim is not installed")
+pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+
+DIGITS = 1e-5  # MuJoCo writes six
+
+
+def plain_urdf() -> str:
+    """The robot without its oddities, which MuJoCo refuses."""
+    text = re.sub(r'<joint name="[AB]_(grip|wrist)".*?</joint>', "", crooked_urdf())
+    text = re.sub(r'<link name="[AB]_finger"/>', "", text)
+    text = re.sub(r'<link name="[AB]_hand">.*?</link>', "", text)
+    kept = '<mujoco><compiler fusestatic="false"/></mujoco>'  # else the base would become the world
+    return text.replace('<robot name="crooked">', f'<robot name="crooked">{kept}')
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("mjcf")
+    model = mujoco.MjModel.from_xml_path(crooked(folder, plain_urdf()))
+    mujoco.mj_saveLastXML(str(folder / "crooked.xml"), model)
+    return str(folder / "crooked.xml")
+
+
+def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
+    found, wanted = biped_of(load_robot(path)), biped_of(load_robot(str(Path(path).with_suffix(".urdf"))))
+    assert found.joints == wanted.joints
+    assert found.posture_rad == pytest.approx(wanted.posture_rad, abs=DIGITS)
+    for side in ("left", "right"):
+        for name in ("ankle_height_m", "front_m", "back_m", "left_m", "right_m"):
+            foot, other = found.model.feet[side], wanted.model.feet[side]
+            assert getattr(foot, name) == pytest.approx(getattr(other, name), abs=DIGITS)
+    for name, joint in wanted.model.joints.items():
+        twin = found.model.joints[name]
+        np.testing.assert_allclose(twin.origin_m, joint.origin_m, atol=DIGITS)
+        np.testing.assert_allclose(twin.axis, joint.axis, atol=DIGITS)
+        np.testing.assert_allclose(twin.limits_rad, joint.limits_rad, atol=DIGITS)
+        assert twin.torque_limit_Nm == joint.torque_limit_Nm
+    for name, link in wanted.model.links.items():
+        assert found.model.links[name].mass_kg == pytest.approx(link.mass_kg, rel=DIGITS)
+        np.testing.assert_allclose(found.model.links[name].com_m, link.com_m, atol=DIGITS)
+        np.testing.assert_allclose(found.model.links[name].inertia_matrix, link.inertia_matrix, atol=DIGITS)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("<worldbody>", "<wordbody>", "is not read by MuJoCo"),
+        (' actuatorfrcrange="-60 60"', "", r"torque_limit_Nm must be > 0, got 0\.0"),
+        ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each a body"),
+    ],
+)
+def test_what_is_wrong_with_an_mjcf_is_said(path: str, tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = Path(path).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "robot.xml").write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(RobotDataError, match=message):
+        load_robot(str(tmp_path / "robot.xml"))
+
+
+def test_without_mujoco_its_extra_is_named(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mjcf, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r"MJCF files need MuJoCo.*pip install 'nlp-gait\[sim\]'"):
+        load_robot(path)
