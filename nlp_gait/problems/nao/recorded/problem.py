@@ -111,7 +111,8 @@ def recorded(
         problem = _cycle(model, parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
         options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
         problem = replace(problem, options=options, refine=lambda by: built(factor * by))
-        return with_robot(problem, robot, model.armatures_kgm2)
+        repeats = len(parts) > 1 and motion.repeats
+        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     times: tuple[float, ...]
