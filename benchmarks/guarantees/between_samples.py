@@ -60,12 +60,12 @@ def contradictions(problem: GaitProblem, gaits: list[Array], samples: int) -> tu
         for name, value in zip(model.row_names, excess.tolist(), strict=True):
             stem = row_of(name)
             by_row[stem] = max(by_row.get(stem, -np.inf), value)
-        allowed = {b.row: b.most for b in proven.breaches}
+        allowed = {b.row: np.inf if b.most is None else b.most for b in proven.breaches}
         holding += proven.holds is True
         slack = QUADRATURE / (factor * problem.grid.parts)
         for name, value in by_row.items():
             mean = name.endswith("_mean")
-            most = max(allowed.get(name, 0.0) or 0.0, TOLERANCE)
+            most = max(allowed.get(name, 0.0), TOLERANCE)
             if name not in proven.sampled and value > most + (slack if mean else ROUNDING):
                 found.append(f"{problem.name} {x.tolist()}: {name} by {value} on the grid, {most} proven")
         for name, (low, high) in proven.means.items():

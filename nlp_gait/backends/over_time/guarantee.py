@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nlp_gait.backends.over_time.functions import TimeFunctions, time_functions
-from nlp_gait.backends.over_time.search import GRAIN, ROUNDING, Search, first_pieces
+from nlp_gait.backends.over_time.search import GRAIN, ROUNDING, Search, beyond, first_pieces
 from nlp_gait.errors import CompilerError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
@@ -87,7 +87,7 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
     Rows of no time, such as those of a switch, are taken as the judge has them.
     """
     if not problem.stretches:
-        return Guarantee(holds=None, means={}, reason="sampled by definition: its rows are no functions of time")
+        return Guarantee(holds=None, means={}, reason="sampled by definition: its rows are stated on samples alone")
     try:
         built = problem.built(
             "between samples", lambda: [time_functions(problem, stretch) for stretch in problem.stretches]
@@ -151,9 +151,10 @@ def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
             if k in part.squares:
                 low, high = np.sqrt(max(low, 0.0)) * (1 - ROUNDING), np.sqrt(max(high, 0.0)) * (1 + ROUNDING)
             if not rows.units[k]:
-                means[rows.names[k]] = (float(low), float(high))
+                if np.isfinite(low) and np.isfinite(high):
+                    means[rows.names[k]] = (float(low), float(high))
                 continue
-            most, least = max(lower[k] - low, high - upper[k]), max(lower[k] - high, low - upper[k], 0.0)
+            most, least = (float(v) for v in beyond(lower[k], upper[k], low, high))
             if not most <= FEASIBILITY_TOLERANCE:
                 breaches.append(
                     Breach(
@@ -161,7 +162,7 @@ def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
                         unit=rows.units[k],
                         from_s=start,
                         to_s=end,
-                        least=float(least),
+                        least=max(least, 0.0),
                         most=_known(most),
                     )
                 )

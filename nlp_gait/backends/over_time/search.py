@@ -26,6 +26,8 @@ MEAN_SHARPNESS = 4e-3
 MOST_MEAN_PIECES = 800
 # Widens sums of pieces by far more than they can be rounded.
 ROUNDING = 1e-12
+# Stands for an unbounded end where only the other one matters.
+LARGEST = 1e300
 
 
 def first_pieces(kinks: Sequence[float], shift: float | None) -> Array:
@@ -41,6 +43,19 @@ def halves(pieces: Array) -> Array:
     """(2 P, 2) pieces, each cut in the middle."""
     middle = np.round(pieces.mean(axis=1) / GRAIN) * GRAIN
     return np.concatenate([np.stack([pieces[:, 0], middle], -1), np.stack([middle, pieces[:, 1]], -1)])
+
+
+def beyond(lower: Array, upper: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """By how much values between low and high are outside lower and upper at most, and at least; a missing bound holds."""
+    most = np.maximum(
+        np.where(np.isneginf(lower), -np.inf, np.where(np.isneginf(low), np.inf, lower - np.maximum(low, -LARGEST))),
+        np.where(np.isposinf(upper), -np.inf, np.where(np.isposinf(high), np.inf, np.minimum(high, LARGEST) - upper)),
+    )
+    least = np.maximum(
+        np.where(np.isneginf(lower), -np.inf, lower - np.minimum(high, LARGEST)),
+        np.where(np.isposinf(upper), -np.inf, np.maximum(low, -LARGEST) - upper),
+    )
+    return most, least
 
 
 class Search:
@@ -69,8 +84,7 @@ class Search:
             forms = self._enclosed(pieces)
             self.count += len(pieces)
             low, high = forms.lower[:, :m], forms.upper[:, :m]
-            most = np.maximum(self._lower - low, high - self._upper)
-            least = np.maximum(self._lower - high, low - self._upper)
+            most, least = beyond(self._lower, self._upper, low, high)
             self.least = np.fmax(self.least, least.max(axis=0, initial=-np.inf))
             holds = most <= FEASIBILITY_TOLERANCE
             broken = least > FEASIBILITY_TOLERANCE
@@ -102,10 +116,11 @@ class Search:
         pieces = np.concatenate([pieces for pieces, _ in self._settled])
         parts = np.concatenate([parts for _, parts in self._settled])
         while parts.shape[1]:
-            spread = parts[..., 1] - parts[..., 0]
+            spread = parts[..., 1] - parts[..., 0]  # infinite where nothing is known
             low, high = parts.sum(axis=0).T
             astride = ((low[:, None] < limits) & (limits < high[:, None])).any(axis=1)
-            wanted = np.where(astride, 0.0, MEAN_SHARPNESS * np.abs(low + high) / 2)
+            known = np.isfinite(low) & np.isfinite(high) & ~astride
+            wanted = np.where(known, MEAN_SHARPNESS * np.maximum(np.abs(low), np.abs(high)), 0.0)
             again: Flags = (spread > wanted / len(pieces)).any(axis=1) & (spread.sum(axis=0) > wanted).any()
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break

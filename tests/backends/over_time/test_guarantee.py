@@ -119,6 +119,24 @@ def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() ->
         assert low <= cubic.means[name][1] and cubic.means[name][0] <= high
 
 
+def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> None:
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        pole = 1 / (phases - math.sqrt(0.5))
+        names = tuple(f"pole, {k}" for k in range(phases.shape[1]))
+        rows = Constraint(
+            name="pole", labels=names, unit="m", scale=1.0, value=-(pole**2).T, upper=MX(0.0), over="instant"
+        )
+        wild = Constraint(name="wild", labels=names, unit="m", scale=1.0, value=pole.T, upper=MX(1e6), over="instant")
+        mean = Constraint(name="mean", unit="m", scale=1.0, value=ca.sum2(pole), upper=MX(0.0), over="mean")
+        return Assembly(objective=MX(0), constraints=(rows, wild, mean), indexes={"mean_m": ca.sum2(pole)})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
+    found = guarantee(replace(waving(PEAK), stretches=(stretch,)), np.array([PEAK, 0.0]))
+    assert found.holds is not True
+    assert {b.row: b.most for b in found.breaches}["wild[pole]"] is None
+    assert "mean_m" not in found.means and "any amount" in str(found)
+
+
 def test_finite_differences_are_sampled_by_definition() -> None:
     found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best("ssp-v5"))
     assert found.holds is None and found.reason.startswith("sampled by definition") and found.word == "?"
