@@ -148,7 +148,6 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         start=_start,
-        long_derivatives=True,
         grid=Grid(intervals=intervals, refined_by="intervals"),
         motion=motion,
         skeleton=skeleton,
