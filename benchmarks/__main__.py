@@ -11,7 +11,7 @@ import platform
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import derivatives, ipopt, kernel, process, search
+from benchmarks import derivatives, ipopt, kernel, process, search, solvers
 from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
@@ -36,6 +36,11 @@ def main() -> None:
         lambda: [] if arguments.quick else derivatives.long_starts(),
         lambda: ipopt.compiled_derivatives(starts),
         lambda: ipopt.formulations(starts),
+        lambda: solvers.condensed_against_ipopt(starts),
+        lambda: solvers.condensed_against_ipopt(starts, "nao-dsp"),
+        lambda: solvers.stairs_plan(starts),
+        lambda: solvers.expected_times(max(5, rounds // 2)),
+        lambda: solvers.starts_at_once(3),
         lambda: process.starts(rounds),
         lambda: overhead.adapter(max(5, rounds // 2)),
     ):

@@ -1,6 +1,6 @@
 """Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -15,16 +15,20 @@ from pathlib import Path
 
 import numpy as np
 
+import metaheuristics
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.problems.humanoid.body import GRAVITY
+from nlp_gait.robots.biped import NAO_LEG_M, biped_of
 from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
+SEARCHES = {name: metaheuristics.algorithm(name) for name in ("pso", "ga", "aco")}
+TIME_S = 2.0  # of NAO's single support
 CLOSURE_M = 1e-9
 
 
@@ -132,6 +136,57 @@ def kernel(files: dict[str, str]) -> Iterator[str]:
         yield cells(name, f"{1e3 * best[name]:.2f}", f"{best[name] / best['nao-ssp']:.2f}")
 
 
+def searches(files: dict[str, str]) -> Iterator[str]:
+    """Searches of 40,000 evaluations, five seeds each: how many end feasible, and the best over IPOPT's best."""
+    yield header("robot", "IPOPT W", *(f"{name}: feasible, best - IPOPT, median" for name in SEARCHES))
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        best = nlp_gait.solve(problem, starts=4, seed=0).objective
+        objective = nlp_gait.compile_objective(problem, threads=1)
+        found = []
+        for search in SEARCHES.values():
+            runs = [metaheuristics.minimize(objective, search, evaluations=40_000, seed=seed) for seed in range(5)]
+            feasible = [run.objective for run in runs if run.feasible]
+            least, middle = (min(feasible), float(np.median(feasible))) if feasible else (np.nan, np.nan)
+            found.append(f"{len(feasible)} of {len(runs)}, {(least - best) / best:+.1e}, {(middle - best) / best:+.1e}")
+        yield cells(name, f"{best:.6g}", *found)
+
+
+def steps(files: dict[str, str]) -> Iterator[str]:
+    """Cheapest single supports of NAO's 2 s times the root of lambda, in the model and played: equal Froude numbers."""
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.plan import plan_of
+    from nlp_gait.simulation.playback import play
+
+    yield header("robot", "leg m", "mass kg", "time s", "step m", "power W", "CoT", "margins mm", "binding", "engine")
+    for name, file in files.items():
+        problem = nlp_gait.load("humanoid-ssp", robot=file)
+        robot, leg = problem.robot, leg_of(problem)
+        assert robot is not None
+        time_s = TIME_S * float(np.sqrt(leg / NAO_LEG_M))
+        problem = problem.fix(single_support_time_s=time_s)
+        solution = nlp_gait.solve(problem, starts=2, seed=0)
+        x = np.array(list(solution.x.values()))
+        indexes, hip = exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
+        plan = plan_of(Result(problem=problem, x=x))
+        m = measure(plan, play(plan), Drive())
+        fate = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"upright, tilt {m.largest_tilt_deg:.1f} deg"
+        step = float(hip[0, 0])
+        yield cells(
+            name,
+            f"{leg:.3f}",
+            f"{robot.mass_kg:.1f}",
+            f"{time_s:.2f}",
+            f"{step:.3f}",
+            f"{indexes['power_W']:.3f}" if solution.success else "not feasible",
+            f"{indexes['power_W'] * time_s / (robot.mass_kg * GRAVITY * step):.3f}",
+            ", ".join(f"{1e3 * indexes[f'dbm_{axis}_min_m']:.0f}" for axis in "xy"),
+            ", ".join(active.name for active in solution.active_constraints[:3]),
+            f"{fate}, {m.measured.total_W:.3f} W",
+        )
+
+
 def cycles(files: dict[str, str]) -> Iterator[str]:
     """Cheapest cycles at NAO's 0.03 m/s times the root of lambda, in the model and over some steps in the engine."""
     from nlp_gait.simulation.drive import Drive
@@ -183,8 +238,6 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
 
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
-    from nlp_gait.robots.biped import biped_of
-
     assert problem.robot is not None
     return biped_of(problem.robot).leg_length_m
 
@@ -193,6 +246,8 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "oracle": oracle,
     "starts": starts,
     "kernel": kernel,
+    "searches": searches,
+    "steps": steps,
     "cycles": cycles,
 }
 

@@ -14,6 +14,7 @@ import argparse
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -160,8 +161,8 @@ def tried(name: str, folder: Path, gait: Path, kills: int, moments: random.Rando
         try:
             process.communicate(timeout=moments.uniform(0.0, duration))
             ends += 1  # it was done: begin anew
-            for path in [killed / file for file in kept(killed)][::2]:
-                path.unlink()
+            shutil.rmtree(killed)
+            killed.mkdir()
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()

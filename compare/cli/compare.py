@@ -18,13 +18,15 @@ from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from nlp_gait.backends.interrupts import Interrupted
-from nlp_gait.errors import InputError
+from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
+DEFAULT_ALGORITHMS = "pso,ga,aco"
+CONDENSED = "condensed"
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
 OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
@@ -38,7 +40,7 @@ def compare(
     ] = None,
     algorithms: Annotated[
         str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
-    ] = "pso,ga,aco",
+    ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
         int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
     ] = 20,
@@ -183,13 +185,28 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 
 
 def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:
-    """The named solvers with IPOPT before them; without starts, those that need none."""
+    """The named solvers with IPOPT before them; without starts, those that need none.
+
+    Where nobody named any, the condensed method takes part too, if there is the compiler that it needs.
+    """
     names = names_in(algorithms)
+    if algorithms == DEFAULT_ALGORITHMS and _has_compiler():
+        names.insert(0, CONDENSED)
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]
     elif IPOPT not in names:
         names.insert(0, IPOPT)
     return [SolverSpec(algorithm=name, polish=polish and name not in GRADIENT_SOLVERS) for name in names]
+
+
+def _has_compiler() -> bool:
+    from nlp_gait.backends.kernel.compiler import find_compiler
+
+    try:
+        find_compiler()
+    except CompilerError:
+        return False
+    return True
 
 
 def _refuse_others(context: typer.Context, flag: str) -> None:

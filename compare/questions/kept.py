@@ -21,7 +21,7 @@ from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers import ipopt
-from nlp_gait.backends.solvers.derivatives import WORTHWHILE_SOLVES
+from nlp_gait.backends.solvers.derivatives import pays
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import CompilerError
@@ -147,7 +147,7 @@ class _KeptSolver(Solver):
         """
         settings = self._solver.settled(problem, self._solves)
         if isinstance(settings, IpoptSettings) and settings.compiled is None:
-            return replace(settings, compiled=problem.long_derivatives or self._solves >= WORTHWHILE_SOLVES)
+            return replace(settings, compiled=pays(problem, self._solves))
         return settings
 
 

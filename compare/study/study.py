@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.disk import rename
-from nlp_gait.errors import InputError, OutputError
+from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
 
 __all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
@@ -102,6 +103,8 @@ def _run_waiting(
     study: Study, records: dict[int, RunRecord], progress: Callable[[Task, RunRecord], None] | None
 ) -> None:
     """Run what is not among the records, by index of the task, and add it."""
+    if study.scheduler is None and study.run is run_task:
+        _build_solvers([task for index, task in enumerate(study.tasks) if index not in records])
     by_title = {(task.problem.title, task.title, task.run): index for index, task in enumerate(study.tasks)}
     for polishing in (False, True):
         waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
@@ -116,6 +119,22 @@ def _run_waiting(
             records[index] = record
             if progress is not None:
                 progress(study.tasks[index], record)
+
+
+def _build_solvers(tasks: Sequence[Task]) -> None:
+    """Make each NLP solver ready for all its runs of a problem, so that what pays for so many is compiled once, here.
+
+    The runs find it in the cache folder, in whatever process they are.
+    """
+    named = [t for t in tasks if not t.is_search and not t.is_own_code and isinstance(t.problem.name, str)]
+    for _, group in groupby(sorted(named, key=_solver_of), key=_solver_of):
+        runs = list(group)
+        with suppress(GaitError):  # each run says it, in its record
+            runs[0].solver().ready_for(runs[0].problem.load(), len(runs))
+
+
+def _solver_of(task: Task) -> tuple[str, str]:
+    return task.problem.title, task.title
 
 
 def keep_record(record: RunRecord, folder: Path) -> Path:

@@ -62,7 +62,6 @@ class GaitProblem:
         skeleton: what is drawn of a motion, from it and the parameters by name, or None.
         playback: what a physics engine needs to play the motion, or None.
         hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
-        long_derivatives: True where one solve by a gradient method pays for compiling its derivatives.
         amplifies_rounding: True where a rounding error may decide a jump, so that another sine gives another gait: its compiled
             code then rounds as the virtual machine does, on every lane count, and is slower.
         starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
@@ -88,7 +87,6 @@ class GaitProblem:
     skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
     playback: Playback | None = None
     hessian: Literal["exact", "limited-memory"] = "exact"
-    long_derivatives: bool = False
     amplifies_rounding: bool = False
     starts: int = 20
     searchable: bool = True

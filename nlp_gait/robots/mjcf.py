@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 from functools import cache
@@ -14,11 +15,12 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.robots.fields import sound
+from nlp_gait.robots.fields import LARGEST_NUMBER, sound
 from nlp_gait.robots.tree import inertia_moments, point_inertia
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+LOG = logging.getLogger("nlp_gait")
 RIM = 24  # points of a cylinder's edge
 UNLIMITED_RAD_S = 1000.0  # MJCF knows no limit of speed
 
@@ -109,11 +111,18 @@ def _compiled(path: str) -> Any:
 @cache
 def _read(path: str, changed_ns: int) -> Any:
     mujoco = import_module("mujoco")
+    mujoco.set_mju_user_warning(lambda said: LOG.warning("robot file %r: %s", path, said))  # else it writes a file
     try:
-        return mujoco.MjModel.from_xml_path(path)
+        model = mujoco.MjModel.from_xml_path(path)
+        for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
+            if not sound(getattr(model, name)):
+                raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
+        return model
     except Exception as error:  # ValueError, and whatever a plugin or decoder raises
         said = " ".join(str(error).split())[:300] or type(error).__name__
         raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {said}") from error
+    finally:
+        mujoco.set_mju_user_warning(None)
 
 
 def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from benchmarks.by_hand import ByHand
+
+pytest.importorskip("pinocchio")
+from benchmarks.by_hand import ByHand  # noqa: E402
 
 # Two programs in double precision.
 TOLERANCE = 1e-11

@@ -71,3 +71,9 @@ def test_the_printed_scheme_acts_at_the_start_and_contacts_press_only_below_the_
         force += (-stiffness * h - damping * (n @ V)) * (n - friction * np.sign(t @ V) * t)
     assert numbers(equations.force) == pytest.approx(force, rel=1e-12)
     assert np.array(ca.evalf(equations.mass)) == pytest.approx(M)
+
+
+def test_a_quantum_of_constant_acceleration() -> None:
+    following = after(STATE, ca.SX([200.0, -300.0]), QUANTUM)
+    assert numbers(following.q) == pytest.approx(Q + V * 0.01 + np.array([0.01, -0.015]))
+    assert numbers(following.v) == pytest.approx(V + np.array([2.0, -3.0]))

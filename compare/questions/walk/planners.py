@@ -118,7 +118,8 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
         )
         options = problem.options
         walk = cart_table_walk(footsteps, robot=str(options["robot"]), intervals=int(options["intervals"]))
-        shared = {name: value for name, value in problem.values.items() if name in walk.problem.values}
+        known = {parameter.name for parameter in walk.problem.parameters}
+        shared = {name: value for name, value in problem.values.items() if name in known}
         return Result(problem=walk.problem.with_values(**shared), x=np.array(walk.x))
 
     def cheapest() -> float | None:

@@ -174,7 +174,7 @@ class _Method:
         shared |= {"jacobian": np.zeros(columns.nnz()), "hessian": np.zeros(curvature.nnz())}
         self._shared = shared
         where_g, where_slope = (
-            np.array(s.get_triplet()).max(axis=0) for s in (g.sparsity_out(0), slope.sparsity_out(1))
+            np.array(s.get_triplet(), dtype=int).max(axis=0) for s in (g.sparsity_out(0), slope.sparsity_out(1))
         )
         point = (shared["x"], self._p)
         cost_at, rows_at = _Buffered(f, point, (shared["f"],)), _Buffered(g, point, (dense_g,))

@@ -9,18 +9,22 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.errors import CompilerError
 from nlp_gait.problem import GaitProblem
 
-__all__ = ["CompiledNlp", "derivatives_of", "worthwhile"]
+__all__ = ["CompiledNlp", "derivatives_of", "pays", "worthwhile"]
 
-# Solves of NAO's single support from which compilation pays: 0.2 s saved on each against 2.5 s of compilation.
-WORTHWHILE_SOLVES = 12
+# Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
+# against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.
+WORTHWHILE_SIZE = 1500
+
+
+def pays(problem: GaitProblem, solves: int) -> bool:
+    """Whether solves take so long, or are so many, that compilation pays; what the cache folder holds has no say."""
+    return solves * nlp_model(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
 
 
 def worthwhile(problem: GaitProblem, solves: int, *, second: bool) -> bool:
-    """Whether compiled functions pay: one solve takes long, or there are many, or the cache folder has them already."""
-    if problem.long_derivatives or solves >= WORTHWHILE_SOLVES:
-        return True
+    """Whether to use compiled functions: they pay, or the cache folder has them already."""
     try:
-        return is_built(nlp_model(problem).nlp, second=second)
+        return pays(problem, solves) or is_built(nlp_model(problem).nlp, second=second)
     except CompilerError:
         return False
 

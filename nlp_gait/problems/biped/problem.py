@@ -41,7 +41,6 @@ def problem_of(
     *,
     start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
     searchable: bool = True,
-    long_derivatives: bool = False,
 ) -> GaitProblem:
     """Problem of one phase, without what drawing and playing need.
 
@@ -51,7 +50,6 @@ def problem_of(
         phase: with its parts and its goal.
         start: start point; None for one within the bounds.
         searchable: False for a problem that only gradient methods can solve.
-        long_derivatives: True where one solve pays for compiling its derivatives.
     """
 
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
@@ -69,5 +67,4 @@ def problem_of(
         start=start,
         durations=(phase.duration,),
         searchable=searchable,
-        long_derivatives=long_derivatives,
     )

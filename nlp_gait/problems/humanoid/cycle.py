@@ -128,7 +128,6 @@ def _problem(body: Humanoid, cycle: WalkingCycle, sharing: Sharing, at_given_spe
         motion=lambda at: joined(cycle.signals(at)),
         start=within_reach(names, (REACH_MARGIN, *((SPEED,) if at_given_speed else ())), reach, own),
         durations=tuple(TIMES.values()),
-        long_derivatives=bool(sharing.variables),
     )
     return with_body(problem, body, cycle.robot.armatures_kgm2, repeats=True)
 

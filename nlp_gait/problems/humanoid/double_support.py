@@ -83,7 +83,6 @@ def humanoid_dsp(
         phase,
         body,
         start=sharing.start_of(phase.names, splines.start_of(phase.names)),
-        long_derivatives=bool(sharing.variables),
     )
 
 

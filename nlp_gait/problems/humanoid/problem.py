@@ -129,13 +129,10 @@ def staged(
     body: Humanoid,
     *,
     start: Start | None = None,
-    long_derivatives: bool = False,
 ) -> GaitProblem:
     """Problem of one phase; the robot's name goes before the title."""
     start = within_reach(phase.names, (REACH_MARGIN,), lambda at: phase.samples(at, Exact()).reach, start)
-    problem = problem_of(
-        name, f"{body.biped.full.name}, {title}", phase, start=start, long_derivatives=long_derivatives
-    )
+    problem = problem_of(name, f"{body.biped.full.name}, {title}", phase, start=start)
     return with_body(problem, body, phase.robot.armatures_kgm2)
 
 

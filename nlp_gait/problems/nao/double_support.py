@@ -96,7 +96,6 @@ def nao_dsp(
         phase,
         robot,
         start=sharing.start_of(phase.names, splines.start_of(phase.names)),
-        long_derivatives=bool(sharing.variables),
     )
 
 

@@ -30,10 +30,9 @@ def phase_problem(
     *,
     start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
     searchable: bool = True,
-    long_derivatives: bool = False,
 ) -> GaitProblem:
     """Problem of one phase of NAO; ``robot`` is its name or file, the others are those of ``problem_of``."""
-    problem = problem_of(name, title, phase, start=start, searchable=searchable, long_derivatives=long_derivatives)
+    problem = problem_of(name, title, phase, start=start, searchable=searchable)
     return with_robot(replace(problem, stretches=phase.stretch()), robot, phase.robot.armatures_kgm2)
 
 

@@ -10,16 +10,21 @@ from casadi import SX
 
 from nlp_gait.problem import Array, Signals
 from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problems.biped.skeleton import skeleton as any_skeleton
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
 
 ON_GROUND = 1e-6  # [m]; a sole that is higher does not bear load
+DRAWN = {"Neck", "Head", *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow"))}
+DRAWN |= {"l_wrist", "r_wrist"}
 LETTER = {LEFT: "L", RIGHT: "R"}
 
 
 def skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-    """What draws a robot with NAO's links."""
+    """What draws a robot with NAO's links; one that has others is drawn as any biped."""
+    if not DRAWN <= set(robot.links):
+        return any_skeleton(robot)
     return lambda signals, parameters: _skeleton(robot, signals)
 
 

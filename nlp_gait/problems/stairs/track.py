@@ -160,7 +160,6 @@ def stairs_track(
         start=start,
         starts=1,
         amplifies_rounding=True,
-        long_derivatives=True,
         motion=motion,
         skeleton=skeleton,
         playback=playback(performance),

@@ -20,7 +20,9 @@ static const int BOXES = 6;
 
 class InteriorPoint {
  public:
-  InteriorPoint(const Nlp& nlp, const Settings& settings) : nlp(nlp), settings(settings), n(nlp.n), m(nlp.m) {}
+  // Adaptive: the barrier parameter is chosen anew in each iteration, as long as that makes progress.
+  InteriorPoint(const Nlp& nlp, const Settings& settings, bool adaptive)
+      : nlp(nlp), settings(settings), n(nlp.n), m(nlp.m), may_adapt(adaptive) {}
   int iterations = 0;
 
   int solve(double* x_io, double* y_io, double* bounds_out, const double* lower, const double* upper,
@@ -44,6 +46,7 @@ class InteriorPoint {
   const Nlp& nlp;
   const Settings& settings;
   const int n, m;
+  const bool may_adapt;
   Newton newton;
   vector<Side> sides;
   Vector x, t, a, b, y, g, df, raw_slopes, residual, lower_row, upper_row, row_scale;
@@ -319,7 +322,6 @@ class InteriorPoint {
   }
   // Barrier parameter whose step has the best linearised optimality conditions.
   double best_barrier(double average, double dual2) {
-    Step none, whole;
     direction(0, residual, none), direction(average, residual, whole);
     double best = INF, chosen = 1, primal2 = 0;
     for (double value : residual) primal2 += value * value;
@@ -350,6 +352,18 @@ class InteriorPoint {
       if (quality < best) best = quality, chosen = sigma;
     }
     return chosen * average;
+  }
+  // The step for a barrier parameter lies on the line through these two.
+  Step none, whole;
+  void between(double share, Step& step) const {
+    auto mix = [share](const Vector& u, const Vector& v, Vector& out) {
+      out.resize(u.size());
+      for (size_t k = 0; k < u.size(); k++) out[k] = u[k] + share * (v[k] - u[k]);
+    };
+    mix(none.x, whole.x, step.x), mix(none.y, whole.y, step.y), mix(none.t, whole.t, step.t);
+    mix(none.a, whole.a, step.a), mix(none.b, whole.b, step.b);
+    step.z.resize(BOXES);
+    for (int s = 0; s < BOXES; s++) mix(none.z[s], whole.z[s], step.z[s]);
   }
   double barrier_value(double cost, const Vector& at_x, const Vector& at_t, const Vector& at_a,
                        const Vector& at_b) const {
@@ -396,7 +410,7 @@ class InteriorPoint {
   }
   int iterate() {
     const double least = settings.tolerance / 1000;
-    bool adaptive = !settings.warm;
+    bool adaptive = may_adapt;
     int acceptable = 0, failures = 0, stuck = 0;
     mu = settings.warm ? settings.barrier : std::max(complementarity(), least);
     Step step, correction;
@@ -433,17 +447,22 @@ class InteriorPoint {
       for (const Pair& p : progress) improves = improves && (value <= p.first - margin || theta <= p.second - margin);
       if (adaptive && !improves)
         adaptive = false, mu = std::max(0.8 * average, least), filter.clear();
-      else if (!adaptive && improves && !settings.warm)
+      else if (!adaptive && improves && may_adapt)
         adaptive = true;
       if (adaptive) {
         progress.push_back({value, theta}), filter.clear();
-        mu = std::min(std::max(best_barrier(average, e.dual2), least), 1e5);
+        mu = std::min(
+            std::max({best_barrier(average, e.dual2), least, std::min(average, 1e-5 * std::max(e.dual, e.primal))}),
+            1e5);
       } else {
         while (mu > least && errors(mu).all <= 10 * mu)
           mu = std::max(least, std::min(0.2 * mu, std::pow(mu, 1.5))), filter.clear();
       }
       const double tau = std::max(FRACTION, 1 - mu);
-      direction(mu, residual, step);
+      if (adaptive)
+        between(mu / average, step);
+      else
+        direction(mu, residual, step);
       Pair most = longest(step, tau);
       const double phi = barrier_value(value, x, t, a, b), noise = 10 * EPS * std::fabs(phi);
       double slope = 0;
@@ -540,10 +559,18 @@ class InteriorPoint {
 EXPORTED int nlp_gait_condensed(const Nlp* nlp, const Settings* settings, double* x, double* y, double* bounds,
                                 const double* lower, const double* upper, const double* row_lower,
                                 const double* row_upper, int* iterations) {
-  InteriorPoint method(*nlp, *settings);
-  const int status = method.solve(x, y, bounds, lower, upper, row_lower, row_upper);
-  *iterations = method.iterations;
-  return status;
+  const Vector x0(x, x + nlp->n), y0(y, y + nlp->m);
+  *iterations = 0;
+  for (bool adaptive : {true, false}) {  // what the fast strategy cannot do, the patient one may
+    if (settings->warm && adaptive) continue;
+    std::copy(x0.begin(), x0.end(), x), std::copy(y0.begin(), y0.end(), y);
+    InteriorPoint method(*nlp, *settings, adaptive);
+    const int status = method.solve(x, y, bounds, lower, upper, row_lower, row_upper);
+    *iterations += method.iterations;
+    const bool failed = status == INFEASIBLE || status == ITERATIONS || status == TOO_SMALL || status == SINGULAR;
+    if (!adaptive || !failed) return status;
+  }
+  return INVALID;
 }
 
 // Rows of the matrix that is factorised.

@@ -80,7 +80,6 @@ def nao_cycle(
         start=sharing.start_of(names, start if at_given_speed else None),
         durations=tuple(TIMES.values()),
         stretches=cycle.stretches,
-        long_derivatives=bool(sharing.variables),
     )
     return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
 
