@@ -219,7 +219,7 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         tree = Path(folder) / "tree"
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__", "docs"))
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__"))
         os.chdir(tree)
         sys.dont_write_bytecode = True
         sys.path[:0] = [str(tree)]
