@@ -1,6 +1,6 @@
 """What the servos are told: set-points between which it is linear or held, shifted by what is fed forward."""
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -55,6 +55,8 @@ def test_drives_by_name_and_settings_that_do_not_exist():
     )
     with pytest.raises(InputError, match="feed forward of a drive must be one of torque, velocity, none, got 'all'"):
         replace(Drive(), feed_forward="all")
+    with pytest.raises(FrozenInstanceError):  # drives by name are everybody's
+        DRIVES["held"].period_s = 0.01
     with pytest.raises(InputError, match="interpolation of a drive must be one of linear, held, got 'cubic'"):
         Drive(interpolation="cubic")
 

@@ -109,9 +109,9 @@ def test_limits_that_are_met_are_named_with_their_share() -> None:
     assert found.saturated == {"LHipRoll": pytest.approx(500 / 2001)} and found.joint_limits == ("LHipRoll",)
     assert measured().saturated == found.beyond_limit == {} and measured().joint_limits == ()
     plan = planned()
-    tau = {"tau": plan.signals.arrays["tau"] * 2.0 * limit}  # of the hip: 0.5 times 2
-    tau["tau"] = tau["tau"] * (1.0, 1.5)
-    strained = replace(plan, signals=replace(plan.signals, arrays={**plan.signals.arrays, **tau}))
+    tau = plan.signals.arrays["tau"].copy()
+    tau[50] = 2.0 * limit, -1.5 * limit  # at one moment
+    strained = replace(plan, signals=replace(plan.signals, arrays={**plan.signals.arrays, "tau": tau}))
     expected = {"LHipRoll": 1.5, "LKneePitch": 2.0 * limit / ROBOT.joint("LKneePitch").torque_limit_Nm}
     found = measure(strained, traced(), Drive()).beyond_limit
     assert found == {name: pytest.approx(share) for name, share in expected.items() if share > 1.0}
@@ -137,6 +137,23 @@ def test_a_foot_lands_where_the_ground_first_carries_it_for_3_ms() -> None:
     landing = found.landings["right"]
     assert landing.planned_m == pytest.approx((0.06, -0.05)) and landing.measured_m == pytest.approx((0.063, -0.054))
     assert landing.error_m == pytest.approx(0.005)
+
+
+def test_where_no_foot_stands_throughout_slip_is_that_of_each_support() -> None:
+    plan = planned()
+    t = plan.signals.arrays["t"]
+    first, second = swing(np.clip(2 * t, 0.0, 1.0)), swing(np.clip(2 * t - 1, 0.0, 1.0))
+    feet = {"left_foot": first * (1, -1, 1), "right_foot": second}
+    walking = replace(plan, signals=replace(plan.signals, arrays={**plan.signals.arrays, **feet}))
+    assert walking.supports == ()
+    trace = traced()
+    paths = np.stack([walking.at(name, trace.t) for name in feet], axis=1)
+    assert measure(walking, replace(trace, feet=paths), Drive()).slip_m < 3e-4  # of splines
+    paths[1:, 1, 0] += (
+        0.005  # the right foot stands in the first half: here 5 mm ahead of where it began, then 10 behind
+    )
+    paths[200:900, 1, 0] -= 0.015
+    assert measure(walking, replace(trace, feet=paths), Drive()).slip_m == pytest.approx(0.010, abs=3e-4)
 
 
 def test_pressure_is_compared_with_the_plan_and_with_the_feet() -> None:
