@@ -201,6 +201,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
         figures = evaluated(at_speed, x).indexes
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
+        assert figures["energy_J_per_m"] == pytest.approx(energy / step, rel=ROUNDING)
         weight = load_robot("nao-v5").mass_kg * GRAVITY
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
 
