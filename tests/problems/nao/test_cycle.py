@@ -231,6 +231,15 @@ def test_the_published_limits_are_the_defaults() -> None:
     assert problem.value("torque_change_limit_Nm") == 1.2
 
 
+def test_the_hip_and_the_step_range_over_shares_of_the_legs_length() -> None:
+    """Which is 0.2029 m."""
+    problem = load("nao-cycle")
+    ranges = {"hip_x_lift_off_m": (-0.051, 0.051), "hip_x_touch_down_m": (-0.02, 0.101), "step_length_m": (0.02, 0.122)}
+    for name, bounds in ranges.items():
+        k = problem.variable_index(name)
+        assert (problem.lower[k], problem.upper[k]) == bounds
+
+
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
