@@ -158,10 +158,7 @@ class _KeptSolver(Solver):
         return None if kept is None else _outcome(kept)
 
     def _pinned(self, problem: GaitProblem) -> Solver:
-        """The solver with its settings, of which none depends on what the cache of compiled functions holds by now.
-
-        Compiled and interpreted functions differ in the last bits, and a question that goes on must not change between them.
-        """
+        """The solver with all its settings; whether functions are compiled is one of them, for it changes last bits."""
         settings = self._solver.settled(problem, self._solves)
         if isinstance(settings, IpoptSettings) and settings.compiled is None:
             return replace(settings, compiled=pays(problem, self._solves))

@@ -15,6 +15,7 @@ from compare.judge import evaluate
 from compare.study.definition import HASH, differences, key_of, without_hashes
 from compare.study.record import RunRecord, Verdict, read_record, run_file
 from compare.study.runner import Run, run_task
+from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
 from compare.study.workers import default_jobs, run_jobs
 from nlp_gait.backends.interrupts import Interrupted
@@ -122,7 +123,7 @@ def _run_waiting(
 
 
 def _build_solvers(tasks: Sequence[Task]) -> None:
-    """Make each NLP solver ready for all its runs of a problem, so that what pays for so many is compiled once, here.
+    """Make each NLP solver ready for its runs of a problem, so that what pays for many is compiled once, here.
 
     The runs find it in the cache folder, in whatever process they are.
     """
@@ -130,7 +131,7 @@ def _build_solvers(tasks: Sequence[Task]) -> None:
     for _, group in groupby(sorted(named, key=_solver_of), key=_solver_of):
         runs = list(group)
         with suppress(GaitError):  # each run says it, in its record
-            runs[0].solver().ready_for(runs[0].problem.load(), len(runs))
+            runs[0].solver().ready_for(runs[0].problem.load(), PLANNED_RUNS)
 
 
 def _solver_of(task: Task) -> tuple[str, str]:

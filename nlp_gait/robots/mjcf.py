@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import os
-from functools import cache
+from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -39,6 +39,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
         RobotDataError: it does not read the file.
         ValueError: there is no robot in it, or a body with several hinges.
     """
+    _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compiled(path)
     root, frames, carriers = _tree(model, path)
     names = {i: model.body(i).name or f"body {i}" for i in frames}
@@ -99,17 +100,17 @@ def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
 
 
 def _compiled(path: str) -> Any:
-    """MuJoCo's model of a file, read anew where the file has changed."""
+    """MuJoCo's model of a file, as it was when its links and joints were read."""
     if find_spec("mujoco") is None:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
     read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses what is no regular file
-    return _read(path, os.stat(path).st_mtime_ns)
+    return _read(os.path.abspath(path), path)
 
 
-@cache
-def _read(path: str, changed_ns: int) -> Any:
+@lru_cache(maxsize=4)
+def _read(place: str, path: str) -> Any:
     mujoco = import_module("mujoco")
     mujoco.set_mju_user_warning(lambda said: LOG.warning("robot file %r: %s", path, said))  # else it writes a file
     try:

@@ -35,6 +35,10 @@ SOLVE = ("solve", "walk12", "--starts", "1")
 KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (2, ("list",)),
     (2, ("list", "walk12", "--json")),
+    (4, ("list", "--robot", "robot.json", "--json")),
+    (4, ("list", "--robot", "crooked.urdf")),
+    (4, ("list", "--robot", "crooked.xml")),
+    (1, ("list", "--robot", "nao-v6", "--out", "out/robot.png")),
     (8, EVALUATE),
     (6, (*EVALUATE, "--set", "torque_change_limit_Nm=1", "--option", "intervals=8", "--json")),
     (4, (*EVALUATE, "--robot", "robot.json", "--derivatives", "finite-difference")),
@@ -44,6 +48,10 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (2, (*SEARCH, "--fix", "double_support_time_s=2", "--time-limit", "1", "--out", "searched")),
     (1, (*SOLVE, "--x0", "0.1,0.1,0.2,1", "--json")),
     (1, (*SOLVE, "--set", "f1max=2", "--out", "out/solved.json")),
+    (1, (*SOLVE, "--jobs", "2", "--seed", "5")),
+    (2, ("export-solver", "walk12", "--to", "out/solver", "--set", "lambda=0.3", "--intervals", "20")),
+    (4, ("certainty", "--check", "certificate.json", "--seed", "1", "--json")),
+    (2, ("walk", "--over", "speed_m_s=0.02,0.04", "--starts", "1", "--baseline", "cart-tables", "--out", "walked")),
     (1, ("sweep", "walk12", "--over", "lambda=0.2,0.3", "--starts", "1", "--out", "swept")),
     (4, ("compare", "--config", "study.toml", "--out", "study", "--jobs", "1", "--runs", "3")),
     (4, ("compare", "--resume", "--out", "absent")),
@@ -62,7 +70,7 @@ SEED_LINES = (*KNOWN_LINES, *((1, (name, "nothing", "--out", "out")) for name in
 COUNTS = ("--starts", "--runs", "--evaluations", "--jobs", "--poses", "--period-ms")
 BAD_COUNTS = ("0", "-1", "1.5", "", "nan", "many", "9" * 400, "\ud800")
 # Little mutated: with right values they take minutes.
-SLOW = ("compare", "reproduce", "simulate", "animate", *STUDIES)
+SLOW = ("compare", "reproduce", "simulate", "animate", "walk", *STUDIES)
 HOSTILE = (
     *(text for text in TEXTS if text not in PROBLEMS),
     *("nan", "inf", "-inf", "1e999", "1e308", "-1", "0", "9" * 400, "=", "a=", "=1", "a=b", "--", "-", "--help", "--x"),
@@ -135,6 +143,9 @@ def workplace(folder: Path) -> Iterator[None]:
     (place / "folder.json").mkdir()
     (place / "result.json").write_bytes((SEEDS / "result" / "by-hand.json").read_bytes())
     (place / "robot.json").write_bytes((SEEDS / "robot" / "heavy.json").read_bytes())
+    (place / "crooked.urdf").write_bytes((SEEDS / "biped" / "crooked.urdf").read_bytes())
+    (place / "crooked.xml").write_bytes((SEEDS / "mjcf" / "crooked.xml").read_bytes())
+    (place / "certificate.json").write_bytes((SEEDS / "certificate" / "closed.json").read_bytes())
     (place / "broken.json").write_bytes(b'{"schema": 1, "schema": 1}')
     (place / "study.toml").write_bytes((SEEDS / "study" / "least.toml").read_bytes())
     (place / "loop.json").symlink_to("loop.json")

@@ -13,6 +13,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from compare.papers.nao.runs import read_points, write_points
+from compare.questions.certainty.certificate import check, read_certificate
 from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
 from compare.study.settings import StudySettings, read_settings
@@ -68,8 +69,9 @@ def read_result(path: Path) -> None:
 
 def read_a_record(path: Path) -> None:
     """A record: written again it is the same file."""
-    record = read_record(path)
-    same(_plain(path), without_nan(record.to_json()), "record")
+    record, raw = read_record(path), _plain(path)
+    raw["verdict"].setdefault("guaranteed", None)  # of records from before it was asked
+    same(raw, without_nan(record.to_json()), "record")
 
 
 def read_a_manifest(path: Path) -> None:
@@ -126,6 +128,29 @@ def read_biped(path: Path) -> None:
         near(float(limit.get("effort", "")), biped.model.joint(name).torque_limit_Nm, "effort")
 
 
+def read_mjcf(path: Path) -> None:
+    """A robot from an MJCF file: it weighs what MuJoCo finds by itself, and has that file's ranges."""
+    import mujoco
+
+    robot = load_robot(str(path))
+    biped_of(robot)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
+    near(max(float(model.body_subtreemass[i]) for i in tops), robot.mass_kg, "mass")
+    for name, joint in robot.joints.items():
+        found = model.joint(int(name.split()[-1]) if name.startswith("joint ") else name)
+        if model.jnt_limited[found.id]:
+            for wish, end in zip(found.range - found.qpos0, joint.limits_rad, strict=True):
+                near(float(wish), end, f"{name}.range")
+
+
+def read_a_certificate(path: Path) -> None:
+    """A certificate, read and followed: it says what stands there, and what passes has the incumbent's objective."""
+    file, raw = read_certificate(path), _plain(path)
+    same({"schema": 1, **raw}, without_nan(file.to_json()), "certificate")
+    check(file, paths=2)
+
+
 def read_a_motion(path: Path) -> None:
     """A motion: its times and angles are those of the file, and it is the same when written again."""
     points = read_motion(path)
@@ -162,6 +187,8 @@ FORMATS = (
     Format(name="robot", file="robot.json", mutate=mutated_json, read=read_robot),
     Format(name="urdf", file="robot.urdf", mutate=mutated_xml, read=read_urdf),
     Format(name="biped", file="robot.urdf", mutate=mutated_xml, read=read_biped),
+    Format(name="mjcf", file="robot.xml", mutate=mutated_xml, read=read_mjcf),
+    Format(name="certificate", file="certificate.json", mutate=mutated_json, read=read_a_certificate),
     Format(name="motion", file="gait.motion", mutate=mutated_lines, read=read_a_motion),
     Format(name="step", file="one.json", mutate=mutated_json, read=read_step),
     Format(name="points", file="points.npz", mutate=mutated_bytes, read=read_archive),

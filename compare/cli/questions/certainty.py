@@ -11,7 +11,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
-from compare.cli.options import AnyProblem, AsJson, Seed
+from compare.cli.options import AnyProblem, AsJson, Code, Seed, name_all
 from compare.cli.questions.answers import Output
 
 
@@ -32,6 +32,7 @@ def certainty(
         Path | None, typer.Option(help="Certificate to check instead: random parts of its proof are made again.")
     ] = None,
     paths: Annotated[int, typer.Option(min=1, max=100_000, help="Parts of a proof to check.")] = 200,
+    code: Code = None,
     out: Annotated[Path, typer.Option(help="Folder; finished batches in it are kept.")] = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
@@ -41,6 +42,7 @@ def certainty(
     `nlp-gait certainty --check certainty/walk12-certificate.json`
     """
     if check is not None:
+        name_all(code)
         _check(check, paths, seed, as_json)
         return
     from compare.questions.certainty.report import certainty_answer

@@ -21,7 +21,9 @@ from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing
 from nlp_gait.problem import GaitProblem, load
+from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.references import named_as
 
 SCHEMA = 1
 PATHS = 200
@@ -96,7 +98,10 @@ def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
     """
     proof = file.certificate
     problem = _problem(file.problem)
-    at = exact_model(problem).at(np.array(proof.x), problem.p)
+    x = problem.check_x(np.array(proof.x))
+    if (np.maximum(problem.lower - x, x - problem.upper) > FEASIBILITY_TOLERANCE * problem.scale).any():
+        raise InputError("the certificate's incumbent is outside the bounds of its variables")
+    at = exact_model(problem).at(x, problem.p)
     objective = problem.objective.sign * at.cost
     if not proof.closed:
         raise InputError("the certificate is of a proof that has not ended: there is nothing to check but its bound")
@@ -131,7 +136,9 @@ def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
 
 def _problem(description: Mapping[str, Any]) -> GaitProblem:
     with refusing("the certificate's problem cannot be made", InputError):
-        problem = load(description["name"], **description["options"]).with_values(**description["parameters"])
+        stored = decoded(StoredProblem, description, "problem")
+        name = named_as(stored.name, "problem", "the certificate")
+        problem = load(name, **stored.options).with_values(**stored.parameters)
     if problem_part(problem) != dict(description):
         raise InputError(f"problem {problem.name!r} is another one today than in the certificate; prove it anew")
     return problem

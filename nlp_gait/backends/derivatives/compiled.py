@@ -17,7 +17,7 @@ from nlp_gait.backends.derivatives.assembly import plan_of
 from nlp_gait.backends.derivatives.source import casadi_source
 from nlp_gait.backends.derivatives.structure import structure_of
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.library_cache import is_cached, load_library
+from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError
 from nlp_gait.problem import Array
 
@@ -96,11 +96,6 @@ class CompiledNlp:
         """Of the Lagrangian."""
         (_, slope), (_, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
         return _numbers([slope + J.T @ weights])
-
-
-def is_built(nlp: Mapping[str, MX], *, second: bool = True) -> bool:
-    """Whether the cache folder has the library of an NLP."""
-    return is_cached(_stands_for(nlp, second), find_compiler(), _flags())
 
 
 def _stands_for(nlp: Mapping[str, MX], second: bool) -> str:

@@ -72,11 +72,6 @@ def load_library(
     return loaded, library
 
 
-def is_cached(source: str, compiler: Compiler, flags: Sequence[str]) -> bool:
-    """Whether there is a library of a source, for arguments of ``load_library``."""
-    return bool(_found(_key(source, compiler, flags)))
-
-
 def _found(key: str) -> list[Path]:
     folders = [cache_folder(), *_private_folder_made()]
     return [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from nlp_gait.backends.derivatives.compiled import CompiledNlp, is_built
+from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.errors import CompilerError
 from nlp_gait.problem import GaitProblem
 
-__all__ = ["CompiledNlp", "derivatives_of", "pays", "worthwhile"]
+__all__ = ["CompiledNlp", "derivatives_of", "pays"]
 
 # Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
 # against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.
@@ -17,16 +16,12 @@ WORTHWHILE_SIZE = 1500
 
 
 def pays(problem: GaitProblem, solves: int) -> bool:
-    """Whether solves take so long, or are so many, that compilation pays; what the cache folder holds has no say."""
+    """Whether solves take so long, or are so many, that compilation pays.
+
+    What the cache folder holds has no say: compiled and interpreted functions differ in the last bits, and the same call gives
+    the same result.
+    """
     return solves * nlp_model(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
-
-
-def worthwhile(problem: GaitProblem, solves: int, *, second: bool) -> bool:
-    """Whether to use compiled functions: they pay, or the cache folder has them already."""
-    try:
-        return pays(problem, solves) or is_built(nlp_model(problem).nlp, second=second)
-    except CompilerError:
-        return False
 
 
 def derivatives_of(solver: ca.Function) -> dict[str, ca.Function]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.solvers.derivatives import CompiledNlp, derivatives_of, worthwhile
+from nlp_gait.backends.solvers.derivatives import CompiledNlp, derivatives_of, pays
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
@@ -97,7 +97,7 @@ class IpoptSettings(Solver):
         chosen = replace(self.settled(problem, solves), compiled=bool(self.compiled))
         try:
             if self.compiled is None:
-                chosen = replace(chosen, compiled=worthwhile(problem, solves, second=chosen.hessian == "exact"))
+                chosen = replace(chosen, compiled=pays(problem, solves))
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:

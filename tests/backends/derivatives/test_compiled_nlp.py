@@ -10,7 +10,7 @@ from casadi import DM, MX, SX
 import nlp_gait
 from nlp_gait.backends.derivatives import sample
 from nlp_gait.backends.derivatives.assembly import plan_of
-from nlp_gait.backends.derivatives.compiled import CompiledNlp, is_built
+from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.derivatives.structure import NotMapped, structure_of
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.problem import Array
@@ -71,7 +71,6 @@ def test_single_support_gives_the_same_values_and_derivatives_also_outside_the_b
     starts = [model.start(problem, model.point(rng.uniform(-0.5, 1.5, n)), model.widths[0]) for _ in range(5)]
     points = np.array([w + np.append(np.zeros(n), rng.normal(0.0, 0.1, len(w) - n)) for w in starts])
     assert compared(model.nlp, np.append(problem.p, model.widths[0]), points) < 1e-10
-    assert is_built(model.nlp)
 
 
 def test_a_solver_of_compiled_functions_takes_the_same_path() -> None:

@@ -17,7 +17,7 @@ from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.problem import Constraint, GaitProblem, load
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Outcome, Solution
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import corner, toy
+from tests.backends.toys import corner, row, toy
 
 # Step of a limit for the difference quotient; the optimum's curvature and IPOPT's tolerance of 1e-8 leave 1e-3 of a price.
 PRICE_STEP, PRICE_TOLERANCE = 1e-5, 5e-3
@@ -95,6 +95,17 @@ def test_the_same_seed_gives_the_same_start_and_the_same_end(double_support: tup
     assert second.starts[0].x0.tolist() == first.starts[0].x0.tolist()
     assert second.starts[0].x.tolist() == first.starts[0].x.tolist()  # bit for bit
     assert first.starts[1].x0.tolist() != first.starts[0].x0.tolist()
+
+
+@pytest.mark.slow
+def test_compiled_functions_in_the_cache_folder_do_not_change_a_solve() -> None:
+    def bowl() -> GaitProblem:
+        return toy(lambda x, y, limit, ops: (x**4 + y**2, (row(x * y, lower=limit),)))
+
+    first = solve(bowl(), starts=1, seed=0)
+    assert IpoptSettings(compiled=True).ready_for(bowl()).compiled
+    assert not IpoptSettings().ready_for(bowl()).compiled
+    assert solve(bowl(), starts=1, seed=0).starts[0].x.tolist() == first.starts[0].x.tolist()  # bit for bit
 
 
 @pytest.mark.slow

@@ -15,12 +15,13 @@ from compare.questions.certainty import branch_and_bound, certificate
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, OwnCodeError
 from nlp_gait.gaitbench.known import known
 from nlp_gait.problem import GaitProblem
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 
+SHIPPED = Path(certificate.__file__).with_name("certificates")
 SEED = 2
 PROBLEM = toy(two_valleys, limit=-9.0)
 BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
@@ -95,6 +96,34 @@ def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> N
     ):
         with pytest.raises(InputError, match=message):
             check(replace(file, certificate=replace(honest, **change)))
+
+
+def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text("raise SystemExit('it ran')\n")
+    raw = json.loads((SHIPPED / "walk12-lambda-1-1-percent.json").read_text())
+    raw["problem"]["name"] = f"{tmp_path / 'own.py'}:problem"
+    (tmp_path / "certificate.json").write_text(json.dumps(raw))
+    with pytest.raises(OwnCodeError, match="certificate needs code of your own.*--code"):
+        check(read_certificate(tmp_path / "certificate.json"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"problem": {"parameters": 0}}, r"problem\.parameters must be an object, got 0"),
+        ({"problem": {"options": None}}, r"problem\.options must be an object"),
+        ({"certificate": {"x": [0.05, 0.1]}}, "walk12 has 4 variables"),
+        ({"certificate": {"x": [-1.0, 0.1, 0.001, 0.008]}}, "outside the bounds"),
+    ],
+    ids=["parameters", "options", "too short", "outside"],
+)
+def test_a_damaged_certificate_is_refused(change: dict[str, dict[str, object]], message: str, tmp_path: Path) -> None:
+    raw = json.loads((SHIPPED / "walk12-lambda-1-1-percent.json").read_text())
+    for part, values in change.items():
+        raw[part] |= values
+    (tmp_path / "certificate.json").write_text(json.dumps(raw))
+    with pytest.raises(InputError, match=message):
+        check(read_certificate(tmp_path / "certificate.json"))
 
 
 def test_a_certificate_of_another_problem_is_refused() -> None:

@@ -11,10 +11,13 @@ import pytest
 
 import nlp_gait
 from compare.study.runner import run_task
+from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.solvers import nlpsol
+from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
 from nlp_gait.backends.solvers.registry import solver
 from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.problem import GaitProblem
 
 SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868
@@ -80,6 +83,22 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
         nlpsol.probe.cache_clear()
     with pytest.raises(UnknownNameError, match="unknown NLP solver 'snop'"):
         solver("snop")
+
+
+@pytest.mark.slow
+def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    planned = []
+    ready_for = IpoptSettings.ready_for
+
+    def watched(settings: IpoptSettings, problem: GaitProblem, solves: int = 1) -> Ipopt:
+        planned.append(solves)
+        return ready_for(settings, problem, solves)
+
+    monkeypatch.setattr(IpoptSettings, "ready_for", watched)
+    tasks = [Task(problem=ProblemSpec(name="walk12"), algorithm="ipopt", run=run) for run in range(2)]
+    for count in (1, 2):
+        run_study(Study(tasks=tasks[:count], jobs=1))
+    assert len(planned) == 5 and len(set(planned)) == 1
 
 
 @pytest.mark.slow
