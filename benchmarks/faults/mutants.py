@@ -38,13 +38,24 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/problems/stairs/stair.py": ("tests/problems/stairs/test_plan.py", "tests/problems/stairs/test_gait.py"),
     "nlp_gait/problems/biped/motors.py": ("tests/problems/nao/test_motors.py",),
     "nlp_gait/problems/nao/motors.py": ("tests/problems/nao/test_motors.py",),
+    "nlp_gait/problems/biped/cycle.py": ("tests/problems/nao/test_cycle.py",),
     "nlp_gait/problems/biped/cycle_motion.py": ("tests/problems/nao/test_cycle.py",),
-    "nlp_gait/problems/nao/cycle": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/problems/nao/cycle/problem.py": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/problems/nao/cycle/motion.py": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/problems/nao/cycle/rows.py": ("tests/problems/nao/test_cycle.py",),
+    "nlp_gait/problems/nao/cycle/preview_control.py": ("tests/problems/nao/test_cart_table.py",),
+    "nlp_gait/problems/nao/cycle/cart_table.py": ("tests/problems/nao/test_cart_table.py",),
+    "nlp_gait/symbolic/general_leg.py": ("tests/symbolic/test_general_leg.py",),
+    "nlp_gait/backends/kernel/affine.py": ("tests/backends/kernel/test_affine.py",),
+    "nlp_gait/backends/over_time": ("tests/backends/over_time/test_guarantee.py",),
+    "nlp_gait/backends/derivatives/plan.py": ("tests/backends/derivatives/test_compiled_nlp.py",),
+    "nlp_gait/backends/solvers/condensed.py": ("tests/backends/solvers/test_condensed.py",),
     "nlp_gait/simulation/drive.py": ("tests/simulation/test_drive.py", "tests/simulation/test_playback.py"),
-    "nlp_gait/simulation/measurements.py": ("tests/simulation/test_playback.py", "tests/simulation/test_walking.py"),
-    "nlp_gait/references.py": ("tests/compare/cli/test_own_code.py", "tests/problem/test_own_problems.py"),
+    "nlp_gait/simulation/measurements.py": ("tests/simulation/test_measurements.py",),
+    "nlp_gait/references.py": ("tests/problem/test_own_problems.py", "tests/compare/cli/test_own_code.py"),
     "nlp_gait/problem/locking.py": ("tests/faults/test_together.py",),
     "nlp_gait/gaitbench/instance.py": ("tests/gaitbench/test_instances.py",),
+    "nlp_gait/gaitbench/definitions.py": ("tests/gaitbench/test_instances.py",),
     "nlp_gait/disk.py": ("tests/faults/test_power_cuts.py",),
     "compare/study/apart.py": ("tests/faults/test_hostile_plugins.py",),
     "compare/study/imported.py": ("tests/compare/study/test_imported.py",),
@@ -201,12 +212,14 @@ def main() -> None:
         chosen = {module: tests for module, tests in BELONGING.items() if any(name in module for name in names)}
     wanted = set(arguments.again.read_text().splitlines()) if arguments.again else None
     import casadi  # noqa: F401  # once, for all forks
+    import matplotlib.pyplot  # noqa: F401
     import pytest  # noqa: F401
+    import scipy.optimize  # noqa: F401
     import scipy.stats  # noqa: F401
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         tree = Path(folder) / "tree"
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__", "docs"))
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__"))
         os.chdir(tree)
         sys.dont_write_bytecode = True
         sys.path[:0] = [str(tree)]

@@ -137,7 +137,7 @@ class AnyProblem(ProblemOptions):
     def spec(self) -> ProblemSpec:
         """The problem, checked; raises as ``spec_of``."""
         if self.name is None:
-            raise InputError("name the problem, for example nao-ssp")
+            raise InputError("name the problem, for example nao-ssp; only --motion and --check know theirs")
         return self.spec_of(self.name)
 
     def recorded(self, motion: Path, touch_down_s: float | None) -> Recorded:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +25,7 @@ from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.derivatives import pays
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.errors import CompilerError
+from nlp_gait.errors import CompilerError, OutputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
 
@@ -53,10 +54,14 @@ class Finished:
     def asked(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
         """Say what has changed since this question was asked of a problem of this name, and remember how it is asked now."""
         if self._steps is not None:
-            self._steps(f"{question}-{problem.name}", {**fingerprint(problem), **inputs}, lambda: None)
+            with self._room():
+                self._steps(f"{question}-{problem.name}", {**fingerprint(problem), **inputs}, lambda: None)
 
     def step(self, name: str, inputs: Mapping[str, Any], compute: Callable[[], Any]) -> Any:
-        """Result of a step as plain data, see ``Steps``; its file is called after the hash of its inputs too."""
+        """Result of a step as plain data, see ``Steps``; its file is called after the hash of its inputs too.
+
+        Where it cannot be kept, ``anew`` is told so once, and nothing is kept from there on: the answer itself may be printed.
+        """
         if self._steps is None:
             return json.loads(json.dumps(compute(), allow_nan=False))
         name = f"{name}-{sha256_of(inputs)[:NAME_DIGITS]}"
@@ -64,7 +69,19 @@ class Finished:
             self.kept += 1
             return found.result
         self.made += 1
-        return self._steps.keep(name, inputs, compute())
+        result = json.loads(json.dumps(compute(), allow_nan=False))
+        with self._room():
+            self._steps.keep(name, inputs, result)
+        return result
+
+    @contextmanager
+    def _room(self) -> Iterator[None]:
+        """Goes on without keeping anything where a file cannot be written."""
+        try:
+            yield
+        except OutputError as error:
+            self._steps = None
+            self.anew(f"{error}; goes on without keeping what is finished")
 
     def solver(self, solver: Solver | None = None) -> Solver:
         """A solver whose finished runs are kept; None for IPOPT with its defaults."""

@@ -29,6 +29,7 @@ from nlp_gait.problem.solution import Outcome
 # How often the parent looks whether Ctrl-C was pressed [s].
 LOOK_EVERY_S = 0.05
 END_WITHIN_S = 5.0
+COUNTER_BYTES = 8
 # Forking two processes and ending them costs 10 to 20 ms: it is done where what they divide takes ten times that.
 FORK_PAYS_FROM_S = 0.2
 
@@ -106,7 +107,8 @@ class _Crew:
     def at_work(cls, solver: Solver, problem: GaitProblem, points: Sequence[Array], count: int) -> Iterator[_Crew]:
         """Workers, which are gone in the end."""
         context = multiprocessing.get_context("fork")
-        taken, ending = context.Value("q", 0), mmap.mmap(-1, 1)
+        # Anonymous memory: a Value would be a temporary file, for which there may be no room.
+        lock, taken, ending = context.Lock(), mmap.mmap(-1, COUNTER_BYTES), mmap.mmap(-1, 1)
         parent, workers = os.getpid(), []
 
         def asked_to_end() -> bool:
@@ -114,9 +116,9 @@ class _Crew:
 
         def work(results: Connection) -> None:
             while not asked_to_end():
-                with taken:
-                    number = taken.value
-                    taken.value += 1
+                with lock:
+                    number = int.from_bytes(taken[:], sys.byteorder)
+                    taken[:] = (number + 1).to_bytes(COUNTER_BYTES, sys.byteorder)
                 if number >= len(points):
                     break
                 try:

@@ -220,3 +220,27 @@ def test_a_source_is_what_an_object_is_made_of(tmp_path: Path) -> None:
 )
 def test_references_have_a_form(text: str, is_one: bool) -> None:
     assert is_reference(text) is is_one
+
+
+def test_a_files_path_is_made_absolute_and_a_modules_name_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert references.reference("own.py:leg", "problem") == (str(tmp_path / "own.py"), "leg")
+    assert references.reference("some.module:leg", "problem") == ("some.module", "leg")
+
+
+def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "own.py"
+    path.write_bytes(b"#" * 5 * 2**20)
+    with pytest.raises(OwnCodeError, match="it has more than 4194304 bytes"):
+        source_sha256(f"{path}:leg", "problem")
+
+
+def test_what_is_imported_with_a_star_may_be_any_name(tmp_path: Path) -> None:
+    """Then every statement of the file belongs to the source."""
+    path, hashes = tmp_path / "own.py", set()
+    for other in (1, 2):
+        path.write_text(f"from math import *\nleg = pi\nother = {other}\n")
+        hashes.add(source_sha256(f"{path}:leg", "problem"))
+    assert len(hashes) == 2

@@ -1,6 +1,6 @@
 """What the servos are told: set-points between which it is linear or held, shifted by what is fed forward."""
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -55,5 +55,27 @@ def test_drives_by_name_and_settings_that_do_not_exist():
     )
     with pytest.raises(InputError, match="feed forward of a drive must be one of torque, velocity, none, got 'all'"):
         replace(Drive(), feed_forward="all")
+    with pytest.raises(FrozenInstanceError):  # drives by name are everybody's
+        DRIVES["held"].period_s = 0.01
     with pytest.raises(InputError, match="interpolation of a drive must be one of linear, held, got 'cubic'"):
         Drive(interpolation="cubic")
+
+
+def test_a_servo_is_as_stiff_as_its_motor_is_strong_and_its_limit_is_the_one_asked_for():
+    joint = ROBOT.joint("LKneePitch")
+    bare = replace(joint, motor=None)
+    limits = {name: Drive(torque_limits=name).torque_limit(joint) for name in ("urdf", "stall", "continuous")}
+    stall = joint.motor.stall_torque_Nm
+    assert limits == {"urdf": joint.torque_limit_Nm, "stall": stall, "continuous": joint.motor.continuous_torque_Nm}
+    assert len(set(limits.values())) == 3
+    assert all(Drive(torque_limits=name).torque_limit(bare) == joint.torque_limit_Nm for name in limits)
+    assert Drive().stiffness(joint) == stall / 0.08 and Drive().stiffness(bare) == joint.torque_limit_Nm / 0.08
+    assert Drive().damping(joint) == Drive().stiffness(joint) * 0.02
+    assert Drive().balance(None, None) is None
+
+
+@pytest.mark.parametrize("name", ["full_error_rad", "time_constant_s", "period_s"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), float("nan")])
+def test_what_is_not_positive_is_refused_by_name(name, value):
+    with pytest.raises(InputError, match=f"{name} of a drive must be > 0, got {value!r}"):
+        Drive(**{name: value})

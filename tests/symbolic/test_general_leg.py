@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
-from nlp_gait.problems.humanoid.newton import newton_steps
+from nlp_gait.problems.humanoid.newton import newton_steps, residuals
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import biped_of
@@ -85,6 +86,17 @@ def test_the_foot_is_flat_and_where_it_is_asked_for(robots: dict[str, Robot], na
         np.testing.assert_allclose(torso @ rotation, np.eye(3), rtol=0, atol=PLACE_TOLERANCE)
         np.testing.assert_allclose(place + torso @ position.ravel(), 0.0, rtol=0, atol=PLACE_TOLERANCE)
         assert float(solved[3]) < PLACE_TOLERANCE
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_guess_is_exact_where_hip_and_ankle_axes_meet(robots: dict[str, Robot], side: str) -> None:
+    """Also with axes askew, of which none are parallel or at right angles, and which reach most poses, not all."""
+    leg = biped_of(robots["crooked"]).legs[side]
+    meeting = np.array([*[leg.hip_m] * 3, leg.points[3], *[leg.ankle_m] * 2])
+    turns = Rotation.from_rotvec(0.2 * np.random.default_rng(3).standard_normal((6, 3)))
+    skew = replace(leg, points=meeting, axes=turns.apply(leg.axes))
+    left = residuals(skew, 0, flat_foot_poses(skew, POSES))
+    assert np.mean(left < PLACE_TOLERANCE) > 0.6
 
 
 @pytest.mark.parametrize("name", ["nao", "crooked"])

@@ -92,7 +92,8 @@ def _stored(built: Path, key: str) -> Path:
             return folder / name
         except OSError as error:
             _warn_once(
-                f"cannot write to the cache folder {folder} ({error}); compiled code is kept for this process only"
+                f"cannot write to the cache folder {folder} ({error.strerror or error}); compiled code is kept for this process "
+                "only"
             )
     raise CompilerError(
         "compiled code can be written neither to the cache folder nor to a temporary one; free some space"

@@ -52,6 +52,7 @@ def test_slopes_cancel_what_intervals_count_twice() -> None:
     x = SX.sym("x")
     function = AffineFunction(ca.Function("f", [x], [ca.vertcat(x - x, x * x - 2 * x * x + x**2)]))
     forms = function(np.array([[[1.0, 2.0]]]), np.array([0]))
+    assert forms.slopes.shape == (1, 2, 1)
     np.testing.assert_allclose(forms.lower[0, 0], 0.0, atol=1e-14)
     assert forms.upper[0, 1] - forms.lower[0, 1] < 1.1  # intervals give a width of 9
 

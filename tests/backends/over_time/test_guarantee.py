@@ -15,6 +15,7 @@ from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.backends.kernel import affine
 from nlp_gait.backends.over_time.guarantee import guarantee
+from nlp_gait.backends.over_time.search import beyond
 from nlp_gait.errors import CompilerError
 from nlp_gait.gaitbench.known import known
 from nlp_gait.problem import Assembly, Constraint, GaitProblem, Over, Point, Stretch
@@ -56,12 +57,48 @@ def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -
     assert breach.from_s <= begins <= breach.to_s <= begins + 0.01
     low, high = found.means["mean_m"]
     assert low <= 2 / math.pi * PEAK <= high <= 1.01 * low
+    assert found.pieces > 4  # intervals
     assert "wave[wave] fails by 0.299 to 0.3 m" in str(found) and found.word == "no"
 
 
 def test_a_row_that_touches_its_limit_holds() -> None:
     found = guarantee(waving(PEAK), np.array([PEAK, 0.0]))
     assert found.holds and not found.breaches and str(found) == "all limits hold at all times"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "values", "most", "least"),
+    [
+        ((0.0, math.inf), (-0.25, 0.5), 0.25, -0.5),
+        ((-math.inf, 1.0), (0.5, 1.25), 0.25, -0.5),
+        ((0.0, 1.0), (-0.5, -0.25), 0.5, 0.25),
+        ((0.0, 1.0), (1.25, 1.5), 0.5, 0.25),
+        ((-math.inf, math.inf), (-5.0, 5.0), -math.inf, -math.inf),
+        ((0.0, math.inf), (-math.inf, 0.5), math.inf, -0.5),
+        ((-math.inf, 1.0), (0.5, math.inf), math.inf, -0.5),
+    ],
+)
+def test_values_are_outside_their_bounds_by_this_at_most_and_at_least(
+    bounds: tuple[float, float], values: tuple[float, float], most: float, least: float
+) -> None:
+    found = beyond(*(np.array([end]) for end in (*bounds, *values)))
+    assert [part.item() for part in found] == [most, least]
+
+
+def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:
+    """At a jump of which nothing is known, the two terms of 5 and 4.8 would not cancel."""
+
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        after = 0.5 <= phases  # noqa: SIM300  as splines ask
+        value = 5 * after - 6 * point.x[0] * after
+        labels = tuple(f"jump, {k}" for k in range(phases.shape[1]))
+        rows = Constraint(name="jump", labels=labels, unit="m", scale=1.0, value=value.T, upper=MX(0.3), over="instant")
+        return Assembly(objective=MX(0), constraints=(rows,), indexes={})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
+    kinked = replace(waving(0.5), stretches=(stretch,))
+    assert guarantee(kinked, np.array([PEAK, 0.0])).holds
+    assert not guarantee(replace(kinked, stretches=(replace(stretch, kinks=()),)), np.array([PEAK, 0.0])).holds
 
 
 def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
@@ -74,7 +111,10 @@ def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
 def test_a_mean_is_that_over_time() -> None:
     mean = 2 / math.pi * PEAK
     assert guarantee(waving(mean + 1e-3, "mean"), np.array([PEAK, 0.0])).holds
-    assert guarantee(waving(mean - 1e-3, "mean"), np.array([PEAK, 0.0])).holds is False
+    found = guarantee(waving(mean - 1e-3, "mean"), np.array([PEAK, 0.0]))
+    (breach,) = found.breaches
+    assert found.holds is False and (breach.from_s, breach.to_s) == (1.0, 3.0)
+    assert 0.0 < breach.least <= 1e-3 <= breach.most
 
 
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -131,3 +133,11 @@ def test_every_end_is_judged_by_the_exact_functions() -> None:
     exact = exact_model(problem).at(outcome.x, problem.p)
     assert (outcome.cost, outcome.violation) == (exact.cost, exact.violation)
     assert outcome.evaluations.f >= outcome.iterations and outcome.evaluations.hessian >= outcome.iterations
+
+
+def test_each_iteration_takes_one_hessian_and_each_stage_one_gradient_more() -> None:
+    before = time.perf_counter()
+    found = CondensedSettings(iterations=2).run(toy(product), np.array([0.5, 0.5]))
+    assert 0.0 < found.compile_s < time.perf_counter() - before
+    assert (found.status, found.iterations) == ("stopped at the iteration limit", 4)  # of two stages
+    assert (found.evaluations.hessian, found.evaluations.gradient) == (4, 6)

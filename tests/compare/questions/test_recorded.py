@@ -51,7 +51,7 @@ def test_tighter_limits_are_named(gait: Path) -> None:
     ("arguments", "words"),
     [
         (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
-        (["evaluate", "--x", "1,2"], "name the problem that --x is a point of"),
+        (["evaluate", "--x", "1,2"], "name the problem, for example nao-ssp; only --motion and --check know theirs"),
         (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no meaning for a motion"),
         (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
     ],

@@ -201,6 +201,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
         figures = evaluated(at_speed, x).indexes
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
+        assert figures["energy_J_per_m"] == pytest.approx(energy / step, rel=ROUNDING)
         weight = load_robot("nao-v5").mass_kg * GRAVITY
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
 
@@ -228,6 +229,15 @@ def test_the_published_limits_are_the_defaults() -> None:
     means = [problem.value(f"{phase}_dbm_{axis}_mean_limit_m") for phase in ("ssp", "dsp") for axis in "xy"]
     assert means == [0.05, 0.02, 0.08, 0.08]
     assert problem.value("torque_change_limit_Nm") == 1.2
+
+
+def test_the_hip_and_the_step_range_over_shares_of_the_legs_length() -> None:
+    """Which is 0.2029 m."""
+    problem = load("nao-cycle")
+    ranges = {"hip_x_lift_off_m": (-0.051, 0.051), "hip_x_touch_down_m": (-0.02, 0.101), "step_length_m": (0.02, 0.122)}
+    for name, bounds in ranges.items():
+        k = problem.variable_index(name)
+        assert (problem.lower[k], problem.upper[k]) == bounds
 
 
 @pytest.mark.parametrize(
