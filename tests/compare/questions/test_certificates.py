@@ -112,7 +112,7 @@ def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     [
         ({"problem": {"parameters": 0}}, r"problem\.parameters must be an object, got 0"),
         ({"problem": {"options": None}}, r"problem\.options must be an object"),
-        ({"certificate": {"x": [0.05, 0.1]}}, "walk12 has 4 variables"),
+        ({"certificate": {"x": [0.05, 0.1]}}, "walk12 must have 4 values"),
         ({"certificate": {"x": [-1.0, 0.1, 0.001, 0.008]}}, "outside the bounds"),
     ],
     ids=["parameters", "options", "too short", "outside"],
