@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
-    """The command line in a process group of its own, as a terminal would start it."""
+    """The command line in a process group of its own, as a terminal would start it, whatever these tests run under (nohup)."""
     return subprocess.Popen(
         [sys.executable, "-m", "nlp_gait", *arguments],
         cwd=ROOT,
@@ -23,6 +24,7 @@ def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
     )
 
 
