@@ -10,8 +10,8 @@ from casadi import MX, SX
 
 import nlp_gait
 from benchmarks.rows import Row
+from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.backends.solvers.derivatives import CompiledNlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.problem import GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Angle

@@ -7,11 +7,10 @@ is asked again takes the same way past them, and its answer is that of an undist
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,13 +18,12 @@ import numpy as np
 
 from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
-from compare.study.steps import Steps
+from compare.study.steps import Steps, as_json
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers import ipopt
-from nlp_gait.backends.solvers.derivatives import pays
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.errors import CompilerError, OutputError
+from nlp_gait.errors import OutputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
 
@@ -63,16 +61,16 @@ class Finished:
         Where it cannot be kept, ``anew`` is told so once, and nothing is kept from there on: the answer itself may be printed.
         """
         if self._steps is None:
-            return json.loads(json.dumps(compute(), allow_nan=False))
+            return as_json(compute())
         name = f"{name}-{sha256_of(inputs)[:NAME_DIGITS]}"
         if (found := self._steps.kept(name, inputs)) is not None:
             self.kept += 1
             return found.result
         self.made += 1
-        result = json.loads(json.dumps(compute(), allow_nan=False))
+        computed = compute()
         with self._room():
-            self._steps.keep(name, inputs, result)
-        return result
+            return self._steps.keep(name, inputs, computed)
+        return as_json(computed)
 
     @contextmanager
     def _room(self) -> Iterator[None]:
@@ -138,15 +136,11 @@ class _KeptSolver(Solver):
         stop: Callable[[], bool],
         run: Callable[[Solver], Outcome | None],
     ) -> Outcome | None:
-        settings = self._pinned(problem)
+        settings = self._solver.settled(problem, self._solves)
         inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.plain(), **start}
 
         def compute() -> Any:
-            try:
-                ready = settings.ready_for(problem, self._solves)
-            except CompilerError:
-                ready = self._solver.ready_for(problem, self._solves)
-            outcome = run(ready)
+            outcome = run(self._solver.ready_for(problem, self._solves))
             if stop():
                 raise _Interrupted(outcome)
             return None if outcome is None else _plain(outcome)
@@ -156,13 +150,6 @@ class _KeptSolver(Solver):
         except _Interrupted as interrupted:
             return interrupted.outcome
         return None if kept is None else _outcome(kept)
-
-    def _pinned(self, problem: GaitProblem) -> Solver:
-        """The solver with all its settings; whether functions are compiled is one of them, for it changes last bits."""
-        settings = self._solver.settled(problem, self._solves)
-        if isinstance(settings, IpoptSettings) and settings.compiled is None:
-            return replace(settings, compiled=pays(problem, self._solves))
-        return settings
 
 
 def _plain(value: Any) -> Any:

@@ -108,10 +108,15 @@ class Steps:
         Raises:
             OutputError: it cannot be kept.
         """
-        result = json.loads(json.dumps(computed, allow_nan=False))
+        result = as_json(computed)
         digests = {"sha256": sha256_of(inputs, self._code), "result_sha256": sha256_of(result)}
         write_json(self._folder / f"{name}.json", {"inputs": inputs, "result": result, **digests})
         return result
+
+
+def as_json(data: Any) -> Any:
+    """Plain data as JSON gives it back."""
+    return json.loads(json.dumps(data, allow_nan=False))
 
 
 def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:

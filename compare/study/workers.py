@@ -15,6 +15,7 @@ from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
 from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import refusing
 
@@ -31,7 +32,7 @@ Job = tuple[Task, RunRecord | None]
 
 def default_jobs() -> int:
     """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return available_cores()
 
 
 def run_jobs(

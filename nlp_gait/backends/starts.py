@@ -21,6 +21,7 @@ from multiprocessing.process import BaseProcess
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import children_ignore_interrupts, never
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import WorkerError
 from nlp_gait.problem import Array, GaitProblem
@@ -45,7 +46,7 @@ def available_workers() -> int:
         or threading.current_thread() is not threading.main_thread()
         or multiprocessing.parent_process() is not None
     )
-    return 1 if alone else len(os.sched_getaffinity(0))
+    return 1 if alone else available_cores()
 
 
 def run_starts(

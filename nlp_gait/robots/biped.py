@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from nlp_gait.errors import InputError
+from nlp_gait.robots.feet import SIDES
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg, leg_of
 from nlp_gait.robots.robot import Joint, Robot
 from nlp_gait.robots.tree import posed, weld
 
-SIDES = ("left", "right")
 # NAO V5: a leg from hip to ankle [m], the mass [kg], and the heat constant K of the paper [W/(Nm)^2].
 NAO_LEG_M, NAO_MASS_KG, NAO_HEAT_W_PER_NM2 = 0.2029, 5.30535, 0.025
 # Both legs are alike to this [m], and both ankles equally high.
@@ -123,7 +123,7 @@ def biped_of(robot: Robot) -> Biped:
         raise InputError(f"robot {robot.name!r}: posture_rad must leave joint {turned[0]!r} above both legs at zero")
     full = posed(robot, held)
     model = weld(full, list(held))
-    legs = {side: leg_of(model, side) for side in SIDES}
+    legs: dict[str, Leg] = {side: leg_of(model, side) for side in SIDES}
     _check_alike(robot.name, legs)
     return Biped(full=full, model=model, legs=legs, posture_rad=held)
 

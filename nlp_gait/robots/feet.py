@@ -73,7 +73,7 @@ def find_feet(robot: str, joints: Mapping[str, Passage]) -> tuple[str, str]:
         RobotDataError: there is none, or not one that is clearly lower than the others.
     """
     to = {joint.child: joint for joint in joints.values()}
-    paths = {child: _path(child, to) for child in to}
+    paths = {child: way_to_root(child, to) for child in to}
     pairs: list[tuple[float, str, str]] = []
     names = sorted(paths)
     for i, first in enumerate(names):
@@ -107,7 +107,8 @@ def own_chains(first: list[Passage], second: list[Passage]) -> tuple[list[Passag
     return [j for j in first if j.child not in shared], [j for j in second if j.child not in shared]
 
 
-def _path(link: str, to: Mapping[str, Passage]) -> list[Passage]:
+def way_to_root(link: str, to: Mapping[str, Passage]) -> list[Passage]:
+    """Joints from a link on, by their child; it ends where they go in a circle."""
     path: list[Passage] = []
     while link in to and len(path) <= len(to):
         path.append(to[link])

@@ -20,6 +20,7 @@ from nlp_gait.robots.feet import (
     forward_of,
     own_chains,
     sole_of,
+    way_to_root,
 )
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
 from nlp_gait.robots.mending import Mass, repaired
@@ -86,7 +87,7 @@ def understood(
     else:
         pair = find_feet(robot, passages)
     to = {joint.child: joint for joint in passages.values()}
-    chains = own_chains(_way(pair[0], to), _way(pair[1], to))
+    chains = own_chains(way_to_root(pair[0], to), way_to_root(pair[1], to))
     legs = {joint.child for chain in chains for joint in chain}
     mended_links, mended_joints = {k: dict(v) for k, v in links.items()}, {k: dict(v) for k, v in joints.items()}
     if repair:
@@ -144,14 +145,6 @@ def _passages(joints: Mapping[str, Raw]) -> dict[str, Passage]:
         )
         for name, raw in joints.items()
     }
-
-
-def _way(link: str, to: Mapping[str, Passage]) -> list[Passage]:
-    way: list[Passage] = []
-    while link in to and len(way) <= len(to):
-        way.append(to[link])
-        link = way[-1].parent
-    return way
 
 
 def _repair(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nlp_gait.backends.kernel.affine import AffineFunction, Forms
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.kernel_source import kernel_of
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
@@ -67,7 +67,7 @@ class BoxBounds:
 
     def assess(self, boxes: Array, target: float) -> Assessed:
         """What is left of boxes (P, n, 2) when no cost of the target or more is of interest; in threads, box by box alike."""
-        parts = np.array_split(np.arange(len(boxes)), max(1, min(_cores(), len(boxes) // 64)))
+        parts = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
         if len(parts) == 1:
             return self._assess(boxes, target)
         with ThreadPoolExecutor(len(parts)) as threads:
@@ -161,7 +161,3 @@ def _down(values: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         lowered: Array = np.where(np.isfinite(values), values - ROUNDING * (1.0 + np.abs(values)), values)
     return lowered
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -178,7 +178,7 @@ def compile_objective(
     kernel = kernel_of(problem)
     count = native_lanes() if lanes is None else lanes
     evaluator: NativeKernel | InterpretedKernel
-    used = threads or _available_cores()
+    used = threads or available_cores()
     try:
         compiler = find_compiler()
         evaluator = problem.built(
@@ -221,7 +221,7 @@ def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> Nat
     return native
 
 
-def _available_cores() -> int:
+def available_cores() -> int:
     """Cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

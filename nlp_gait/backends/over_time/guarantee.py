@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.over_time.functions import TimeFunctions, time_functions
+from nlp_gait.backends.over_time.functions import TimeFunctions, TimeRows, time_functions
 from nlp_gait.backends.over_time.search import GRAIN, ROUNDING, Search, beyond, first_pieces
 from nlp_gait.errors import CompilerError
 from nlp_gait.problem import Array, GaitProblem
@@ -137,16 +137,8 @@ def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
         pieces += search.count
         for k in search.open_rows():
             a, b = search.first[k]
-            breaches.append(
-                Breach(
-                    row=rows.names[k],
-                    unit=rows.units[k],
-                    from_s=start + a * (end - start),
-                    to_s=start + b * (end - start),
-                    least=max(float(search.least[k]), 0.0),
-                    most=_known(search.most[k]),
-                )
-            )
+            piece = start + a * (end - start), start + b * (end - start)
+            breaches.append(_breach(rows, k, piece, float(search.least[k]), float(search.most[k])))
         for k, (low, high) in enumerate(zip(*search.integrals(), strict=True), start=plain):
             if k in part.squares:
                 low, high = np.sqrt(max(low, 0.0)) * (1 - ROUNDING), np.sqrt(max(high, 0.0)) * (1 + ROUNDING)
@@ -156,18 +148,12 @@ def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
                 continue
             most, least = (float(v) for v in beyond(lower[k], upper[k], low, high))
             if not most <= FEASIBILITY_TOLERANCE:
-                breaches.append(
-                    Breach(
-                        row=rows.names[k],
-                        unit=rows.units[k],
-                        from_s=start,
-                        to_s=end,
-                        least=max(least, 0.0),
-                        most=_known(most),
-                    )
-                )
+                breaches.append(_breach(rows, k, (start, end), least, most))
     return _Part(breaches, means, pieces)
 
 
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _breach(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> Breach:
+    """Of row k, first in a piece of time [s], by between least and most."""
+    known = most if np.isfinite(most) else None
+    from_s, to_s = piece
+    return Breach(row=rows.names[k], unit=rows.units[k], from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known)

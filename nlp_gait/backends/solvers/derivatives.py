@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from nlp_gait.backends.derivatives.compiled import CompiledNlp
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.problem import GaitProblem
-
-__all__ = ["CompiledNlp", "derivatives_of", "pays"]
 
 # Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
 # against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.
@@ -26,5 +24,4 @@ def pays(problem: GaitProblem, solves: int) -> bool:
 
 def derivatives_of(solver: ca.Function) -> dict[str, ca.Function]:
     """Derivatives that an ``nlpsol`` has, by the option with which a new one takes them over."""
-    names = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
-    return {option: solver.get_function(name) for option, name in names.items() if solver.has_function(name)}
+    return {option: solver.get_function(name) for option, name in DERIVATIVES.items() if solver.has_function(name)}

@@ -11,9 +11,10 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.solvers.derivatives import CompiledNlp, derivatives_of, pays
+from nlp_gait.backends.solvers.derivatives import derivatives_of, pays
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
@@ -81,8 +82,9 @@ class IpoptSettings(Solver):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
     def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
-        """See ``Solver``; compiled functions are the same ones, and stay open."""
-        return replace(self, hessian=self.hessian or problem.hessian)
+        """See ``Solver``."""
+        compiled = pays(problem, solves) if self.compiled is None else self.compiled
+        return replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
 
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
@@ -94,10 +96,8 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        chosen = replace(self.settled(problem, solves), compiled=bool(self.compiled))
+        chosen = self.settled(problem, solves)
         try:
-            if self.compiled is None:
-                chosen = replace(chosen, compiled=pays(problem, solves))
             return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
         except CompilerError as error:
             if self.compiled:
@@ -164,5 +164,5 @@ class Ipopt(StagedSolver):
         """Functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""
         if self._native is not None:
             return dict(self._native.functions)
-        names = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
+        names = (*VALUES, *DERIVATIVES.values())
         return {name: self._of_ipopt.get_function(name) for name in names if self._of_ipopt.has_function(name)}
