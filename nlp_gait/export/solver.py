@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from nlp_gait.backends.derivatives.source import nlp_source, table
 from nlp_gait.backends.derivatives.straight_line import number
 from nlp_gait.backends.derivatives.structure import structure_of
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
-from nlp_gait.files import writable_folder, write_text
+from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.locking import one_at_a_time
 
@@ -53,18 +52,8 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     found = plan_of(structure_of(model.nlp))
     prefix = f"{problem.name.replace('-', '_')}_nlp"
     words = _words(problem, model, found, prefix)
-    native = files("nlp_gait.export") / "native"
-    texts = {f"{prefix}.cpp": _source(problem, model, found, prefix)}
-    for name, template in TEMPLATES.items():
-        text = (native / template).read_text(encoding="utf-8")
-        for word, value in words.items():
-            text = text.replace(f"@{word}@", value)
-        texts[name.format(prefix=prefix)] = text
-    written = []
-    for name, text in texts.items():
-        written.append(writable_folder(folder) / name)
-        write_text(written[-1], text)
-    return written
+    source = _source(problem, model, found, prefix)
+    return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
 
 
 def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
@@ -119,13 +108,9 @@ def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(FLAGS),
-        "VARIABLES": _comment(f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)),
-        "PARAMETERS": _comment(
+        "VARIABLES": comment(f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)),
+        "PARAMETERS": comment(
             f"{k:4d}  {q.name} = {value:g} [{q.unit}]: {q.description}"
             for k, (q, value) in enumerate(zip(problem.parameters, problem.p, strict=True))
         ),
     }
-
-
-def _comment(lines: Iterable[str]) -> str:
-    return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)

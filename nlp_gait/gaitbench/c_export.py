@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nlp_gait.backends.kernel.kernel_source import kernel_of, kernel_source
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
-from nlp_gait.files import writable_folder, write_text
+from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.gaitbench.instance import Instance, Sides
 from nlp_gait.problem import Array
 
@@ -34,18 +34,7 @@ def export_objective(instance: Instance, folder: Path) -> list[Path]:
     sides = Sides(kernel_of(instance.gait_problem), instance.gait_problem)
     prefix = prefix_of(instance.id)
     words = _words(instance, sides, prefix)
-    native = files("nlp_gait.gaitbench") / "native"
-    texts = {f"{prefix}.cpp": cpp_source(instance, sides)}
-    for name, template in TEMPLATES.items():
-        text = (native / template).read_text(encoding="utf-8")
-        for word, value in words.items():
-            text = text.replace(f"@{word}@", value)
-        texts[name.format(prefix=prefix)] = text
-    written = []
-    for name, text in texts.items():
-        written.append(writable_folder(folder) / name)
-        write_text(written[-1], text)
-    return written
+    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, words, cpp_source(instance, sides))
 
 
 def prefix_of(id: str) -> str:
@@ -107,19 +96,15 @@ def _words(instance: Instance, sides: Sides, prefix: str) -> Mapping[str, str]:
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(flag for flag in BASE_FLAGS if flag != "-w") + " -w",
         "BEST_X": ", ".join(map(repr, instance.best_x.tolist())),
-        "VARIABLES": _comment(
+        "VARIABLES": comment(
             f"{k:4d}  {v.name} [{v.unit}] from {low:g} to {high:g}: {v.description}"
             for k, (v, low, high) in enumerate(zip(problem.variables, instance.lower, instance.upper, strict=True))
         ),
-        "PARAMETERS": _comment(
+        "PARAMETERS": comment(
             f"{q.name} = {value:g} [{q.unit}]: {q.description}"
             for q, value in zip(problem.own_parameters, problem.p, strict=False)
         ),
     }
-
-
-def _comment(lines: object) -> str:
-    return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)  # type: ignore[attr-defined]
 
 
 def _numbers(values: Array) -> str:

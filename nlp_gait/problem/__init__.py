@@ -13,7 +13,7 @@ from nlp_gait.problem.assembly import (
     Variable,
     parameters,
 )
-from nlp_gait.problem.gait_problem import GaitProblem
+from nlp_gait.problem.gait_problem import GaitProblem, Start
 from nlp_gait.problem.motion.grid import Grid
 from nlp_gait.problem.motion.playback import Playback
 from nlp_gait.problem.motion.signals import Array, Columns, Signals, in_space
@@ -37,6 +37,7 @@ __all__ = [
     "Point",
     "Result",
     "Signals",
+    "Start",
     "Stretch",
     "Variable",
     "finely_sampled",

@@ -33,6 +33,8 @@ T = TypeVar("T")
 LARGEST = 1e100  # of a parameter; the square of a larger one is no number any more
 # Changes what a problem assembles.
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
+# Start point (n,) from the parameters by name.
+Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point lies on a bound that it misses by this share of the variable's default range.
 ROUNDING = 1e-6
 
@@ -81,7 +83,7 @@ class GaitProblem:
     refine: Callable[[int], GaitProblem] | None = None
     grid: Grid | None = None
     motion: Callable[[NumericPoint], Signals] | None = None
-    start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None
+    start: Start | None = None
     robot: Robot | None = None
     durations: tuple[str, ...] = ()
     skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None

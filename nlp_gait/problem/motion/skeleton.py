@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from nlp_gait.problem.motion.signals import Array
+from nlp_gait.problem.motion.signals import Array, Signals
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 
@@ -81,6 +82,19 @@ class Skeleton:
         parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
         everything = np.concatenate([part.reshape(-1, 3) for part in parts])
         return everything.min(axis=0), everything.max(axis=0)
+
+
+def on_flat_ground(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
+    """A gait on a floor, with the centre of mass and the zero-moment point of its time histories."""
+    arrays = signals.arrays
+    return Skeleton(
+        t=arrays["t"],
+        limbs=tuple(limbs),
+        soles=tuple(soles),
+        ground=flat_ground(*(sole.corners for sole in soles)),
+        com=arrays["com"],
+        zmp=grounded(arrays["zmp"]),
+    )
 
 
 def flat_ground(*points: Array) -> Array:

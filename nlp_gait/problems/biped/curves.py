@@ -6,7 +6,7 @@ own; with all of them at zero the motion is the papers'.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem import Array, Grid, InstantPoint, Variable
+from nlp_gait.problem import Array, Grid, InstantPoint, Start, Variable
 from nlp_gait.symbolic.splines import coefficient_count, spline
 from nlp_gait.symbolic.trajectories import Motion, cubic, plus, stack
 
@@ -79,7 +79,7 @@ class Splines:
         added = spline(ca.reshape(coefficients, self.count, len(self.units)), duration, phase)
         return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
 
-    def start_of(self, names: Sequence[str]) -> Callable[[Mapping[str, float], np.random.Generator], Array] | None:
+    def start_of(self, names: Sequence[str]) -> Start | None:
         """Start points of variables: the papers' anywhere within their bounds, coefficients near zero; None without any."""
         if self.count == 0:
             return None

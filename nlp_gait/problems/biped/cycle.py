@@ -12,7 +12,19 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.problem import Array, Assembly, Constraint, Objective, Parameter, Point, Signals, Stretch, Variable
+from nlp_gait.problem import (
+    Array,
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Objective,
+    Parameter,
+    Point,
+    Signals,
+    Start,
+    Stretch,
+    Variable,
+)
 from nlp_gait.problem.assembly import parameters
 from nlp_gait.problems.biped.cycle_motion import LEAST_STEP, STEP, TIMES
 from nlp_gait.problems.biped.parts import rows
@@ -183,6 +195,29 @@ class WalkingCycle:
         single, double = (phase.signals(self.motion(at)) for phase in self.phases.values())
         later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
         return {"ssp": single, "dsp": replace(double, arrays=later)}
+
+
+def cycle_problem(name: str, owner: str, cycle: WalkingCycle, start: Start | None = None) -> GaitProblem:
+    """Problem of a cycle, without what drawing and playing need.
+
+    Args:
+        name: of the problem.
+        owner: whose cycle it is, for the title.
+        cycle: both phases.
+        start: start point; None for one within the bounds.
+    """
+    return GaitProblem(
+        name=name,
+        title=f"{owner}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
+        variables=cycle.decisions,
+        own_parameters=cycle.parameters,
+        objective=cycle.objective,
+        assemble=cycle.assemble,
+        grid=cycle.phases["ssp"].grid,
+        motion=lambda at: joined(cycle.signals(at)),
+        start=start,
+        durations=tuple(TIMES.values()),
+    )
 
 
 def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -8,8 +8,8 @@ from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 from casadi import MX, SX
 
-from nlp_gait.problem import Variable
-from nlp_gait.problems.biped.foot_loads import FootLimits, PlannedWrench, Start, planned_loads
+from nlp_gait.problem import Start, Variable
+from nlp_gait.problems.biped.foot_loads import FootLimits, PlannedWrench, planned_loads
 from nlp_gait.problems.biped.parts import Margins, Part
 from nlp_gait.problems.biped.phase import BOTH_FEET, Loader, Loads, Planner
 from nlp_gait.robots import Robot

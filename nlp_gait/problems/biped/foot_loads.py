@@ -8,7 +8,7 @@ the torques of both legs follow. What flat soles on a rough floor can bear limit
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,7 +16,7 @@ import numpy as np
 from casadi import MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, InstantPoint, Point, Variable
+from nlp_gait.problem import Array, InstantPoint, Point, Start, Variable
 from nlp_gait.problem.assembly import parameters as table
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.parts import Contribution, Part, rows
@@ -41,8 +41,6 @@ START_SHARE = 0.02
 FRICTION_COEFFICIENT = 0.5
 CORNERS = ("+x", "-x", "+y", "-y")
 TURNS = tuple(f"{sense}{first}{second}" for sense in "+-" for first in "+-" for second in "+-")
-
-Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

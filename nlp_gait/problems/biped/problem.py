@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
-
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Assembly, GaitProblem, Parameter, Point
+from nlp_gait.problem import Assembly, GaitProblem, Parameter, Point, Start
 from nlp_gait.problems.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.phase import Phase
@@ -39,7 +36,7 @@ def problem_of(
     title: str,
     phase: Phase,
     *,
-    start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
+    start: Start | None = None,
     searchable: bool = True,
 ) -> GaitProblem:
     """Problem of one phase, without what drawing and playing need.

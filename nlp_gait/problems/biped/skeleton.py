@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, on_flat_ground, rectangle
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
@@ -27,12 +27,9 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
     arrays, at = signals.arrays, _link_origins(robot, signals)
     limbs, soles = [], []
     for side in (LEFT, RIGHT):
-        foot, sole_centre = robot.feet[side], arrays[f"{side}_foot"]
-        leg = [at[link] for link in _chain(robot, foot.link)]
-        limbs.append(Limb(side=side, points=np.stack([*leg, sole_centre], axis=1)))
-        outline = rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
-        corners = sole_centre[:, None, :] + outline
-        soles.append(Sole(side=side, corners=corners, supports=sole_centre[:, 2] <= ON_GROUND))
+        leg = [at[link] for link in _chain(robot, robot.feet[side].link)]
+        limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
+        soles.append(level_sole(robot, side, arrays[f"{side}_foot"]))
     feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
     height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
     for tip in _tips(robot):
@@ -44,14 +41,14 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
             continue
         side = TRUNK if abs(far[1]) < 0.1 * height else LEFT if far[1] > 0 else RIGHT
         limbs.append(Limb(side=side, points=np.stack([at[link] for link in chain], axis=1)))
-    return Skeleton(
-        t=arrays["t"],
-        limbs=tuple(limbs),
-        soles=tuple(soles),
-        ground=flat_ground(*(sole.corners for sole in soles)),
-        com=arrays["com"],
-        zmp=grounded(arrays["zmp"]),
-    )
+    return on_flat_ground(signals, limbs, soles)
+
+
+def level_sole(robot: Robot, side: str, centre: Array) -> Sole:
+    """Sole of a foot that stays level, from the point under its ankle (T, 3) [m]; it bears load on the ground alone."""
+    foot = robot.feet[side]
+    outline = rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
+    return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
 
 
 def _chain(robot: Robot, link: str) -> list[str]:

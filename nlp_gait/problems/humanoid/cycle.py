@@ -10,7 +10,7 @@ from casadi import MX, SX
 
 from nlp_gait.problem import Array, GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.curves import grid_for
-from nlp_gait.problems.biped.cycle import SPEED, CycleGoal, WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle import SPEED, CycleGoal, WalkingCycle, cycle_problem, start_at_speed
 from nlp_gait.problems.biped.cycle_motion import (
     LIFT,
     STEP,
@@ -117,18 +117,8 @@ def _problem(body: Humanoid, cycle: WalkingCycle, sharing: Sharing, at_given_spe
         return start_at_speed(names, parameters, rng)
 
     own = sharing.start_of(names, start if at_given_speed else None)
-    problem = GaitProblem(
-        name="humanoid-cycle",
-        title=f"{body.biped.full.name}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
-        variables=cycle.decisions,
-        own_parameters=cycle.parameters,
-        objective=cycle.objective,
-        assemble=cycle.assemble,
-        grid=cycle.phases["ssp"].grid,
-        motion=lambda at: joined(cycle.signals(at)),
-        start=within_reach(names, (REACH_MARGIN, *((SPEED,) if at_given_speed else ())), reach, own),
-        durations=tuple(TIMES.values()),
-    )
+    known = (REACH_MARGIN, *((SPEED,) if at_given_speed else ()))
+    problem = cycle_problem("humanoid-cycle", body.biped.full.name, cycle, within_reach(names, known, reach, own))
     return with_body(problem, body, cycle.robot.armatures_kgm2, repeats=True)
 
 

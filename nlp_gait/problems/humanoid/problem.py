@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem import Array, GaitProblem, InstantPoint, Playback, Point, Variable
+from nlp_gait.problem import Array, GaitProblem, InstantPoint, Playback, Point, Start, Variable
 from nlp_gait.problems.biped.goals import HEAT_LOSS
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.parts import (
@@ -31,7 +31,6 @@ from nlp_gait.problems.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion, cubic, plus
 
-Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 DRAWS = 50  # of a start point, at most
 
 LEAN = ("torso_roll", "torso_pitch")

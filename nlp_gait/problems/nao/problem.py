@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
-from nlp_gait.problem import Array, GaitProblem, Playback
+from nlp_gait.problem import GaitProblem, Playback, Start
 from nlp_gait.problems.biped.goals import HEAT_LOSS
 from nlp_gait.problems.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.problems.biped.phase import Phase
@@ -28,7 +26,7 @@ def phase_problem(
     phase: Phase,
     robot: str,
     *,
-    start: Callable[[Mapping[str, float], np.random.Generator], Array] | None = None,
+    start: Start | None = None,
     searchable: bool = True,
 ) -> GaitProblem:
     """Problem of one phase of NAO; ``robot`` is its name or file, the others are those of ``problem_of``."""

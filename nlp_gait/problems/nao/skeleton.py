@@ -9,13 +9,13 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, on_flat_ground
+from nlp_gait.problems.biped.skeleton import level_sole
 from nlp_gait.problems.biped.skeleton import skeleton as any_skeleton
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
 
-ON_GROUND = 1e-6  # [m]; a sole that is higher does not bear load
 DRAWN = {"Neck", "Head", *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow"))}
 DRAWN |= {"l_wrist", "r_wrist"}
 LETTER = {LEFT: "L", RIGHT: "R"}
@@ -41,17 +41,8 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
         arm = [shoulders, *(at[f"{letter}{link}"] for link in ("Shoulder", "Elbow")), at[f"{letter.lower()}_wrist tip"]]
         sole_centre = arrays[f"{side}_foot"]
         limbs += [Limb(side=side, points=np.stack(part, axis=1)) for part in ([*leg, sole_centre], arm)]
-        outline = rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
-        lifted = sole_centre[:, 2]
-        soles.append(Sole(side=side, corners=sole_centre[:, None, :] + outline, supports=lifted <= ON_GROUND))
-    return Skeleton(
-        t=arrays["t"],
-        limbs=tuple(limbs),
-        soles=tuple(soles),
-        ground=flat_ground(*(sole.corners for sole in soles)),
-        com=arrays["com"],
-        zmp=grounded(arrays["zmp"]),
-    )
+        soles.append(level_sole(robot, side, sole_centre))
+    return on_flat_ground(signals, limbs, soles)
 
 
 def _link_origins(robot: Robot, signals: Signals) -> dict[str, Array]:

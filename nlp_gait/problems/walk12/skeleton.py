@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, flat_ground, grounded, rectangle
+from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, on_flat_ground, rectangle
 from nlp_gait.problems.walk12.robot import PointMassBiped
 
 
@@ -31,14 +31,7 @@ def _skeleton(robot: PointMassBiped, signals: Signals, turn: float) -> Skeleton:
         limbs.append(Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
         corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
         soles.append(Sole(side=side, corners=corners, supports=stands))
-    return Skeleton(
-        t=arrays["t"],
-        limbs=tuple(limbs),
-        soles=tuple(soles),
-        ground=flat_ground(*(sole.corners for sole in soles)),
-        com=arrays["com"],
-        zmp=grounded(arrays["zmp"]),
-    )
+    return on_flat_ground(signals, limbs, soles)
 
 
 def _knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:

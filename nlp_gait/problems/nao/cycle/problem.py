@@ -8,12 +8,13 @@ and the step length are variables, and the cycle repeats after mirroring left to
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from nlp_gait.problem import Array, GaitProblem, Grid, Variable, maker
 from nlp_gait.problems.biped.curves import grid_for
-from nlp_gait.problems.biped.cycle import CycleGoal, WalkingCycle, joined, start_at_speed
+from nlp_gait.problems.biped.cycle import CycleGoal, WalkingCycle, cycle_problem, start_at_speed
 from nlp_gait.problems.biped.cycle_motion import TIMES
 from nlp_gait.problems.biped.double_support import LOAD_DEGREE, Sharing, TorsoShare
 from nlp_gait.problems.biped.goals import Goal
@@ -68,20 +69,8 @@ def nao_cycle(
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         return start_at_speed(names, parameters, rng)
 
-    problem = GaitProblem(
-        name="nao-cycle",
-        title=f"NAO, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
-        variables=cycle.decisions,
-        own_parameters=cycle.parameters,
-        objective=cycle.objective,
-        assemble=cycle.assemble,
-        grid=grid,
-        motion=lambda at: joined(cycle.signals(at)),
-        start=sharing.start_of(names, start if at_given_speed else None),
-        durations=tuple(TIMES.values()),
-        stretches=cycle.stretches,
-    )
-    return with_robot(problem, robot, cycle.robot.armatures_kgm2, repeats=True)
+    problem = cycle_problem("nao-cycle", "NAO", cycle, sharing.start_of(names, start if at_given_speed else None))
+    return with_robot(replace(problem, stretches=cycle.stretches), robot, cycle.robot.armatures_kgm2, repeats=True)
 
 
 def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
-from nlp_gait.problems.biped.cycle import joined
+from nlp_gait.problems.biped.cycle import cycle_problem
 from nlp_gait.problems.biped.cycle_motion import STEP, TIMES
 from nlp_gait.problems.biped.double_support import double_support_margins, double_support_mean_margins, support_box
 from nlp_gait.problems.biped.parts import Part
@@ -205,17 +205,8 @@ def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         for name, motion in parts.items()
     }
     cycle = nao_cycle_of(model, variables, phases, at_given_speed=False)
-    return GaitProblem(
-        name="recorded-cycle",
-        title="A recorded gait of NAO, a walking cycle",
-        variables=cycle.decisions,
-        own_parameters=cycle.parameters,
-        objective=cycle.objective,
-        assemble=cycle.assemble,
-        grid=grid,
-        motion=lambda at: joined(cycle.signals(at)),
-        durations=tuple(TIMES.values()),
-    )
+    problem = cycle_problem("recorded-cycle", "NAO", cycle)
+    return replace(problem, title="A recorded gait of NAO, a walking cycle")
 
 
 def _recorded_phase(

@@ -1,0 +1,43 @@
+"""Files of C and C++ that are made from templates, for objectives and solvers that are taken elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+
+from nlp_gait.files import writable_folder, write_text
+
+
+def write_c_files(
+    folder: Path, package: str, templates: Mapping[str, str], words: Mapping[str, str], source: str
+) -> list[Path]:
+    """Write a C++ source and the files around it; returns their paths, the source's first.
+
+    Args:
+        folder: made if it is missing.
+        package: whose folder ``native`` holds the templates.
+        templates: by the name of the file, in which ``{prefix}`` stands for the word PREFIX.
+        words: what stands for each ``@WORD@`` in the templates.
+        source: of ``{prefix}.cpp``.
+
+    Raises:
+        OutputError: the folder cannot be written to.
+    """
+    native, prefix = files(package) / "native", words["PREFIX"]
+    texts = {f"{prefix}.cpp": source}
+    for name, template in templates.items():
+        text = (native / template).read_text(encoding="utf-8")
+        for word, value in words.items():
+            text = text.replace(f"@{word}@", value)
+        texts[name.format(prefix=prefix)] = text
+    written = []
+    for name, text in texts.items():
+        written.append(writable_folder(folder) / name)
+        write_text(written[-1], text)
+    return written
+
+
+def comment(lines: Iterable[str]) -> str:
+    """Lines inside a comment of C that is open."""
+    return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)
