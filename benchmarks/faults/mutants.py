@@ -67,7 +67,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "compare/bench/leaderboard.py": ("tests/compare/bench/test_bench.py",),
     "nlp_gait/gaitbench/definitions.py": ("tests/gaitbench/test_instances.py",),
     "nlp_gait/disk.py": ("tests/faults/test_disk.py", "tests/faults/test_power_cuts.py"),
-    "compare/study/apart.py": ("tests/faults/test_hostile_plugins.py",),
+    "compare/study/apart.py": ("tests/compare/study/test_apart.py",),
     "compare/study/imported.py": ("tests/compare/study/test_imported.py",),
     "compare/study/steps.py": ("tests/compare/study/test_steps.py",),
     "compare/logs": ("tests/compare/logs/test_logs.py",),
