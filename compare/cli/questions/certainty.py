@@ -18,9 +18,9 @@ from compare.cli.questions.answers import Output
 @command
 def certainty(
     *,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of IPOPT.")] = 10_000,
+    starts: Annotated[int, typer.Option(min=1, max=1_000_000, help="Random starts of IPOPT.")] = 10_000,
     evaluations: Annotated[
-        int, typer.Option(min=0, help="Budget of one long CMA-ES with restarts; 0 for none.")
+        int, typer.Option(min=0, max=10**12, help="Budget of one long CMA-ES with restarts; 0 for none.")
     ] = 1_000_000,
     tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
     time_limit: Annotated[
