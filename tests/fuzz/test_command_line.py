@@ -25,6 +25,7 @@ KEPT = (
     ("export", "result.json", "--format", "csv", "--period-ms", "9" * 400),
     ("export", "result.json", "--format", "csv", "--out", "x" * 300),
     ("evaluate", "nao-dsp", "--x", "1", "--robot", "x" * 300 + ".urdf"),
+    ("certainty", "walk12", "--check", "certificate.json"),
     ("simulate", "walk.json", "--steps", "1000000000"),
     ("simulate", "walk.json", "--period-ms", "1e-9"),
     ("simulate", "walk.json", "--period-ms", "1e9"),

@@ -13,6 +13,7 @@ from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AnyProblem, AsJson, Code, Seed, name_all
 from compare.cli.questions.answers import Output
+from nlp_gait.errors import InputError
 
 
 @command
@@ -42,6 +43,8 @@ def certainty(
     `nlp-gait certainty --check certainty/walk12-certificate.json`
     """
     if check is not None:
+        if problem != AnyProblem():
+            raise InputError("--check takes the problem and its options from the certificate; leave them out")
         name_all(code)
         _check(check, paths, seed, as_json)
         return
