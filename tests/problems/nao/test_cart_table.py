@@ -97,6 +97,7 @@ def test_another_robot_walks_on_its_own_legs() -> None:
             {"hip_height_m": 0.33},
             "a hip 0.33 m high reaches no step of 0.05 m: .* the right ankle is too far; lower the hip",
         ),
+        ({"hip_height_m": 0.335, "step_m": 0.01}, "the left ankle is too far; lower the hip"),
         ({"single_s": 0.0}, "single_s must be a finite number > 0, got 0.0"),
         ({"step_m": float("nan")}, "step_m must be a finite number > 0, got nan"),
     ],
