@@ -43,7 +43,7 @@ _DATA = resources.files("nlp_gait.robots") / "data"
 class RobotFile:
     """Content of a robot file. Links, joints and feet are decoded later, once it is known which of them are replaced."""
 
-    schema: Literal[1]
+    schema: Literal[1] = 1
     name: str | None = None
     extends: str | None = None
     description: str | None = None
@@ -217,7 +217,11 @@ def _read(name_or_path: str) -> RobotFile:
     if not name_or_path.endswith(".json") and name_or_path not in robot_names():
         raise unknown("robot", name_or_path, robot_names())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
-    return read_decoded(RobotFile, path, "robot file", error=RobotDataError)
+    file = read_decoded(RobotFile, path, "robot file", error=RobotDataError)
+    beside = [path.with_suffix(ending) for ending in MODEL_ENDINGS if os.path.isfile(path.with_suffix(ending))]
+    if file.extends is None and file.root is None and beside:  # it says of that model what it would say otherwise
+        return replace(file, extends=beside[0].name)
+    return file
 
 
 def _robot(file: RobotFile, source: str) -> Robot:
