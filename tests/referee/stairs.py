@@ -5,7 +5,7 @@ Origin: the ankle of the stance foot. Angles of legs and feet turn clockwise fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -186,39 +186,59 @@ class Body(NamedTuple):
     moment: Array
 
 
-def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[str, Array]:
-    """Torques, ground forces, energy: what carries a part gives the rate of its momentum, and of its moment."""
+class Loads(NamedTuple):
+    """What joints and ground give.
+
+    Attributes:
+        torque: by joint, (m, P) [Nm].
+        turned: by joint, angle, rate and acceleration (3, m, P).
+        stance: force of the ground on the stance foot (2, m, P) [N].
+        pressure: its centre ahead of the stance ankle (m, P) [m]; NaN where nothing loads the foot.
+        places: by point, its place (2, m, P) [m].
+    """
+
+    torque: dict[str, Array]
+    turned: dict[str, Array]
+    stance: Array
+    pressure: Array
+    places: dict[str, Array]
+
+
+def loads(q: Mapping[str, Array], rear: Mapping[str, Array] | Callable[[Array], Mapping[str, Array]]) -> Loads:
+    """What carries a part of the robot gives the rate of its momentum, and of its moment.
+
+    Args:
+        q: by moving link, angle, rate and acceleration (3, m, P).
+        rear: forces of the ground (2, m, P) by the point of the rear foot, or what says them of the whole ground's force.
+    """
     still = np.zeros_like(q["HK"])
-    places = {"A'": np.zeros((3, 2, *t.shape))}  # value, velocity, acceleration
+    moved = {"A'": np.zeros((3, 2, *still.shape[1:]))}  # value, velocity, acceleration
     bodies = {}
     ways = {"K'A'": ("A'", "K'", -1), "HK'": ("K'", "H", -1), "UH": ("H", "U", 1), "HK": ("H", "K", 1)}
-    ways |= {
-        "KA": ("K", "A", 1),
-        "AS": ("A", "S", 1),
-        "ST": ("S", "T", 1),
-        "A'S'": ("A'", "S'", 1),
-        "S'T'": ("S'", "T'", 1),
-    }
+    ways |= {"KA": ("K", "A", 1), "AS": ("A", "S", 1), "ST": ("S", "T", 1)}
+    ways |= {"A'S'": ("A'", "S'", 1), "S'T'": ("S'", "T'", 1)}
     for link, (near, far, sense) in ways.items():
         length, mass = RODS[link]
         angle, rate, acceleration = q.get(link, still)
         turn = 1.0 if link == "UH" else -1.0
-        ahead, aside = np.stack([np.cos(angle), turn * np.sin(angle)]), np.stack([-np.sin(angle), turn * np.cos(angle)])
+        ahead = np.stack([np.cos(angle), turn * np.sin(angle)])
+        aside = np.stack([-np.sin(angle), turn * np.cos(angle)])
         rod = sense * length * np.stack([ahead, aside * rate, aside * acceleration - ahead * rate**2])
-        places[far] = places[near] + rod
-        middle = places[near] + rod / 2
+        moved[far] = moved[near] + rod
+        middle = moved[near] + rod / 2
         lifted = middle[2] + np.array([0.0, GRAVITY])[:, None, None]
         bodies[link] = Body(middle[0], lifted, mass, -turn * mass * length**2 / 12 * acceleration)
+    places = {name: place[0] for name, place in moved.items()}
     whole = sum(body.mass * body.lifted for body in bodies.values())
-    passed = np.minimum(t / x["t2"], 1.0)
-    rear = x["share"] * (1.0 - passed**2 * (3.0 - 2.0 * passed)) * whole
-    stance = whole - rear
+    behind = rear(whole) if callable(rear) else rear
+    stance = whole - sum(behind.values())
 
     def asked(links: tuple[str, ...], about: str) -> Array:
-        """Clockwise moment about a point that the links need from what carries them."""
-        base = places[about][0]
+        """Clockwise moment about a point that the links need from what carries them; the rear foot's ground helps."""
+        base = places[about]
         total = sum(b.moment + _clockwise(b.centre - base, b.mass * b.lifted) for b in (bodies[link] for link in links))
-        return total - _clockwise(places["T"][0] - base, rear)
+        # Every part that is asked for ends in the rear toe; the sole's force has no arm about the sole.
+        return total - sum(_clockwise(places[point] - base, force) for point, force in behind.items())
 
     swing = ("HK", "KA", "AS", "ST")
     torque = {
@@ -236,22 +256,41 @@ def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[st
     turned = {}
     for joint, (link, base) in pairs.items():
         turned[joint] = q[link] - (0.0 if base is None else -q[base] if base == "UH" else q[base])
-    carried = stance[1] > 0.01 * whole[1]
+    carried = stance[1] > 0.01 * sum(mass for _, mass in RODS.values()) * GRAVITY
     pressure = np.where(carried, -asked(tuple(RODS), "A'") / np.where(carried, stance[1], 1.0), np.nan)
-    found = {f"stance_load[z, {i}]": value for i, value in enumerate(stance[1])}
-    for name, sign in (("forward", -1.0), ("backward", 1.0)):
-        found |= {f"friction[{name}, {i}]": v for i, v in enumerate(FRICTION * stance[1] + sign * stance[0])}
-    found |= {f"stance_zmp[x, {i}]": value for i, value in enumerate(pressure)}
+    return Loads(torque, turned, stance, pressure, places)
+
+
+def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[str, Array]:
+    """Rows of the ground's forces, energy and peaks of a planned step."""
+    passed = np.minimum(t / x["t2"], 1.0)
+    share = x["share"] * (1.0 - passed**2 * (3.0 - 2.0 * passed))
+    torque, turned, stance, pressure, _ = loads(q, lambda whole: {"T": share * whole})
+    found = ground_rows(stance, pressure, FRICTION, "friction")
     power = sum(np.abs(torque[joint] * turned[joint][1]) for joint in torque)
     gaps = np.diff(t, axis=0)
     found["energy_J"] = np.sum(gaps * (power[1:] + power[:-1]) / 2, axis=0)  # phases meet without a gap
     gaps[PARTS :: PARTS + 1] = QUANTUM
-    found["peak_jerk_rad_s3"] = np.max(
-        [np.abs(np.diff(turned[j][2], axis=0) / gaps).max(axis=0) for j in turned], axis=0
-    )
+    jerks = [np.abs(np.diff(turned[joint][2], axis=0) / gaps).max(axis=0) for joint in turned]
+    found["peak_jerk_rad_s3"] = np.max(jerks, axis=0)
     found["peak_acceleration_rad_s2"] = np.max([np.abs(turned[j][2]).max(axis=0) for j in turned], axis=0)
     found["peak_torque_Nm"] = np.max([np.abs(torque[j]).max(axis=0) for j in torque], axis=0)
     found["zmp_margin_min_m"] = np.minimum(pressure, FOOT - pressure).min(axis=0)
+    return found
+
+
+def ground_rows(stance: Array, pressure: Array, friction: float, name: str) -> dict[str, Array]:
+    """Load, grip and centre of pressure of the stance foot, by name."""
+    found = {f"stance_load[z, {i}]": value for i, value in enumerate(stance[1])}
+    found |= {f"stance_zmp[x, {i}]": value for i, value in enumerate(pressure)}
+    return found | grip_rows(stance, friction, name)
+
+
+def grip_rows(force: Array, friction: float, name: str) -> dict[str, Array]:
+    """|F_x| <= mu F_z as two rows."""
+    found = {}
+    for way, sign in (("forward", -1.0), ("backward", 1.0)):
+        found |= {f"{name}[{way}, {i}]": v for i, v in enumerate(friction * force[1] + sign * force[0])}
     return found
 
 

@@ -14,7 +14,7 @@ import pytest
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.problem import Array, GaitProblem
-from tests.referee import nao, stairs, walk12
+from tests.referee import nao, stairs, stairs_ideal, walk12
 
 POINTS = 1000
 AGREEMENT = 1e-9  # of a row's scale, or of its value where that is larger
@@ -50,7 +50,8 @@ def compared(problem: GaitProblem, referee: Referee, X: Array, of: str = "") -> 
     expected = referee(X)
     named = [*zip(model.row_names, model.row_scales, g, strict=True)]
     named += [(name, 1.0, values) for name, values in zip(model.index_names, indexes, strict=True)]
-    named.append((model.index_names[0], 1.0, problem.objective.sign * cost[0]))  # the first index is the objective
+    objective = problem.objective.name if problem.objective.name in expected else model.index_names[0]
+    named.append((objective, 1.0, problem.objective.sign * cost[0]))
     found: dict[str, float] = {}
     for name, scale, values in named:
         if name.startswith("bounds[") or not name.startswith(of):
@@ -109,6 +110,18 @@ def test_the_planned_step_on_stairs(length: float, ratio: float) -> None:
 
     found = compared(problem, referee, drawn(problem, referee, 3600, in_order))
     assert len(found) == 44 * 22 + 3 * 82 + 4 + 5
+    assert worst(found)[0] < AGREEMENT, worst(found)
+
+
+def test_the_ideal_step_on_stairs() -> None:
+    """Effort and all 1,560 variables' rows: continuity, feet, clearance, and the ground's forces of every interval."""
+    problem = nlp_gait.load("stairs-ideal")
+    X = np.random.default_rng(21).uniform(problem.lower, problem.upper, (POINTS, len(problem.names)))
+    X[:, [name.startswith(("rate", "acceleration", "toe", "sole")) for name in problem.names]] *= (
+        0.1  # else it flies as a rule
+    )
+    found = compared(problem, lambda X: stairs_ideal.effort(X, problem.names), X)
+    assert len(found) == 2 * 490 + 14 + 69 + 56 + 10 + 4 + 4 + 2 + 56 + 126 + 56 + 20 + 140 + 70 + 70 + 142 + 4
     assert worst(found)[0] < AGREEMENT, worst(found)
 
 
