@@ -42,14 +42,14 @@ def list_problems(
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`
     """
-    from compare.study.task import solver_names
+    from compare.study.description import described_names
 
     if robot is not None:
         _robot(robot, out, as_json)
         return
     if out is not None:
         raise InputError("--out is the picture of a robot; name one with --robot FILE")
-    known = solver_names()
+    known = described_names()
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
     elif name is None:
@@ -105,6 +105,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
 
 def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
+    from metaheuristics.multi_objective import FRONT_ALGORITHMS
     from nlp_gait.references import installed
     from nlp_gait.robots import robot_names
 
@@ -120,6 +121,7 @@ def _overview(as_json: bool) -> None:
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(solver_names())}")
+    stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
     for kind, listed in (("problems", installed("problem")), ("algorithms", installed("algorithm"))):
         if listed:
