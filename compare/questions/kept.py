@@ -23,7 +23,7 @@ from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, as_json
 from nlp_gait.backends.interrupts import never
-from nlp_gait.backends.solvers import ipopt
+from nlp_gait.backends.solvers import ipopt, stages
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import OutputError
@@ -48,7 +48,7 @@ class Finished:
 
     def __init__(self, out: Path | None = None, anew: Progress = unwatched) -> None:
         self.anew = anew
-        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt], anew=anew)
+        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt, stages], anew=anew)
         self._counts = None if out is None else _Counts()
 
     def asked(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
