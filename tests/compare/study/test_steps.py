@@ -65,6 +65,7 @@ def test_fingerprint_tells_values_and_mathematics_apart() -> None:
     assert one["mathematics_sha256"] != other["mathematics_sha256"]
 
 
+@pytest.mark.slow
 def test_steps_side_by_side_are_kept_one_by_one(tmp_path: Path) -> None:
     """In two processes; what is there already is not computed again."""
     todo = [Step(name=f"root-{k}", inputs={"k": k}, compute=partial(math.sqrt, k)) for k in range(4)]
