@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import compare.study.apart
+from compare.study.record import RunRecord
 from compare.study.runner import attempt
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import Study, read_records, run_study
@@ -143,11 +144,15 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient:
         "def few(f, lower):\n    f(lower)\n"
     )
 
-    def status(name: str) -> str:
-        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=STOP)).status
+    def record(name: str, stop: Stop) -> RunRecord:
+        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=stop))
 
-    assert "did not return" in status("stubborn")
-    deaf = attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:deaf", stop=STOP))
+    def status(name: str) -> str:
+        return record(name, patient).status
+
+    patient = Stop(evaluations=200, time_limit_s=60.0)  # on a busy machine a process may begin late
+    assert "did not return" in record("stubborn", STOP).status
+    deaf = record("deaf", patient)
     assert (deaf.status, deaf.evaluations) == ("evaluation budget used", {"f": 200})
     assert "returned without any call of f" in status("lazy")
     assert "f takes one point of shape (4,)" in status("wrong")
