@@ -7,6 +7,7 @@ learns from them (`tell`), so an adapter to another package is a small class wit
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -50,6 +51,31 @@ class BatchObjective(Bounded, Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class Constraints:
+    """The constraints of an objective one by one, where it can tell them apart; see `Start`.
+
+    An objective has them if it has the attributes `excess` and `groups`, as here.
+
+    Attributes:
+        excess: Of points (P, n) within the bounds, by how much each of m rows is exceeded, (P, m): a row is met where it is
+            <= 0. It is asked for points that are evaluated anyhow, and counts no evaluation.
+        groups: (m,) the constraint that each row belongs to; rows of one constraint stand together.
+    """
+
+    excess: Callable[[Array], Array]
+    groups: tuple[str, ...]
+
+    def worst(self, X: Array) -> Array:
+        """(P, c) the greatest excess within each constraint, of points (P, n); 1e30 where it has no finite value."""
+        first = [k for k, name in enumerate(self.groups) if k == 0 or name != self.groups[k - 1]]
+        excess = np.nan_to_num(self.excess(X), nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN)
+        return np.asarray(np.maximum.reduceat(excess, first, axis=1))
+
+
+UNKNOWN = 1e30  # excess of a row that has no finite value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Start:
     """All that an algorithm is given at the start of a run.
 
@@ -59,6 +85,7 @@ class Start:
         initial: (P, n) starting points, read-only; P is the population of the algorithm. The first `ask` returns them.
         evaluations: Budget of the run, a hint for algorithms that plan ahead.
         rng: The only source of randomness of the search.
+        constraints: One by one, for searches that learn from each; None where only their total violation is known.
     """
 
     lower: Array
@@ -66,6 +93,13 @@ class Start:
     initial: Array
     evaluations: int
     rng: np.random.Generator
+    constraints: Constraints | None = None
+
+    def excess(self, X: Array, violation: Array) -> Array:
+        """(P, c) excess of each constraint at points (P, n); without `constraints`, the violation (P,) as the only one."""
+        if self.constraints is not None:
+            return self.constraints.worst(X)
+        return np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)[:, None]
 
 
 class Search(Protocol):

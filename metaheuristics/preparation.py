@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from metaheuristics.array import Array, real_array
 from metaheuristics.errors import SearchError, shown
-from metaheuristics.interface import Algorithm, Bounded, Start
+from metaheuristics.interface import Algorithm, Bounded, Constraints, Start
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 
@@ -24,12 +24,14 @@ def prepared(
 ) -> Start:
     """All that an algorithm is given; SearchError where the bounds, or given starting points (R, n), are not allowed."""
     lower, upper = checked_bounds(objective)
+    excess, groups = getattr(objective, "excess", None), getattr(objective, "groups", ())
     return Start(
         lower=lower,
         upper=upper,
         initial=starting_points(lower, upper, population, initial, child(seed, 0)),
         evaluations=evaluations,
         rng=np.random.default_rng(child(seed, 1)),
+        constraints=Constraints(excess=excess, groups=tuple(groups)) if callable(excess) and groups else None,
     )
 
 

@@ -58,7 +58,7 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
     """
     if isinstance(name, str) and name in ADAPTERS:
         check_installed(name, name.partition(":")[0])
-    return _made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
+    return made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
 
 def handling(name: str, /, **settings: object) -> ConstraintHandling:
@@ -71,10 +71,11 @@ def handling(name: str, /, **settings: object) -> ConstraintHandling:
     Raises:
         SearchError: Unknown name or setting, a setting that is missing, or a value that is not allowed.
     """
-    return _made("constraint handling", name, HANDLINGS, settings)
+    return made("constraint handling", name, HANDLINGS, settings)
 
 
-def _made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
+def made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
+    """What a factory makes of settings, by its name; SearchError as `algorithm` raises it."""
     if not isinstance(name, str):
         raise SearchError(f"the name of a {kind} must be a text, got {shown(name)}")
     if name not in factories:

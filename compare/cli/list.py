@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -41,14 +42,14 @@ def list_problems(
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`
     """
-    from compare.study.task import solver_names
+    from compare.study.description import described_names
 
     if robot is not None:
         _robot(robot, out, as_json)
         return
     if out is not None:
         raise InputError("--out is the picture of a robot; name one with --robot FILE")
-    known = solver_names()
+    known = described_names()
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
     elif name is None:
@@ -78,13 +79,19 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
     from nlp_gait.problems.humanoid.report import understood_of
 
     target = None if out is None else output_file(out)
-    body = humanoid(name)
-    facts = understood_of(body)
+    log = logging.getLogger("nlp_gait")
+    level = log.level
+    log.setLevel(logging.ERROR)  # its warnings are among the notes below
+    try:
+        body = humanoid(name)
+    finally:
+        log.setLevel(level)
+    facts, notes = understood_of(body), body.biped.full.notes
     if as_json:
-        print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}})
+        print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}, "notes": list(notes)})
     else:
         print_table(f"What I understood of robot {body.biped.full.name}", ("what", "found"), facts)
-        for note in body.biped.full.notes:
+        for note in notes:
             stdout.print(f"note: {note}")
         stdout.print(
             "anything of it can be said otherwise in the JSON file beside it: docs/custom-robots.md; gaits: humanoid-ssp, "
@@ -98,6 +105,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
 
 def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
+    from metaheuristics.multi_objective import FRONT_ALGORITHMS
     from nlp_gait.references import installed
     from nlp_gait.robots import robot_names
 
@@ -113,6 +121,7 @@ def _overview(as_json: bool) -> None:
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(solver_names())}")
+    stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
     for kind, listed in (("problems", installed("problem")), ("algorithms", installed("algorithm"))):
         if listed:

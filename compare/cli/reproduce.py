@@ -18,6 +18,7 @@ REPRODUCTIONS = {
     "nao": "compare.papers.nao.reproduce",
     "walk12": "compare.papers.walk12.reproduce",
     "stairs": "compare.papers.stairs.reproduce",
+    "nao-claims": "compare.papers.nao_claims.reproduce",
 }
 
 

@@ -10,6 +10,8 @@ from functools import partial
 from typing import Any
 
 import metaheuristics
+from compare.study.task import solver_names
+from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
 SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
@@ -35,9 +37,14 @@ class Description:
     source: str
 
 
+def described_names() -> tuple[str, ...]:
+    """Names of all that has a description: what a study runs, and the algorithms for several objectives."""
+    return (*solver_names(), *FRONT_ALGORITHMS)
+
+
 def description_of(name: str) -> Description:
     """Of an algorithm or solver by its name, as ``nlp-gait list`` shows it."""
-    factory: Any = {**metaheuristics.ALGORITHMS, **metaheuristics.ADAPTERS, **SOLVERS}[name]
+    factory: Any = {**metaheuristics.ALGORITHMS, **metaheuristics.ADAPTERS, **FRONT_ALGORITHMS, **SOLVERS}[name]
     bound = factory.keywords if isinstance(factory, partial) else {}
     kind: Any = factory.func if isinstance(factory, partial) else factory
     # A class may leave its settings and its source to the one that it extends.

@@ -18,14 +18,14 @@ from compare.study.rows import frame_of
 from compare.study.runner import Run, run_task
 from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
-from compare.study.workers import default_jobs, run_jobs
+from compare.study.workers import run_jobs
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
 from nlp_gait.notebook import html_table
 
-__all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
+__all__ = ["Study", "check_study", "read_records", "record_file", "run_study"]
 
 RECORDS = "records"
 KEY_DIGITS = 8

@@ -39,7 +39,7 @@ def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.optimize import minimize
 
-    problem = instance.to_pymoo(rows=rows)
+    problem = instance.to_pymoo(rows=rows) if rows else instance.to_pymoo()
     assert (problem.n_var, problem.n_obj) == (9, 1)
     assert problem.n_ieq_constr == (len(instance.row_names) if rows else 1)
     F, G = problem.evaluate(X, return_values_of=["F", "G"])

@@ -47,6 +47,7 @@ def test_files_stand_alone(built: tuple[str, Path]) -> None:
     header = (folder / f"{prefix}.h").read_text()
     instance = gaitbench.load(id)
     assert "@" not in header
+    assert f"objective, to be minimised{' [W]' if id.startswith('ssp') else ''}; infinite" in header
     for name, unit in zip(instance.names, instance.units, strict=True):
         assert f"{name} [{unit}]" in header
     if shutil.which("ldd"):

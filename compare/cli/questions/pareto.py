@@ -32,7 +32,9 @@ def pareto(
     search: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=BUDGET,BUDGET", help="NSGA2 or CMOPSO; repeatable. 'none' for no search.", show_default=False
+            metavar="NAME=BUDGET,BUDGET",
+            help="NSGA2, CMOPSO, CMOEAD or DCNSGA3; repeatable. 'none' for no search.",
+            show_default=False,
         ),
     ] = None,
     runs: Annotated[int, typer.Option(min=1, help="Runs of each search.")] = 11,

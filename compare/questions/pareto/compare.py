@@ -25,7 +25,7 @@ class Quality:
     """All runs of one algorithm at one budget; medians with the extremes over runs.
 
     Attributes:
-        algorithm: of pymoo.
+        algorithm: its name.
         budget: evaluations.
         runs: number.
         empty: runs without a feasible point; they count as hypervolume 0 and are left out of what follows.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from casadi import MX
 
@@ -49,8 +50,7 @@ class Margin:
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
         """(P,) values of candidates (P, n)."""
-        rows = [i for i, name in enumerate(objective.row_names) if name.partition("[")[0] == self._group]
-        margins: Array = objective.constraints(X)[:, rows].min(axis=1)
+        margins: Array = objective.constraints(X)[:, _rows(objective.groups, self._group)].min(axis=1)
         return margins
 
     def expression(self, point: Point, assembly: Assembly) -> MX:
@@ -67,6 +67,11 @@ class Margin:
     def _group(self) -> str:
         """Constraint rows that carry the limit."""
         return self.name.removesuffix("_min")
+
+
+@lru_cache(maxsize=16)  # searches ask for one point at a time
+def _rows(groups: tuple[str, ...], group: str) -> list[int]:
+    return [i for i, name in enumerate(groups) if name == group]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,13 @@ from compare.questions.pareto.study import ParetoStudy
 from compare.report.document import Figure, Table, text_table
 from nlp_gait.problem import GaitProblem
 
-SEARCH_COLOURS = {"NSGA2": COLOURS["ga"], "CMOPSO": COLOURS["pso"]}
-SEARCH_NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO"}
+SEARCH_COLOURS = {
+    "NSGA2": COLOURS["ga"],
+    "CMOPSO": COLOURS["pso"],
+    "CMOEAD": COLOURS["aco-grid"],
+    "DCNSGA3": COLOURS["cma"],
+}
+SEARCH_NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO", "CMOEAD": "C-MOEA/D", "DCNSGA3": "DCNSGA-III"}
 MARKS = ("x", "+", ".")
 
 

@@ -16,7 +16,7 @@ from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from metaheuristics.array import Array
-from metaheuristics.multi_objective import MultiObjective, minimize_many
+from metaheuristics.multi_objective import FrontAlgorithm, front_algorithm, minimize_many
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.problem import GaitProblem
 
@@ -42,11 +42,15 @@ class Scale:
 
 
 class PowerAndCompeting:
-    """The compiled objective with a criterion beside the power; see ``metaheuristics.multi_objective.ManyObjectives``."""
+    """The compiled objective with a criterion beside the power; see ``metaheuristics.multi_objective.ManyObjectives``.
+
+    Its constraints are those that its problem names, each with its worst row.
+    """
 
     def __init__(self, objective: CompiledObjective, criterion: CompetingObjective, scale: Scale) -> None:
         self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
         self._objective, self._criterion, self._scale = objective, criterion, scale
+        self.excess, self.groups = objective.excess, objective.groups
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
         """Objectives (P, 2) and violations (P,)."""
@@ -59,7 +63,7 @@ class SearchFront:
     """Feasible nondominated points of one run after a budget.
 
     Attributes:
-        algorithm: of pymoo.
+        algorithm: its name.
         run: number.
         budget: evaluations allowed.
         values: (k,) criterion.
@@ -93,7 +97,7 @@ def search_fronts(
         criterion: beside power.
         scale: of both, so that no algorithm's distances are dominated by one of them.
         out: folder.
-        searches: rising numbers of evaluations by algorithm of pymoo.
+        searches: rising numbers of evaluations by algorithm.
         runs: run k uses seed + k.
         seed: of the first run.
         progress: told which run is done.
@@ -108,7 +112,7 @@ def search_fronts(
     identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}
     fronts = []
     for name, budgets in searches.items():
-        algorithm = MultiObjective(algorithm=name)
+        algorithm = front_algorithm(name)
         for run in range(runs):
             inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed + run}
             compute = partial(_snapshots, compiled, algorithm, budgets, seed + run)
@@ -122,7 +126,7 @@ def search_fronts(
 
 
 def _snapshots(
-    compiled: PowerAndCompeting, algorithm: MultiObjective, budgets: Sequence[int], seed: int
+    compiled: PowerAndCompeting, algorithm: FrontAlgorithm, budgets: Sequence[int], seed: int
 ) -> list[dict[str, Any]]:
     """What one run had found after each budget, as plain data."""
     snapshots = minimize_many(compiled, algorithm, evaluations=budgets, seed=seed)

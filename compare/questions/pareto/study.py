@@ -19,7 +19,7 @@ from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from compare.study.task import plain_problem
-from metaheuristics.multi_objective import MultiObjective
+from metaheuristics.multi_objective import check_budgets, front_algorithm
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
@@ -81,7 +81,7 @@ def pareto_study(
         out: folder.
         points: of the front.
         starts: random starts at some of its points.
-        searches: budgets by algorithm of pymoo; none for the front alone.
+        searches: budgets by algorithm; none for the front alone.
         runs: of each algorithm.
         seed: of starts and of the first run.
         finished: what an earlier call has finished of a step; None to keep nothing of an unfinished one.
@@ -94,7 +94,7 @@ def pareto_study(
     """
     beside = competing_objective(name, problem)
     for algorithm, budgets in searches.items():
-        MultiObjective(algorithm=algorithm).check_budgets(budgets)  # before the front, which takes long
+        check_budgets(front_algorithm(algorithm), budgets)  # before the front, which takes long
     free = beside.freed(problem)
     finished = finished or Finished()
     asked = {"searches": {a: list(b) for a, b in searches.items()}, "runs": runs}

@@ -43,6 +43,7 @@ class CompiledObjective:
         lower: (n,) current lower bounds.
         upper: (n,) current upper bounds.
         row_names: (m,) constraint rows, in the order of ``constraints``.
+        groups: (m - n,) what each row of ``excess`` belongs to: its name without the place.
         backend: ``"compiled"`` or ``"interpreted"``.
         description: backend, compiler and lane count, in words.
     """
@@ -67,6 +68,8 @@ class CompiledObjective:
         self.description = evaluator.description
         self._evaluator = evaluator
         self._lower, self._upper = kernel.row_bounds(problem)
+        self._weights = kernel.weights
+        self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
         self._p = np.array(problem.p)
         self._threads = threads
         self._time_per_row_s = 0.0
@@ -98,6 +101,15 @@ class CompiledObjective:
         f, violation, g = np.empty(len(X)), np.empty(len(X)), np.empty((len(X), len(self.row_names)))
         self._evaluate(X, f, violation, g)
         return g
+
+    def excess(self, X: Array | Mapping[str, float]) -> Array:
+        """(P, m - n) by how much each row is beyond the nearer of its bounds, in units of its scale; met where <= 0.
+
+        Bounds of the variables are left out.
+        """
+        g = self.constraints(X)
+        beyond: Array = np.maximum(self._lower - g, g - self._upper) * self._weights
+        return beyond[:, : len(self.groups)]
 
     def __reduce__(self) -> tuple[Callable[..., CompiledObjective], tuple[Any, ...]]:
         """For pickle: the call that made it."""

@@ -100,10 +100,9 @@ def test_the_solution_is_in_its_file_although_the_reader_of_the_output_has_gone(
 
 
 def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():
-    from compare.study.description import description_of
-    from compare.study.task import solver_names
+    from compare.study.description import described_names, description_of
 
-    for name in solver_names():
+    for name in described_names():
         found = description_of(name)
         assert found.title and all(setting.words for setting in found.settings), name
     (swarm,) = as_json("list", "pso")["algorithms"]

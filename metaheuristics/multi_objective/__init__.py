@@ -1,0 +1,18 @@
+"""Minimisation of several objectives at once, with operators of the package pymoo.
+
+snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
+"""
+
+from metaheuristics.multi_objective.interface import FrontAlgorithm, ManyObjectives, check_budgets
+from metaheuristics.multi_objective.minimize_many import Snapshot, minimize_many
+from metaheuristics.multi_objective.registry import FRONT_ALGORITHMS, front_algorithm
+
+__all__ = [
+    "FRONT_ALGORITHMS",
+    "FrontAlgorithm",
+    "ManyObjectives",
+    "Snapshot",
+    "check_budgets",
+    "front_algorithm",
+    "minimize_many",
+]

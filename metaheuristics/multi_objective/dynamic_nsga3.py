@@ -1,0 +1,172 @@
+"""DCNSGA-III: NSGA-III whose constraints tighten as the run proceeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metaheuristics.array import Array
+from metaheuristics.interface import UNKNOWN, Start
+from metaheuristics.multi_objective.interface import feasible_front
+from metaheuristics.multi_objective.variation import Variation, directions
+from metaheuristics.settings import check_count, check_installed, check_number
+
+LEAST = 1e-8  # boundary at which the last generation arrives, z
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class DynamicConstrainedNsga3:
+    """DCNSGA-III: the mean violation is an objective more, and what counts as feasible tightens generation by generation.
+
+    A point is within the boundary if no constraint is exceeded by more than epsilon, which falls from the greatest excess in
+    the first generation to zero at the end of the budget. Where more points are within it than the population holds, they are
+    sorted by all objectives and the violation, and thinned out along reference directions as in NSGA-III; else those of least
+    violation stay.
+
+    Attributes:
+        population: members, a number of evenly spread directions; any number from 2 on for two objectives.
+        decrease: speed at which the boundary falls (cp).
+        crossover_index: of simulated binary crossover; the larger, the nearer are children to their parents.
+        mutation_index: of polynomial mutation, likewise.
+
+    Raises:
+        SearchError: a setting is not allowed, or pymoo is not installed.
+
+    Source:
+        Jiao, Zeng, Li, Yang, Ong (2021), Handling constrained many-objective optimization problems via problem
+        transformation, IEEE Transactions on Cybernetics 51(10), 4834-4847. Read was not the paper but its first author's
+        implementation (RuwangJiao/DCNSGA-III, and the one in PlatEMO), whose defaults these are.
+    """
+
+    population: int = 100
+    decrease: float = 5.0
+    crossover_index: float = 20.0
+    mutation_index: float = 20.0
+    name: ClassVar[str] = "DCNSGA3"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=2)
+        check_number(self, "decrease", above=0.0)
+        check_number(self, "crossover_index", at_least=3.0, at_most=30.0)
+        check_number(self, "mutation_index", at_least=3.0, at_most=30.0)
+        check_installed(self.name, "pymoo")
+
+    def start(self, start: Start, objectives: int) -> DynamicNsga3Search:
+        """Begin a run; see `FrontAlgorithm.start`."""
+        return DynamicNsga3Search(self, start, objectives)
+
+
+def boundary(first: Array, generation: int, generations: int, decrease: float) -> Array:
+    """What each constraint may be exceeded by.
+
+    Args:
+        first: (c,) in the beginning, > 0.
+        generation: from 0 on.
+        generations: at the last of which nothing is left.
+        decrease: cp.
+
+    Returns:
+        (c,) epsilon, from `first` to 0.
+
+    Source:
+        Jiao et al. (2021): E exp(-(k / B)^cp) - z with B = K / ln((E + z) / z)^(1 / cp), as their code has it.
+    """
+    fall = np.log((first + LEAST) / LEAST) * (generation / max(generations, 1)) ** decrease
+    return np.asarray(np.maximum(0.0, first * np.exp(-fall) - LEAST))
+
+
+class DynamicNsga3Search:
+    """A run of `DynamicConstrainedNsga3`; see `FrontSearch`."""
+
+    def __init__(self, settings: DynamicConstrainedNsga3, start: Start, objectives: int) -> None:
+        """Ask for the starting points first."""
+        self._settings, self._start = settings, start
+        self._directions = directions(settings.population, objectives)
+        self._vary = Variation(start, settings.crossover_index, settings.mutation_index)
+        # The starting points are the first of the generations that fit into the budget.
+        self._last = max(1, start.evaluations // settings.population - 1)
+        self._generation = 0
+        self._asked = start.initial
+        self._X = np.empty((0, start.initial.shape[1]))
+        self._F = np.empty((0, objectives))
+        self._violation, self._excess = np.empty(0), np.empty((0, 0))
+        self._first = np.empty(0)
+
+    def ask(self) -> Array:
+        """See `FrontSearch.ask`."""
+        return self._asked
+
+    def tell(self, X: Array, F: Array, violation: Array) -> None:
+        """See `FrontSearch.tell`."""
+        excess = np.maximum(0.0, self._start.excess(X, violation))
+        if not len(self._X):
+            self._X, self._F, self._violation, self._excess = np.array(X), np.array(F), np.array(violation), excess
+            largest = np.where(excess < UNKNOWN, excess, 0.0).max(axis=0)
+            self._first = np.where(largest > 0.0, largest, 1.0)
+        else:
+            self._X = np.concatenate([self._X, X])
+            self._F = np.concatenate([self._F, F])
+            self._violation = np.concatenate([self._violation, violation])
+            self._excess = np.concatenate([self._excess, excess])
+            self._keep(self._chosen(self._epsilon()))
+        self._generation += 1
+        self._asked = self._children()
+
+    def front(self) -> tuple[Array, Array]:
+        """See `FrontSearch.front`."""
+        return feasible_front(self._X, self._F, self._violation)
+
+    def _epsilon(self) -> Array:
+        return boundary(self._first, self._generation, self._last, self._settings.decrease)
+
+    def _children(self) -> Array:
+        """Children of winners of tournaments between two, which less excess beyond the boundary decides."""
+        count, rng = self._settings.population, self._start.rng
+        beyond = np.maximum(0.0, self._excess - self._epsilon()).sum(axis=1)
+        drawn = rng.integers(len(self._X), size=(2 * -(-count // 2), 2))
+        pool = np.where(beyond[drawn[:, 0]] <= beyond[drawn[:, 1]], drawn[:, 0], drawn[:, 1])
+        half = len(pool) // 2
+        return self._vary(self._X[pool[:half]], self._X[pool[half:]])[:count]
+
+    def _chosen(self, epsilon: Array) -> NDArray[np.intp]:
+        """Places of the members that survive."""
+        size = self._settings.population
+        mean = (self._excess / self._first).mean(axis=1)
+        within = np.flatnonzero((self._excess <= epsilon).all(axis=1))
+        if len(within) <= size:
+            return np.argsort(mean, kind="stable")[:size]
+        from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+        F = self._F[within]
+        fronts = NonDominatedSorting().do(np.column_stack([F, mean[within]]), n_stop_if_ranked=size)
+        sure = np.concatenate([*fronts[:-1], np.empty(0, dtype=int)]).astype(int)
+        last = np.asarray(fronts[-1], dtype=int)
+        if len(sure) + len(last) > size:
+            last = last[self._spread(F, sure, last, size - len(sure))]
+        chosen: NDArray[np.intp] = within[np.concatenate([sure, last])]
+        return chosen
+
+    def _spread(self, F: Array, sure: NDArray[np.intp], last: NDArray[np.intp], count: int) -> list[int]:
+        """Which of the last front join the sure ones, by NSGA-III's niches; the ideal point is that of all of them."""
+        from pymoo.algorithms.moo.nsga3 import (
+            associate_to_niches,
+            calc_niche_count,
+            get_extreme_points_c,
+            get_nadir_point,
+            niching,
+        )
+
+        ideal, candidates = F.min(axis=0), F[np.concatenate([sure, last])]
+        worst = candidates.max(axis=0)
+        nadir = get_nadir_point(get_extreme_points_c(candidates, ideal), ideal, worst.copy(), worst, worst)
+        niche, distance, _ = associate_to_niches(candidates, self._directions, ideal, nadir)
+        crowd = calc_niche_count(len(self._directions), niche[: len(sure)])
+        of_last = slice(len(sure), None)
+        return list(niching(last, count, crowd, niche[of_last], distance[of_last], random_state=self._start.rng))
+
+    def _keep(self, chosen: NDArray[np.intp]) -> None:
+        self._X, self._F = self._X[chosen], self._F[chosen]
+        self._violation, self._excess = self._violation[chosen], self._excess[chosen]

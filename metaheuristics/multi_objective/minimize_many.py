@@ -1,0 +1,108 @@
+"""The loop of several objectives: ask, evaluate, tell, and looks at what is found on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+
+from metaheuristics.array import Array
+from metaheuristics.errors import SearchError
+from metaheuristics.interface import UNKNOWN
+from metaheuristics.multi_objective.interface import FrontAlgorithm, ManyObjectives, check_budgets
+from metaheuristics.preparation import checked_seed, prepared
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class Snapshot:
+    """Feasible points of a run that no other point of its population betters in all objectives.
+
+    Attributes:
+        evaluations: used until then.
+        feasible: of these, without violation.
+        first_feasible: the first of these, counted from 1; None until there is one.
+        time_s: processor time until then [s].
+        objective_time_s: part of it spent in the objectives [s].
+        X: (k, n) points; none as long as the population has no feasible one.
+        F: (k, m) objectives.
+    """
+
+    evaluations: int
+    feasible: int
+    first_feasible: int | None
+    time_s: float
+    objective_time_s: float
+    X: Array
+    F: Array
+
+
+def minimize_many(
+    objectives: ManyObjectives,
+    algorithm: FrontAlgorithm,
+    *,
+    evaluations: Sequence[int] = (10_000,),
+    seed: int = 0,
+    progress: Callable[[int], None] = lambda used: None,
+) -> tuple[Snapshot, ...]:
+    """One run, looked at each time that another budget is used.
+
+    For an algorithm that does not know its budget each look is a run of that budget; DCNSGA3 plans for the last one.
+
+    Args:
+        objectives: what to minimise.
+        algorithm: settings.
+        evaluations: budgets, rising; each at least the population. Of the last generation before each only whole ones count.
+        seed: of starting points and search; equal seeds start alike whatever the algorithm.
+        progress: told the evaluations used, after each generation.
+
+    Returns:
+        A snapshot for each budget.
+
+    Raises:
+        SearchError: an argument is not allowed, all variables are fixed, or an objective is not finite.
+    """
+    check_budgets(algorithm, evaluations)
+    budgets = list(evaluations)
+    start = prepared(objectives, algorithm.population, budgets[-1], checked_seed(seed))
+    if not (start.upper > start.lower).any():
+        raise SearchError("all variables are fixed, so there is no front to look for; widen the bounds of one")
+    began, in_objectives = process_time(), 0.0
+    search = algorithm.start(start, objectives.count)
+
+    snapshots: list[Snapshot] = []
+    used = feasible = 0
+    first: int | None = None
+    while True:
+        X = search.ask()
+        while budgets and used + len(X) > budgets[0]:
+            points, values = search.front()
+            snapshots.append(
+                Snapshot(
+                    evaluations=used,
+                    feasible=feasible,
+                    first_feasible=first,
+                    time_s=process_time() - began,
+                    objective_time_s=in_objectives,
+                    X=points,
+                    F=values,
+                )
+            )
+            budgets.pop(0)
+        if not budgets:
+            return tuple(snapshots)
+        called = process_time()
+        F, violation = objectives(X)
+        in_objectives += process_time() - called
+        if not np.all(np.isfinite(F)):
+            raise SearchError("an objective is not finite; give a large finite number where it has no value")
+        # A violation that is not finite counts as the worst.
+        violation = np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)
+        good = np.flatnonzero(violation == 0.0)
+        if first is None and len(good):
+            first = used + int(good[0]) + 1
+        feasible += len(good)
+        search.tell(X, F, violation)
+        used += len(X)
+        progress(used)

@@ -1,0 +1,80 @@
+"""NSGA-II and CMOPSO of the package pymoo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from metaheuristics.adapters.pymoo import PymooSettings
+from metaheuristics.array import Array
+from metaheuristics.interface import Start
+from metaheuristics.preparation import completed
+
+MODULES: Mapping[str, str] = MappingProxyType({"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"})
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MultiObjective(PymooSettings):
+    """An algorithm of pymoo for several objectives, ``"NSGA2"`` or ``"CMOPSO"``; a population of 100 is pymoo's own choice.
+
+    Source:
+        Deb et al. (2002), NSGA-II; Zhang et al. (2018), A competitive mechanism based multi-objective particle swarm
+        optimizer with fast convergence.
+    """
+
+    population: int = 100
+    modules: ClassVar[Mapping[str, str]] = MODULES
+
+    @property
+    def name(self) -> str:
+        """The algorithm's."""
+        return self.algorithm
+
+    def start(self, start: Start, objectives: int) -> PymooFrontSearch:
+        """Begin a run; see `FrontAlgorithm.start`."""
+        search = self.begun(start, objectives)
+        if self.algorithm == "CMOPSO":
+            _seed_elites(search)
+        return PymooFrontSearch(search, start)
+
+
+class PymooFrontSearch:
+    """A run of pymoo's; see `FrontSearch`."""
+
+    def __init__(self, search: Any, start: Start) -> None:
+        self._search, self._start = search, start
+        self._infills: Any = None
+
+    def ask(self) -> Array:
+        """See `FrontSearch.ask`."""
+        self._infills = self._search.ask()
+        return completed(self._infills.get("X"), self._start.lower, self._start.upper)
+
+    def tell(self, X: Array, F: Array, violation: Array) -> None:
+        """See `FrontSearch.tell`."""
+        self._infills.set("F", np.array(F), "G", violation[:, None])
+        for individual in self._infills:
+            individual.H, individual.evaluated = np.zeros(0), {"F", "G", "H"}
+        self._search.tell(infills=self._infills)
+
+    def front(self) -> tuple[Array, Array]:
+        """See `FrontSearch.front`."""
+        search, start = self._search, self._start
+        feasible = search.opt[search.opt.get("FEAS")[:, 0]]
+        problem = search.problem
+        X = completed(feasible.get("X").astype(float).reshape(len(feasible), problem.n_var), start.lower, start.upper)
+        return X, feasible.get("F").astype(float).reshape(len(feasible), problem.n_obj)
+
+
+def _seed_elites(search: Any) -> None:
+    """pymoo thins out CMOPSO's elites with a generator of its own, unseeded: with this, equal seeds give equal runs."""
+    tournament = search.elites.truncation.survival
+
+    def truncated(members: Any, count: int) -> Any:
+        return tournament.do(search.problem, members, n_survive=count, random_state=search.random_state)
+
+    search.elites.truncation = truncated
