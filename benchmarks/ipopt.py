@@ -14,14 +14,14 @@ from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.problem import GaitProblem, Point
-from nlp_gait.symbolic.nonsmooth import Angle
+from nlp_gait.symbolic.nonsmooth import Angle, Exact
 
 QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 LIFTED = {**QUIET, "ipopt.mu_strategy": "adaptive", "ipopt.bound_relax_factor": 0.0}
 WIDTH = 1e-2  # of the sigmoid, in the first stage
 
 
-class Naive:
+class Naive(Exact):
     """What one writes first: roots in place of absolute values and minima, acos as it is."""
 
     SMOOTHING = 1e-3

@@ -1,30 +1,44 @@
-"""A robot of your own: NAO with a heavier torso, as a file that extends a robot of the package."""
+"""
+A robot of your own
+===================
+
+A robot is a file: JSON that may extend a robot of the package, or URDF or MJCF for any biped with two legs of six turning joints.
+Here NAO carries more and more at its torso, and the cheapest step changes with it.
+"""
 
 import json
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+
 import nlp_gait
 from nlp_gait.robots import load_robot
 
 torso = load_robot("nao-v5").links["torso"]
-heavy = {
-    "schema": 1,
-    "name": "nao-with-a-load",
-    "extends": "nao-v5",
-    "description": "NAO V5 with half a kilogram more at the torso's centre of mass",
-    "sources": {"links": "this example"},
-    "links": {
-        "torso": {
-            "mass_kg": torso.mass_kg + 0.5,
-            "com_m": list(torso.com_m),
-            "inertia_com_kgm2": list(torso.inertia_com_kgm2),
-        }
-    },
-}
+loads_kg, powers = (0.0, 0.5, 1.0), []
 with tempfile.TemporaryDirectory() as folder:
-    path = Path(folder) / "heavy.json"
-    path.write_text(json.dumps(heavy))
-    for robot in ("nao-v5", str(path)):
-        solution = nlp_gait.solve(nlp_gait.load("nao-ssp", robot=robot), starts=2, seed=0)
-        print(f"{load_robot(robot).name}: {solution.objective:.6f} W, {solution.status}")
+    for load_kg in loads_kg:
+        loaded = {
+            "schema": 1,
+            "name": "nao-with-a-load",
+            "extends": "nao-v5",
+            "description": "NAO V5 with more mass at the torso's centre of mass",
+            "sources": {"links": "this example"},
+            "links": {
+                "torso": {
+                    "mass_kg": torso.mass_kg + load_kg,
+                    "com_m": list(torso.com_m),
+                    "inertia_com_kgm2": list(torso.inertia_com_kgm2),
+                }
+            },
+        }
+        path = Path(folder) / f"loaded-{load_kg:g}.json"
+        path.write_text(json.dumps(loaded))
+        solution = nlp_gait.solve(nlp_gait.load("nao-ssp", robot=str(path)), starts=1, seed=0)
+        powers.append(solution.objective)
+        print(f"{load_robot(str(path)).name}: {load_kg:g} kg, {solution.objective:.6f} W, {solution.status}")
+
+figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
+axes.plot(loads_kg, powers, "o-")
+axes.set(xlabel="load at the torso [kg]", ylabel="least power [W]")

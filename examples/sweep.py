@@ -1,10 +1,15 @@
-"""The true price of lifting the foot higher: IPOPT follows the optimum over the swing height.
+"""
+The price of lifting the foot
+=============================
 
-python examples/sweep.py [FOLDER]
+IPOPT follows the optimum over a variable that is held at one value after another; each solve begins where the last one ended.
+`nlp-gait sweep` does the same from the command line, over one or two variables or limits.
 """
 
 import sys
 from pathlib import Path
+
+import matplotlib.pyplot as plt
 
 from compare.questions.sweep.report import sweep_answer
 from compare.questions.sweep.study import parse_axis, sweep
@@ -12,7 +17,11 @@ from compare.study.task import ProblemSpec
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 spec = ProblemSpec(name="nao-ssp")
-points = sweep(spec, [parse_axis("swing_height_m=0.015:0.028:3")], starts=2)
+points = sweep(spec, [parse_axis("swing_height_m=0.015:0.028:5")], starts=2)
 for point in points:
     print(f"{point.at['swing_height_m'] * 1000:.1f} mm: {point.objective:.5f} W, {point.status}")
-print("wrote", *sweep_answer(points, spec.load(), "ipopt").write(folder))
+print("wrote", *(path.name for path in sweep_answer(points, spec.load(), "ipopt").write(folder)))
+
+figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
+axes.plot([1000 * point.at["swing_height_m"] for point in points], [point.objective for point in points], "o-")
+axes.set(xlabel="height of the swing foot [mm]", ylabel="least power [W]")

@@ -1,4 +1,10 @@
-"""Your own search algorithm in 20 lines, in a study beside PSO and IPOPT."""
+"""
+Your own algorithm in the report
+================================
+
+Anything that is asked for candidates and told their values takes part in a study beside PSO and IPOPT, is judged as they are, and
+stands in the same tables and figures. From the command line: `nlp-gait compare nao-ssp --algorithms pso,FILE.py:ShrinkingBox`.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -7,6 +13,7 @@ import numpy as np
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.table import HEADER, cells, summarise
+from compare.drawing.convergence import convergence_figure
 from compare.report.document import Document, text_table
 from compare.report.writing import markdown_page
 from compare.study.study import Study, run_study
@@ -45,18 +52,9 @@ class ShrinkingBoxSearch:
         return ()
 
 
-problem = ProblemSpec(name="nao-ssp")
-solvers = [(ShrinkingBox(), 5), (ShrinkingBox(shrink=0.98), 5), ("pso", 5), ("ipopt", 2)]
-tasks = tuple(
-    Task(
-        problem=problem,
-        algorithm=algorithm,
-        run=run,
-        label=f"box-{algorithm.shrink}" if hasattr(algorithm, "shrink") else "",
-    )
-    for algorithm, runs in solvers
-    for run in range(runs)
-)
-(comparison,) = compare_problems(run_study(Study(tasks=tasks)))
+problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
+tasks = [Task(problem=problem, algorithm=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
+(comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
 table = text_table(HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
-print(markdown_page(Document(title="Shrinking boxes", parts=[table])))
+print(markdown_page(Document(title="A shrinking box", parts=[table])))
+figure = convergence_figure(comparison)

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import logging
 from collections.abc import Iterable
+from functools import cache
 from numbers import Integral
 
 LONGEST_VALUE = 80  # characters of a value in a message
+
+# Warns in words and what they are about, as ``logging`` takes them, once in a process however often a file is read.
+warn_once = cache(logging.getLogger("nlp_gait").warning)
 
 
 class GaitError(Exception):

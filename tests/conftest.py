@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from compare.study.workers import default_jobs
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.problem import GaitProblem, registry
 from nlp_gait.robots.loading import is_robot_file
 
@@ -27,7 +27,7 @@ SLOW_FOLDERS = tuple(Path(__file__).parent / "compare" / name for name in ("cli"
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Processors that this process may use; where it may not use all, the operating system's count is too large."""
-    return default_jobs()
+    return available_cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -17,6 +17,7 @@ ROOMS = (
     "nlp_gait.disk",
     "nlp_gait.files",
     "nlp_gait.columns",
+    "nlp_gait.notebook",
     "nlp_gait.decoding",
     "nlp_gait.references",
     "nlp_gait.robots",

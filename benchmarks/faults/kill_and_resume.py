@@ -21,8 +21,11 @@ import sys
 import tempfile
 import time
 import zipfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from nlp_gait import load
 
 SMALL = ("nao-ssp", "--intervals", "2", "--starts", "1")
 FIXED = (
@@ -30,7 +33,7 @@ FIXED = (
     *("hip_vx_end_m_s=0.001", "swing_height_m=0.015"),
 )
 WALKS = ("walk12", "--runs", "4", "--evaluations", "3000")
-# {out} is the folder of the case; {gait} a result that was made before.
+# {out} is the folder of the case; made before: {gait} a result, {finals} points from elsewhere, {study} the folder of a study.
 CASES: dict[str, tuple[str, ...]] = {
     "compare": (
         "compare",
@@ -88,8 +91,27 @@ CASES: dict[str, tuple[str, ...]] = {
     "export": ("export", "{gait}", "--format", "json", "--out", "{out}/gait.json"),
     "animate": ("animate", "{gait}", "--out", "{out}/gait.gif", "--fps", "10"),
     "export-objective": ("export-objective", "walk12-w015", "--to", "{out}"),
+    "export-solver": ("export-solver", "walk12", "--to", "{out}"),
+    "list": ("list", "--robot", "nao-v6", "--out", "{out}/robot.png"),
+    "import": ("import", "walk12", "{finals}", "--as", "GA (MATLAB)", "--out", "{out}"),
+    "import into a study": ("import", "walk12", "{finals}", "--as", "GA (MATLAB)", "--out", "{out}"),
+    "report": ("report", "{out}", "--csv"),
+    "report with the engine": ("report", "{out}", "--engine"),
+    "logs": ("logs", "{study}", "--to", "{out}"),
+    "logs of COCO": ("logs", "{study}", "--to", "{out}", "--format", "coco"),
+    "simulate": ("simulate", "{gait}", "--steps", "2", "--out", "{out}"),
+    "simulate with a film": ("simulate", "{gait}", "--steps", "2", "--size", "320x240", "--video", "{out}/film.gif"),
+    "reproduce": ("reproduce", "walk12", "--out", "{out}"),
 }
+# These begin in a copy of the study's folder.
+IN_A_STUDY = ("import into a study", "report", "report with the engine")
+STUDY = (
+    *("compare", "nao-ssp", "--intervals", "4", "--algorithms", "random,de", "--evaluations", "500", "--runs", "6"),
+    *("--starts", "6", "--jobs", "1", "--out"),
+)
+FINALS = 300  # rows
 TIMES = ("time_s", "build_s", "compile_s", "objective_s", "cpu_s", "result_sha256", "sessions", "files")
+TEXTS = (".dat", ".info", ".xml", ".cpp", ".hpp", ".h", ".c", ".sh", ".m", ".jl")
 
 
 def begin(arguments: list[str]) -> subprocess.Popen[bytes]:
@@ -122,6 +144,8 @@ def contents(folder: Path) -> dict[str, Any]:
             data = path.read_bytes().endswith(b"IEND\xaeB`\x82")
         elif path.suffix in (".html", ".svg"):
             data = path.read_text().rstrip().endswith(("</html>", "</svg>"))
+        elif path.suffix in TEXTS:
+            data = path.read_text(encoding="utf-8")
         elif path.suffix == ".gif":
             data = path.read_bytes().endswith(b";")
         if data is False:
@@ -139,21 +163,44 @@ def without_times(data: Any) -> Any:
 
 def kept(folder: Path) -> dict[str, bytes]:
     """Finished records and steps."""
-    paths = [*folder.glob("records/*/*.json"), *folder.glob("steps/*.json")]
+    paths = [*folder.glob("records/*/*.json"), *folder.glob("steps/*.json"), *folder.glob("engine/**/*.json")]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 
-def tried(name: str, folder: Path, gait: Path, kills: int, moments: random.Random) -> list[str]:
+def beforehand(folder: Path, names: Sequence[str]) -> dict[str, Path]:
+    """What the cases start from, as far as one of them needs it."""
+    made = {"gait": folder / "gait.json", "finals": folder / "finals.csv", "study": folder / "study"}
+    finished("solve", ["solve", "walk12", "--starts", "1", "--out", str(made["gait"])])
+    problem, draw = load("walk12"), random.Random(0)
+    rows = [
+        [draw.uniform(low, high) for low, high in zip(problem.lower.tolist(), problem.upper.tolist(), strict=True)]
+        for _ in range(FINALS)
+    ]
+    lines = [",".join((*problem.names, "evaluations")), *(",".join(map(repr, [*row, 1000])) for row in rows)]
+    made["finals"].write_text("\n".join(lines) + "\n")
+    if any(name in IN_A_STUDY or "{study}" in CASES[name] for name in names):
+        finished("compare", [*STUDY, str(made["study"])])
+    return made
+
+
+def tried(name: str, folder: Path, made: Mapping[str, Path], kills: int, moments: random.Random) -> list[str]:
     """What is wrong after so many kills of a command, and prints how far it came."""
 
     def line(out: Path) -> list[str]:
         resuming = name == "compare" and (out / "study.json").exists()
         words = ("compare", "--resume", "--jobs", "2", "--out", "{out}") if resuming else CASES[name]
-        return [word.format(out=out, gait=gait) for word in words]
+        return [word.format(out=out, **made) for word in words]
+
+    def begun(place: Path) -> None:
+        shutil.rmtree(place, ignore_errors=True)
+        if name in IN_A_STUDY:
+            shutil.copytree(made["study"], place)
+        else:
+            place.mkdir(parents=True)
 
     undisturbed, killed = folder / "undisturbed", folder / "killed"
     for place in (undisturbed, killed):
-        place.mkdir(parents=True)
+        begun(place)
     duration = finished(name, line(undisturbed))
     whole, wrong, before, ends = contents(undisturbed), [], kept(killed), 0
     for _ in range(kills):
@@ -161,8 +208,7 @@ def tried(name: str, folder: Path, gait: Path, kills: int, moments: random.Rando
         try:
             process.communicate(timeout=moments.uniform(0.0, duration))
             ends += 1  # it was done: begin anew
-            shutil.rmtree(killed)
-            killed.mkdir()
+            begun(killed)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -194,12 +240,11 @@ def main() -> None:
     arguments = parser.parse_args()
     folder = arguments.out or Path(tempfile.mkdtemp(prefix="kill-and-resume-"))
     names, moments = arguments.only.split(","), random.Random(arguments.seed)
-    gait = folder / "gait.json"
-    finished("solve", ["solve", "walk12", "--starts", "1", "--out", str(gait)])
+    made = beforehand(folder, names)
     shares = [arguments.kills // len(names) + (i < arguments.kills % len(names)) for i in range(len(names))]
     wrong = []
     for name, kills in zip(names, shares, strict=True):
-        wrong += tried(name, folder / name.replace(" ", "-"), gait, kills, moments)
+        wrong += tried(name, folder / name.replace(" ", "-"), made, kills, moments)
     print(f"{arguments.kills} kills of {len(names)} commands: {len(wrong)} wrong", *wrong, sep="\n")
     raise SystemExit(bool(wrong))
 

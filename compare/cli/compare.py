@@ -81,7 +81,8 @@ def compare(
     from compare.report import write_report
     from compare.study.imported import imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
-    from compare.study.study import Study, check_study, default_jobs, run_study
+    from compare.study.study import Study, check_study, run_study
+    from nlp_gait.backends.kernel.compiled import available_cores
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import mujoco
 
@@ -101,7 +102,9 @@ def compare(
         specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = _solvers(algorithms, starts, searches.polish)
         settings = searches.study(specs, solvers, max(starts, 1))
-    study = Study(tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or default_jobs(), scheduler=scheduler)
+    study = Study(
+        tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
+    )
     check_study(study)  # before the manifest names it
     if engine and not any(task.problem.load().playback for task in study.tasks):
         raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -78,13 +79,19 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
     from nlp_gait.problems.humanoid.report import understood_of
 
     target = None if out is None else output_file(out)
-    body = humanoid(name)
-    facts = understood_of(body)
+    log = logging.getLogger("nlp_gait")
+    level = log.level
+    log.setLevel(logging.ERROR)  # its warnings are among the notes below
+    try:
+        body = humanoid(name)
+    finally:
+        log.setLevel(level)
+    facts, notes = understood_of(body), body.biped.full.notes
     if as_json:
-        print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}})
+        print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}, "notes": list(notes)})
     else:
         print_table(f"What I understood of robot {body.biped.full.name}", ("what", "found"), facts)
-        for note in body.biped.full.notes:
+        for note in notes:
             stdout.print(f"note: {note}")
         stdout.print(
             "anything of it can be said otherwise in the JSON file beside it: docs/custom-robots.md; gaits: humanoid-ssp, "

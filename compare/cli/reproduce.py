@@ -19,6 +19,7 @@ REPRODUCTIONS = {
     "nao-pareto": "compare.papers.nao_pareto.reproduce",
     "walk12": "compare.papers.walk12.reproduce",
     "stairs": "compare.papers.stairs.reproduce",
+    "nao-claims": "compare.papers.nao_claims.reproduce",
 }
 
 

@@ -40,7 +40,8 @@ def search(
     Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
     `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
     """
-    from compare.study.study import Study, default_jobs, run_study
+    from compare.study.study import Study, run_study
+    from nlp_gait.backends.kernel.compiled import available_cores
 
     spec = problem.spec()
     solver = SolverSpec(algorithm=algorithm, runs=searches.runs, polish=searches.polish)
@@ -48,7 +49,7 @@ def search(
     with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
         records, stopped = until_interrupted(
             lambda: run_study(
-                Study(tasks=tasks, folder=out, jobs=jobs or default_jobs()),
+                Study(tasks=tasks, folder=out, jobs=jobs or available_cores()),
                 progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
                 anew=say,
             ),

@@ -70,14 +70,14 @@ def style() -> Iterator[None]:
 
 def new_figure(width_in: float = 6.3, height_in: float = 3.0) -> Figure:
     """Empty figure of a size [inch] that fits a printed column; to be used inside ``style()``."""
-    from matplotlib.figure import Figure
+    from compare.drawing.shown_figure import ShownFigure
 
-    return Figure(figsize=(width_in, height_in))
+    return ShownFigure(figsize=(width_in, height_in))
 
 
-def legend_below(figure: Figure) -> None:
-    """Legend of the first axes below the figure, which grows by its height."""
-    handles, labels = figure.axes[0].get_legend_handles_labels()
+def legend_below(figure: Figure, axes: Axes | None = None) -> None:
+    """Legend of some axes, or else the first ones, below the figure, which grows by its height."""
+    handles, labels = (axes or figure.axes[0]).get_legend_handles_labels()
     if not labels:
         return
     letters = 14 * figure.get_figwidth()  # that fit beside each other at the legend's size

@@ -11,9 +11,10 @@ import numpy as np
 from compare.study.progress import Progress
 from compare.study.record import RunRecord
 from compare.study.runner import Run, run_task
-from compare.study.study import Study, default_jobs, record_file, run_study
+from compare.study.study import Study, record_file, run_study
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 
 Runs = dict[tuple[str, str], list[RunRecord]]
@@ -48,7 +49,7 @@ def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = 
     Raises:
         InputError: a run failed before it had a point, or the folder holds runs of other tasks.
     """
-    study = Study(tasks=tuple(tasks), folder=folder, jobs=default_jobs(), run=run)
+    study = Study(tasks=tuple(tasks), folder=folder, jobs=available_cores(), run=run)
 
     def keep(count: int) -> None:
         for _ in range(count):

@@ -8,8 +8,11 @@ is asked again takes the same way past them, and its answer is that of an undist
 from __future__ import annotations
 
 import math
+import os
+import weakref
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,13 +23,14 @@ from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, as_json
 from nlp_gait.backends.interrupts import never
-from nlp_gait.backends.solvers import ipopt
+from nlp_gait.backends.solvers import ipopt, stages
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import OutputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
 
+KEPT, MADE = b"k", b"m"
 NAME_DIGITS = 20  # of a hash, in the name of a run's file
 FLOATS = tuple(field.name for field in fields(Outcome) if field.type == "float")
 
@@ -36,8 +40,6 @@ class Finished:
 
     Attributes:
         anew: told what has changed if the question was asked otherwise before.
-        kept: steps that an earlier call had finished.
-        made: steps that were made now.
 
     Args:
         out: folder of the answer, or None.
@@ -46,8 +48,8 @@ class Finished:
 
     def __init__(self, out: Path | None = None, anew: Progress = unwatched) -> None:
         self.anew = anew
-        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt], anew=anew)
-        self.kept = self.made = 0
+        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt, stages], anew=anew)
+        self._counts = None if out is None else _Counts()
 
     def asked(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
         """Say what has changed since this question was asked of a problem of this name, and remember how it is asked now."""
@@ -64,9 +66,9 @@ class Finished:
             return as_json(compute())
         name = f"{name}-{sha256_of(inputs)[:NAME_DIGITS]}"
         if (found := self._steps.kept(name, inputs)) is not None:
-            self.kept += 1
+            self._count(KEPT)
             return found.result
-        self.made += 1
+        self._count(MADE)
         computed = compute()
         with self._room():
             return self._steps.keep(name, inputs, computed)
@@ -89,7 +91,38 @@ class Finished:
     @property
     def sentence(self) -> str:
         """How much an earlier call had finished; empty if nothing."""
-        return f"{self.kept} of {self.kept + self.made} steps were finished by an earlier call" if self.kept else ""
+        counted = Counter() if self._counts is None else self._counts.so_far()
+        return f"{counted[KEPT]} of {counted.total()} steps were finished by an earlier call" if counted[KEPT] else ""
+
+    def _count(self, step: bytes) -> None:
+        if self._counts is not None:
+            self._counts.add(step)
+
+
+class _Counts:
+    """Steps that this process and its forks, which make starts side by side, have taken from files or made."""
+
+    def __init__(self) -> None:
+        self._counted: Counter[bytes] = Counter()
+        self._ends, self._owner = os.pipe(), os.getpid()
+        for end in self._ends:
+            os.set_blocking(end, False)
+            weakref.finalize(self, os.close, end)
+
+    def add(self, step: bytes) -> None:
+        """Count a step, in whichever process: a single byte is written at once or not at all."""
+        if os.getpid() == self._owner:
+            self._counted[step] += 1
+        else:
+            with suppress(BlockingIOError):  # 65,536 steps that nobody asked about
+                os.write(self._ends[1], step)
+
+    def so_far(self) -> Counter[bytes]:
+        """By kind."""
+        with suppress(BlockingIOError):
+            while True:
+                self._counted.update(bytes([step]) for step in os.read(self._ends[0], 65_536))
+        return self._counted
 
 
 class _Interrupted(Exception):

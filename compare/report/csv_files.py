@@ -6,12 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compare.study.record import RunRecord
+from compare.study.rows import HEADER, JUDGED, judged, row_of
 from nlp_gait.files import csv_text, without_nan, write_text
-
-CALLS = ("f", "g", "gradient", "jacobian", "hessian")
-RUN = ("problem", "solver", "run", "seed", "success", "status", "claimed_objective", "claimed_violation")
-JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
-COST = (*(f"calls_{kind}" for kind in CALLS), "failed_evaluations", "iterations", "time_s")
 
 
 def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
@@ -26,9 +22,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
         OutputError: a file cannot be written.
     """
     files = [folder / "runs.csv"]
-    write_text(
-        files[0], csv_text([(*RUN, *JUDGED, *COST), *(_cells([*_run(r), *_judged(r), *_cost(r)]) for r in records)])
-    )
+    write_text(files[0], csv_text([HEADER, *(_cells(row_of(r)) for r in records)]))
     for problem, stem in stems.items():
         own = [record for record in records if record.problem == problem]
         names = list(dict.fromkeys(name for record in own for name in record.x))
@@ -40,7 +34,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
                     r.algorithm,
                     r.run,
                     *(r.x.get(n) for n in names),
-                    *_judged(r),
+                    *judged(r),
                     *(r.verdict.indexes.get(n) for n in indexes),
                 ]
             )
@@ -50,22 +44,6 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
         files.append(folder / f"{stem}-points.csv")
         write_text(files[-1], csv_text([("solver", "run", *names, *JUDGED, *indexes), *rows]))
     return files
-
-
-def _run(record: RunRecord) -> list[object]:
-    claims = (record.objective, record.violation)
-    return [record.problem, record.algorithm, record.run, record.seed, record.success, record.status, *claims]
-
-
-def _judged(record: RunRecord) -> list[object]:
-    verdict = record.verdict
-    proven = None if verdict.guaranteed is None else verdict.guaranteed.holds
-    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible, proven]
-
-
-def _cost(record: RunRecord) -> list[object]:
-    calls = [record.evaluations.get(kind) for kind in CALLS]
-    return [*calls, record.failed_evaluations, record.iterations, record.time_s.solve]
 
 
 def _cells(row: list[object]) -> list[object]:

@@ -16,6 +16,7 @@ from compare.drawing.convergence import SMALLEST_GAP, convergence_figure
 from compare.drawing.distributions import ecdf_figure, final_gap_figure
 from compare.report.document import Figure, Section, text_table
 from compare.report.engine_section import engine_section
+from compare.report.gait_section import gaits_part
 from compare.study.engine import Played
 from compare.study.record import RunRecord
 from nlp_gait.files import file_safe
@@ -43,6 +44,7 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
         ),
         Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),
     )
+    gaits = gaits_part(comparison)
     where_needed = (
         engine_section(plays),
         _tests(comparison),
@@ -57,6 +59,7 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
             "Claims are the solvers' own. Everything else is the judge's: the exact functions at the reported point, on the "
             "problem's own samples. Gaps are measured from the best feasible value known here; evaluations are equivalent ones.",
             text_table(HEADER, [cells(s, comparison) for s in summaries], "Solvers, best median first"),
+            *(() if gaits is None else (gaits,)),
             *figures,
             _costs(comparison, summaries),
             *(section for section in where_needed if section is not None),

@@ -66,15 +66,15 @@ def problem_part(problem: GaitProblem) -> dict[str, Any]:
 
 
 def source_of(algorithm: object) -> str | None:
-    """Hash of the source file of an object of a program's own; None for this package's, and where there is no file."""
+    """Hash of the source file of an object of a program's own; None for this package's, and without a file, as in a notebook."""
     kind = algorithm if inspect.isroutine(algorithm) else type(algorithm)
     if kind.__module__.partition(".")[0] == "metaheuristics":
         return None
     try:
         path = inspect.getsourcefile(kind)
-    except TypeError:
+    except (TypeError, OSError):
         return None
-    if path is None:
+    if path is None or not Path(path).is_file():
         return None
     return source_digest(Path(path), read_bytes(Path(path), "source"), kind.__qualname__.partition(".")[0])
 

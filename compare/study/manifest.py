@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from compare.study.settings import StudySettings, settings_from
-from compare.study.workers import default_jobs
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.decoding import decoded
@@ -56,7 +56,7 @@ class Session:
             machine={
                 "processor": _processor(),
                 "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-                "processors": str(default_jobs()),
+                "processors": str(available_cores()),
             },
             versions={"python": sys.version.split()[0], **_versions()},
             kernel=_kernel(),

@@ -15,6 +15,7 @@ from nlp_gait.backends.over_time.guarantee import Guarantee
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, without_nan
+from nlp_gait.notebook import html_table
 from nlp_gait.problem import Objective
 from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
@@ -110,7 +111,7 @@ class Verdict:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class RunRecord:
     """A run of one solver on one problem: its claim, the judge's verdict, its cost.
 
@@ -185,6 +186,23 @@ class RunRecord:
             history=History(evaluations=(), objective=()),
             time_s=Times(build=0.0, compile=0.0, solve=0.0, objective=0.0, history=()),
         )
+
+    @property
+    def objective_in_words(self) -> str:
+        """Of the judge, for example ``power 0.845869 W``."""
+        if not self.verdict.feasible:
+            return "infeasible"
+        asked = self.definition["objective"]
+        return f"{asked['name']} {self.verdict.objective:.6g} {asked['unit']}".removesuffix(" 1")
+
+    def __repr__(self) -> str:
+        """One line: whose run on what, and what the judge finds."""
+        return f"<RunRecord of {self.algorithm} on {self.problem}, run {self.run}: {self.objective_in_words}>"
+
+    def _repr_html_(self) -> str:
+        calls = ", ".join(f"{kind} {count}" for kind, count in self.evaluations.items())
+        note = f"{self.status}; seed {self.seed}; calls {calls}; {self.time_s.solve:.3g} s"
+        return html_table(repr(self)[1:-1], ("variable", "value"), [(n, f"{v:.6g}") for n, v in self.x.items()], note)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""

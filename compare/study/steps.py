@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 from compare.study.definition import input_differences, sha256_of
 from compare.study.progress import Progress
-from compare.study.workers import default_jobs, side_by_side
+from compare.study.workers import side_by_side
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, remove_leftovers, writable_folder, write_json
 
@@ -80,7 +81,7 @@ class Steps:
                 self._progress(f"{step.name}: kept from an earlier run")
                 results[k] = kept.result
         waiting = {k: step for k, step in enumerate(steps) if k not in results}
-        for k, computed in _computed(waiting, min(jobs or default_jobs(), len(waiting)), self._progress):
+        for k, computed in _computed(waiting, min(jobs or available_cores(), len(waiting)), self._progress):
             results[k] = self.keep(steps[k].name, steps[k].inputs, computed)
         return [results[k] for k in range(len(steps))]
 

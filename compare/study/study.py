@@ -14,23 +14,25 @@ from typing import Any
 from compare.judge import evaluate
 from compare.study.definition import HASH, differences, key_of, without_hashes
 from compare.study.record import RunRecord, Verdict, read_record, run_file
+from compare.study.rows import frame_of
 from compare.study.runner import Run, run_task
 from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
-from compare.study.workers import default_jobs, run_jobs
+from compare.study.workers import run_jobs
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
+from nlp_gait.notebook import html_table
 
-__all__ = ["Study", "check_study", "default_jobs", "read_records", "record_file", "run_study"]
+__all__ = ["Study", "check_study", "read_records", "record_file", "run_study"]
 
 RECORDS = "records"
 KEY_DIGITS = 8
 SAME_VALUE = 1e-9  # relative: another processor rounds otherwise
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Study:
     """What to run.
 
@@ -60,6 +62,35 @@ class Study:
             raise InputError(
                 f"two solvers of the study are called {twice.stem!r} on {twice.parent.name!r}: label them apart"
             )
+
+    @property
+    def _groups(self) -> Counter[tuple[str, str]]:
+        """Runs by problem and solver."""
+        return Counter((task.problem.title, task.title) for task in self.tasks)
+
+    def __repr__(self) -> str:
+        """One line: what by what, and where it is kept."""
+        problems, solvers = (", ".join(dict.fromkeys(group[i] for group in self._groups)) for i in (0, 1))
+        kept = "not kept" if self.folder is None else f"kept in {str(self.folder)!r}"
+        return f"<Study of {problems} by {solvers}: {len(self.tasks)} runs, {kept}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(problem, solver, str(runs)) for (problem, solver), runs in self._groups.items()]
+        return html_table(repr(self)[1:-1], ("problem", "solver", "runs"), rows)
+
+    def to_frame(self) -> Any:
+        """The finished runs as a pandas data frame, a row each; see ``compare.study.rows.frame_of``.
+
+        Raises:
+            InputError: the study keeps nothing; ``frame_of(records)`` takes what ``run_study`` returned.
+            MissingExtraError: pandas is not installed.
+        """
+        if self.folder is None:
+            raise InputError(
+                "a study without a folder keeps no runs; give it one, or hand its records to compare.study.rows.frame_of"
+            )
+        records, _ = _finished(self)
+        return frame_of([records[index] for index in sorted(records)])
 
 
 def run_study(

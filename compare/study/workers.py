@@ -15,7 +15,6 @@ from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
 from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
-from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import refusing
 
@@ -28,11 +27,6 @@ PARENT_CHECKED_EVERY_S = 0.5
 
 Job = tuple[Task, RunRecord | None]
 """A task, and the run that it polishes if it does."""
-
-
-def default_jobs() -> int:
-    """Processors that this process may use."""
-    return available_cores()
 
 
 def run_jobs(

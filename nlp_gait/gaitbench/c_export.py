@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 
+from nlp_gait.backends.kernel.compiler import native_source
 from nlp_gait.backends.kernel.kernel_source import kernel_of, kernel_source
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.export.c_files import comment, write_c_files
@@ -56,7 +56,6 @@ def cpp_source(instance: Instance, sides: Sides) -> str:
     }
     known = {"lower": instance.lower, "upper": instance.upper, "best_x": instance.best_x}
     names = {"variable_names": instance.names, "row_names": sides.names}
-    native = files("nlp_gait.gaitbench") / "native"
     return "\n".join(
         [
             f"// GaitBench instance {instance.id}; see {prefix}.h. Generated: change nothing here.",
@@ -73,7 +72,7 @@ def cpp_source(instance: Instance, sides: Sides) -> str:
             *(f'extern "C" const char* const {prefix}_{name}[] = {_texts(values)};' for name, values in names.items()),
             f"#define SIDES {len(sides.names)}",
             f"#define FUNCTION {prefix}_evaluate",
-            (native / "objective.hpp").read_text(encoding="utf-8"),
+            native_source("nlp_gait.gaitbench", "objective.hpp"),
         ]
     )
 

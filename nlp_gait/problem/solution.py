@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from nlp_gait.problem.motion.signals import Array
+from nlp_gait.notebook import html_table
+from nlp_gait.problem.motion.signals import Array, Signals
+
+if TYPE_CHECKING:
+    from nlp_gait.problem.gait_problem import GaitProblem
 
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6
+SHOWN = 20  # variables, and rows with a price, that a notebook shows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,6 +222,51 @@ class Solution:
         found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
         converged = sum(start.success for start in self.starts)
         return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
+
+    def _repr_html_(self) -> str:
+        bounds = {a.name: f"{a.price:.4g} {a.price_unit}" for a in self.active_constraints}
+        x = [(name, f"{value:.6g}", bounds.pop(f"bounds[{name}]", "")) for name, value in list(self.x.items())[:SHOWN]]
+        rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
+        left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
+        note = f"{self.status}; " + (f"{left_out} more rows in .x and .active_constraints" if left_out else "all of x")
+        return html_table(
+            repr(self)[1:-1], ("variable or row", "value", "price of raising its bound"), [*x, *rows], note
+        )
+
+    def signals(self, problem: GaitProblem | None = None) -> Signals:
+        """Time histories at x.
+
+        Args:
+            problem: that was solved; None to load it by its name, which one of your own may not have.
+
+        Raises:
+            UnknownNameError: no problem has that name.
+            InputError: the problem has no time histories.
+        """
+        return self._of(problem).signals(self.x)
+
+    def plot(self, problem: GaitProblem | None = None) -> Any:
+        """The gait as a Matplotlib figure: stick figures from the side, power and balance margin over time.
+
+        Args:
+            problem: as in ``signals``.
+
+        Raises:
+            UnknownNameError: no problem has that name.
+            InputError: the problem has no time histories.
+        """
+        from nlp_gait.problem.result import Result
+
+        drawing = import_module("compare.drawing.gait_figure")  # by name: it stands above, and few results are drawn
+        found = self._of(problem)
+        gait = drawing.drawn_gait(Result(problem=found, x=found.check_x(self.x)))
+        return drawing.gaits_figure({self.solver: gait})
+
+    def _of(self, problem: GaitProblem | None) -> GaitProblem:
+        """The problem that was solved, with the values that it had."""
+        from nlp_gait.problem.registry import load
+
+        return (problem or load(self.problem, **self.options)).with_values(**self.parameters)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with the schema version of results."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import logging
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
-from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown
+from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown, warn_once
 from nlp_gait.files import refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
@@ -25,7 +24,6 @@ from nlp_gait.robots.tree import reversed_joint
 from nlp_gait.robots.understanding import Understood, understood
 from nlp_gait.robots.urdf import collision_points, urdf_record
 
-LOG = logging.getLogger("nlp_gait")
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
@@ -43,7 +41,7 @@ _DATA = resources.files("nlp_gait.robots") / "data"
 class RobotFile:
     """Content of a robot file. Links, joints and feet are decoded later, once it is known which of them are replaced."""
 
-    schema: Literal[1]
+    schema: Literal[1] = 1
     name: str | None = None
     extends: str | None = None
     description: str | None = None
@@ -217,7 +215,11 @@ def _read(name_or_path: str) -> RobotFile:
     if not name_or_path.endswith(".json") and name_or_path not in robot_names():
         raise unknown("robot", name_or_path, robot_names())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
-    return read_decoded(RobotFile, path, "robot file", error=RobotDataError)
+    file = read_decoded(RobotFile, path, "robot file", error=RobotDataError)
+    beside = [path.with_suffix(ending) for ending in MODEL_ENDINGS if os.path.isfile(path.with_suffix(ending))]
+    if file.extends is None and file.root is None and beside:  # it says of that model what it would say otherwise
+        return replace(file, extends=beside[0].name)
+    return file
 
 
 def _robot(file: RobotFile, source: str) -> Robot:
@@ -283,7 +285,7 @@ def _completed(file: RobotFile) -> tuple[RobotFile, tuple[str, ...]]:
         )
     for note in found.notes:
         if "foot:" not in note:
-            LOG.warning("robot %r: %s", name, note)
+            warn_once("robot %r: %s", name, note)
     feet = {side: file.feet.get(side, _Record({}, model))._replace(raw=raw) for side, raw in found.feet.items()}
     links = {key: records[key]._replace(raw=raw) for key, raw in found.links.items()}
     joints = {key: records[key]._replace(raw=raw) for key, raw in found.joints.items()}

@@ -5,6 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -23,6 +26,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 LOG = logging.getLogger("nlp_gait")
 RIM = 24  # points of a cylinder's edge
 UNLIMITED_RAD_S = 1000.0  # MJCF knows no limit of speed
+_READING = threading.Lock()  # MuJoCo has one handler of warnings for all threads
 
 
 def mjcf_record(path: str) -> dict[str, Any]:
@@ -112,9 +116,9 @@ def _compiled(path: str) -> Any:
 @lru_cache(maxsize=4)
 def _read(place: str, path: str) -> Any:
     mujoco = import_module("mujoco")
-    mujoco.set_mju_user_warning(lambda said: LOG.warning("robot file %r: %s", path, said))  # else it writes a file
     try:
-        model = mujoco.MjModel.from_xml_path(path)
+        with _logged_warnings(mujoco, path):
+            model = mujoco.MjModel.from_xml_path(path)
         for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
             if not sound(getattr(model, name)):
                 raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
@@ -122,8 +126,18 @@ def _read(place: str, path: str) -> Any:
     except Exception as error:  # ValueError, and whatever a plugin or decoder raises
         said = " ".join(str(error).split())[:300] or type(error).__name__
         raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {said}") from error
-    finally:
-        mujoco.set_mju_user_warning(None)
+
+
+@contextmanager
+def _logged_warnings(mujoco: Any, path: str) -> Iterator[None]:
+    """MuJoCo's warnings in this package's log instead of a file in the user's folder; later ones go where they went before."""
+    with _READING:
+        earlier = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(lambda said: LOG.warning("robot file %r: %s", path, said))
+        try:
+            yield
+        finally:
+            mujoco.set_mju_user_warning(earlier)
 
 
 def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]:

@@ -4,8 +4,8 @@ Written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it can stand w
 
     mass            factor on the masses and inertias of all links
     LINK.mass       the same for one link, for example ``LThigh.mass``
-    thigh_m         added to both thighs; mass, centre of mass and inertia of the link stay
-    tibia_m         likewise
+    thigh_m         added between the knees and the joints before them; masses, centres of mass and inertias stay
+    tibia_m         likewise between the upper ankle joints and the knees
     sole_x_m        both soles shifted forwards under their ankles
     sole_y_m        likewise to the left
     sole_front_m    added to both soles' extent forwards; likewise ``sole_back_m``, ``sole_left_m``, ``sole_right_m``
@@ -17,20 +17,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from nlp_gait.errors import InputError, UnknownNameError, unknown
+from nlp_gait.errors import InputError, unknown
 from nlp_gait.robots.robot import Foot, Link, Robot
 
 MARK = "@"
 MASS = "mass"
-SIDES = "LR"
 # What is added to each extent of a sole, for each unit of a quantity.
 SOLES: Mapping[str, Mapping[str, int]] = {
     "sole_x_m": {"front_m": 1, "back_m": -1},
     "sole_y_m": {"left_m": 1, "right_m": -1},
     **{f"sole_{extent}": {extent: 1} for extent in ("front_m", "back_m", "left_m", "right_m")},
 }
-# The joint at the lower end of a part of the leg.
-LENGTHS = {"thigh_m": "KneePitch", "tibia_m": "AnklePitch"}
+# The joint at the lower end of a part of the leg, counted from the foot upwards: two of the ankle, then the knee.
+LENGTHS = {"thigh_m": 2, "tibia_m": 1}
 
 
 def perturbed(robot: Robot, changes: Mapping[str, float]) -> Robot:
@@ -104,16 +103,20 @@ def _heavier(link: Link, factor: float) -> Link:
     return replace(link, mass_kg=factor * link.mass_kg, inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
 
 
-def _with_length(robot: Robot, joint: str, metres: float) -> Robot:
+def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
     """Both legs longer above a joint, which moves away from the one before it."""
     joints = dict(robot.joints)
-    for side in SIDES:
-        name = f"{side}{joint}"
-        if name not in joints:
-            raise UnknownNameError(f"robot {robot.name!r} has no joint {name!r}, so its legs have no length to change")
+    for side, foot in robot.feet.items():
+        path = robot.path_to_root(foot.link)
+        if len(path) <= above_foot + 1:
+            raise InputError(
+                f"robot {robot.name!r}: the {side} leg has {len(path)} joints, too few for a thigh and a shank whose length "
+                "can change"
+            )
+        name = path[above_foot].name
         origin = joints[name].origin_m
         length = math.hypot(*origin)
-        if not length + metres > 0.0:
+        if not (length > 0.0 and length + metres > 0.0):
             raise InputError(
                 f"robot {robot.name!r}: joint {name!r} is {length:g} m below the one before it; adding {metres:g} m "
                 "leaves nothing"

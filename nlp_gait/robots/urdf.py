@@ -5,7 +5,6 @@ The file is parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses 
 
 from __future__ import annotations
 
-import logging
 import math
 import re
 from collections.abc import Callable
@@ -16,13 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.fields import LARGEST_NUMBER, sound
 from nlp_gait.robots.meshes import mesh_file, mesh_points
 from nlp_gait.robots.tree import inertia_moments, point_inertia
-
-LOG = logging.getLogger("nlp_gait")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -195,7 +192,7 @@ def _told(path: str) -> Callable[[str], None]:
     def tell(message: str) -> None:
         if not OWNER.search(message):
             raise RobotDataError(message)
-        LOG.warning("robot file %r: %s; it is not read, and may be removed", path, message)
+        warn_once("robot file %r: %s; it is not read, and may be removed", path, message)
 
     return tell
 

@@ -12,7 +12,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
 from nlp_gait.robots import Joint
-from nlp_gait.simulation.feedback import Balance, Feedback
+from nlp_gait.simulation.feedback import Balance, Feedback, check_period
 from nlp_gait.simulation.plan import Plan
 
 # Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
@@ -55,6 +55,7 @@ class Drive:
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
                 raise InputError(f"{name} of a drive must be > 0, got {value!r}")
+        check_period("drive", self.period_s)
         allowed = {"interpolation": INTERPOLATIONS, "feed_forward": FEED_FORWARD, "torque_limits": TORQUE_LIMITS}
         for name, names in allowed.items():
             if getattr(self, name) not in names:

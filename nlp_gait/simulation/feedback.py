@@ -17,6 +17,17 @@ from nlp_gait.simulation.plan import SIDES, Plan
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
 NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
 
+# Between two commands of a controller: NAO's works in cycles of 10 ms, the engine in steps of 0.5 ms.
+SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 1e-4, 1.0
+
+
+def check_period(owner: str, period_s: float) -> None:
+    """Refuse a time between two commands of a controller that no controller has."""
+    if not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
+        raise InputError(
+            f"period_s of a {owner} must be from {SHORTEST_PERIOD_S:g} to {LONGEST_PERIOD_S:g} s, got {period_s!r}"
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feedback:
@@ -71,6 +82,7 @@ class Feedback:
             least = "> 0" if name == "period_s" else ">= 0"
             if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and least == ">= 0"))):
                 raise InputError(f"{name} of a feedback must be {least}, got {value!r}")
+        check_period("feedback", self.period_s)
 
     def with_strength(self, factor: float) -> Feedback:
         """The same with so many times the springs and dampers."""

@@ -21,6 +21,7 @@ from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.problems.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
 from nlp_gait.problems.biped.phase import BOTH_FEET
 from nlp_gait.robots import Robot
+from nlp_gait.simulation.feedback import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
 from nlp_gait.symbolic.balance import sole_limits
 from nlp_gait.symbolic.trajectories import Motion
@@ -50,6 +51,7 @@ class Sharing:
             value = getattr(self, name)
             if not value > 0.0:  # NaN fails too
                 raise InputError(f"{name} of a sharing of load must be > 0, got {value!r}")
+        check_period("sharing of load", self.period_s)
 
 
 class Support(NamedTuple):

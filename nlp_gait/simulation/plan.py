@@ -20,6 +20,8 @@ SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 STANDING = 1e-9  # [m]; a sole that moves less is a support
+# Of a walk: an engine's step of 0.5 ms is kept with all that is measured, and so is each step's plan.
+MOST_STEPS, LONGEST_S = 1000, 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,8 +145,8 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
         steps: how many are played one after the other; by default what the gait is, one phase or one cycle.
 
     Raises:
-        InputError: a problem that says nothing of it, a gait so damaged that its angles are not finite, or several steps of
-            what cannot be repeated.
+        InputError: a problem that says nothing of it, a gait so damaged that its angles are not finite, several steps of
+            what cannot be repeated, or more than anybody waits for.
     """
     problem = result.problem
     playback = problem.playback
@@ -152,6 +154,8 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
         raise InputError(f"problem {problem.name!r} cannot be simulated: it does not say how its gaits are played")
     if steps is not None and not playback.repeats:
         raise InputError(f"problem {problem.name!r} is no cycle that can be repeated; leave out the number of steps")
+    if steps is not None and steps > MOST_STEPS:
+        raise InputError(f"at most {MOST_STEPS} steps are played, got {steps}; take fewer")
     at = problem.at(result.x)
     if playback.motion is not None:
         signals = playback.motion(at, 1 if steps is None else steps)
@@ -160,6 +164,10 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
         signals = signals if steps is None else walk(signals, playback.robot, steps)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
+    if (duration := float(signals.arrays["t"][-1])) > LONGEST_S:
+        raise InputError(
+            f"{steps} steps of this gait last {duration:g} s, and at most {LONGEST_S:g} s are played; take fewer"
+        )
     return Plan(
         robot=playback.robot,
         full_robot=problem.robot or playback.robot,

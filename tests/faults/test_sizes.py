@@ -13,10 +13,16 @@ from compare.study.task import ProblemSpec
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.export.formats import FORMATS, write_as
+from nlp_gait.problem import Result
 from nlp_gait.problem.registry import LARGEST_COUNT
 from nlp_gait.problem.result import load_result
 from nlp_gait.problem.sampling import LONGEST_S, SHORTEST_S, sampled
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
+from nlp_gait.simulation.load_sharing import Sharing
+from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
+from nlp_gait.simulation.plan import MOST_STEPS, plan_of
 
 
 def test_a_sweep_is_as_large_as_its_grid() -> None:
@@ -48,6 +54,29 @@ def test_a_gait_without_a_duration_is_not_drawn_played_or_exported(duration_s: f
         with pytest.raises(InputError, match="time must run forward"):
             write_as(format_, tmp_path / f"gait{ending}", result, 40)
     assert [file.name for file in tmp_path.iterdir()] == ["result.json"]
+
+
+WALK = {"step_length_m": 0.1, "frontal_shift_m": 0.1, "foot_lift_m": 0.02, "bending_height_m": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("steps", "step_time_s", "message"),
+    [
+        (10**9, 1.0, f"at most {MOST_STEPS} steps are played, got 1000000000; take fewer"),
+        (4, 100.0, f"4 steps of this gait last 400 s, and at most {LONGEST_PLAYED_S:g} s are played"),
+    ],
+)
+def test_a_walk_is_played_as_long_as_somebody_waits_for(steps: int, step_time_s: float, message: str) -> None:
+    walk = load("walk12").with_values(step_time_s=step_time_s)
+    with pytest.raises(InputError, match=message):
+        plan_of(Result(problem=walk, x=walk.check_x(WALK)), steps)
+
+
+@pytest.mark.parametrize("owner", [Drive, Feedback, Sharing])
+@pytest.mark.parametrize("period_s", [1e-12, 1e6])
+def test_no_controller_commands_every_picosecond_or_once_a_month(owner: type, period_s: float) -> None:
+    with pytest.raises(InputError, match=f"must be from 0.0001 to 1 s, got {period_s!r}"):
+        owner(period_s=period_s)
 
 
 def test_a_film_has_no_more_frames_than_somebody_waits_for() -> None:

@@ -15,7 +15,8 @@ from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.gaitbench.known import known
-from nlp_gait.problem import Array
+from nlp_gait.gaitbench.problem import held
+from nlp_gait.problem import Array, load
 
 # A published value may change by rounding alone: other compilers, other widths of SIMD.
 PUBLISHED = 1e-12
@@ -137,8 +138,28 @@ def test_what_is_held_is_no_variable() -> None:
     X = points(instance)
     position = free.names.index("single_support_time_s")
     np.testing.assert_allclose(instance(X)[0], free(np.insert(X, position, 1.0, axis=1))[0], rtol=1e-13)
+    whole = np.insert(X, position, 1.0, axis=1)[0]
+    for held_constant, found in ((instance, X[0]), (free, whole)):
+        assert held_constant.gait_problem.name == "gaitbench"
+        np.testing.assert_allclose(
+            held_constant.gait_problem.signals(found).arrays["tau"], free.gait_problem.signals(whole).arrays["tau"]
+        )
     dense = instance.gait_problem.dense(2)
     assert dense is not None and dense.names == instance.names
+
+
+def test_bounds_of_what_is_held_are_no_values_any_more() -> None:
+    walk = load("walk12").with_values(**{"step_length_m.lower": 0.06, "lambda": 0.3})
+    found = held(walk, {"step_length_m": 0.1})
+    assert dict(found.values) == {"lambda": 0.3} and found.value("step_length_m") == 0.1
+
+
+def test_an_instance_says_what_it_is_and_keeps_its_bounds() -> None:
+    instance = gaitbench.load("walk12-w015")
+    assert repr(instance) == f"<GaitBench walk12-w015: 4 variables, {len(instance.row_names)} rows>"
+    for bounds in (instance.lower, instance.upper):
+        with pytest.raises(ValueError, match="read-only"):
+            bounds[0] = 0.0
 
 
 def test_the_one_equation_of_splines_is_a_band() -> None:
@@ -195,6 +216,7 @@ def test_definitions_are_those_that_were_published() -> None:
         assert entry["subsets"] == (["small", "full"] if definition.small else ["full"])
 
 
+@pytest.mark.slow
 def test_the_catalogue_has_an_entry_for_each() -> None:
     """Plain data, and the file in the documentation is that."""
     made = json.loads(json.dumps(gaitbench.catalogue(), allow_nan=False))

@@ -133,7 +133,7 @@ def test_what_is_wrong_with_a_robot_is_said(
         ("{", "is not valid JSON"),
         ("[]", r"it must be an object, got \[\]"),
         ("[" * 100_000, "is not valid JSON"),
-        ("{}", "schema is missing"),
+        ("{}", "'name' is missing"),
     ],
     ids=["cut off", "list", "too deep", "empty"],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -76,3 +77,26 @@ def test_without_mujoco_its_extra_is_named(path: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(mjcf, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"MJCF files need MuJoCo.*pip install 'nlp-gait\[sim\]'"):
         load_robot(path)
+
+
+@pytest.mark.parametrize("spoilt", [False, True])
+def test_the_engines_warnings_go_where_they_went_before(path: str, tmp_path: Path, spoilt: bool) -> None:
+    """Else later ones would be written to a file in the user's folder."""
+    robot = tmp_path / "robot.xml"
+    robot.write_text("<mujoco><worldbody/>" if spoilt else Path(path).read_text(encoding="utf-8"), encoding="utf-8")
+    said: list[str] = []
+    mujoco.set_mju_user_warning(said.append)
+    try:
+        with nullcontext() if not spoilt else pytest.raises(RobotDataError):
+            load_robot(str(robot))
+        assert mujoco.get_mju_user_warning() == said.append
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
+def test_a_warning_while_a_robot_is_read_is_logged(path: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of MuJoCo's compiler, in this package's log and in no file."""
+    with pytest.MonkeyPatch.context() as patch, mjcf._logged_warnings(mujoco, "robot.xml"):
+        patch.chdir(tmp_path)
+        mujoco.get_mju_user_warning()("a tensor was mended")
+    assert caplog.messages == ["robot file 'robot.xml': a tensor was mended"] and not list(tmp_path.iterdir())

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot
+from nlp_gait.robots.leg import leg_of
 from nlp_gait.robots.perturbation import perturbed, perturbed_name, quantities, split_name
+from tests.robots.crooked import crooked
 
 NAO = load_robot("nao-v5")
 
@@ -31,6 +37,16 @@ def test_both_legs_get_longer() -> None:
     for side in "LR":
         assert tall.joints[f"{side}KneePitch"].origin_m == pytest.approx((0.0, 0.0, -0.101))
         assert tall.joints[f"{side}AnklePitch"].origin_m == pytest.approx((0.0, 0.0, -0.1009))
+
+
+def test_the_legs_of_any_robot_get_longer(tmp_path: Path) -> None:
+    pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+    robot = load_robot(str(crooked(tmp_path)))
+    tall = perturbed(robot, {"thigh_m": 0.01, "tibia_m": -0.005})
+    for side in robot.feet:
+        before, after = (leg_of(each, side) for each in (robot, tall))
+        steps = [[math.dist(leg.points[k], leg.points[k - 1]) for k in range(1, 6)] for leg in (before, after)]
+        assert np.subtract(steps[1], steps[0]) == pytest.approx([0, 0, 0.01, -0.005, 0], abs=1e-12)
 
 
 def test_a_shifted_sole_keeps_its_size_and_shape() -> None:

@@ -28,7 +28,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 
 def beside(path: str, **record: object) -> str:
     """Write the robot file beside a URDF."""
-    own = {"schema": 1, "extends": Path(path).name, **record}
+    own = record  # schema, and what it extends, go without saying
     Path(path).with_suffix(".json").write_text(json.dumps(own), encoding="utf-8")
     return path
 

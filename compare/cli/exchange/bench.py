@@ -48,8 +48,9 @@ def bench(
     from compare.bench.page import leaderboard_page, verdict
     from compare.report.writing import write_document
     from compare.study.record import RunRecord
-    from compare.study.study import Study, check_study, default_jobs, run_study
+    from compare.study.study import Study, check_study, run_study
     from nlp_gait import gaitbench
+    from nlp_gait.backends.kernel.compiled import available_cores
 
     chosen = gaitbench.names(suite) if instances is None else tuple(names_in(instances))
     for id in chosen:
@@ -70,7 +71,7 @@ def bench(
     if algorithm is not None:
         label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
         study = Study(
-            tasks=bench_tasks(chosen, algorithm, label=label, runs=runs), folder=out, jobs=jobs or default_jobs()
+            tasks=bench_tasks(chosen, algorithm, label=label, runs=runs), folder=out, jobs=jobs or available_cores()
         )
         name = study.tasks[0].title
         if name in BASELINE:

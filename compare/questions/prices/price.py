@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from nlp_gait.decoding import decoded
 
 # A variable that moves by less than this share of its range over a natural step stands still.
 STANDS = 1e-9
@@ -60,6 +63,15 @@ class Price:
         name = max(moves, key=lambda variable: abs(moves[variable]) / ranges[variable], default="")
         still = not name or abs(moves[name] * self.step) < STANDS * ranges[name]
         return None if still else (name, moves[name] * self.step)
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data that gives back every bit: JSON has no infinity, so that the reach is text."""
+        return {**asdict(self), "reach": [repr(end) for end in self.reach]}
+
+
+def price_from(raw: Mapping[str, Any]) -> Price:
+    """The price that ``Price.plain`` was asked of."""
+    return decoded(Price, {**raw, "reach": [float(end) for end in raw["reach"]]})
 
 
 @dataclass(frozen=True, kw_only=True)

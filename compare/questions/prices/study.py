@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
+from compare.questions.kept import Finished
 from compare.questions.other_robot import is_mass, present_value, with_robot
-from compare.questions.prices.price import STANDS, Price, Prices
+from compare.questions.prices.price import STANDS, Price, Prices, price_from
+from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
@@ -32,6 +35,25 @@ CHECK_SHARE, LEAST_CHECK_SHARE = 1e-3, 1e-6
 AGREEMENT = 1e-4
 # Half-width of the central differences over rebuilt models: masses enter the objective almost linearly.
 MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
+
+
+class _KeptPrices(NamedTuple):
+    """Prices that take seconds, in steps: those of the whole robot, and what solving again says of each."""
+
+    finished: Finished
+    inputs: dict[str, Any]
+    progress: Progress
+
+    def of_robot(self, compute: Callable[[], list[Price]]) -> list[Price]:
+        raw = self.finished.step("robot", self.inputs, lambda: [price.plain() for price in compute()])
+        return [price_from(price) for price in raw]
+
+    def checked(self, base: Solved, price: Price, changed: Callable[[float], GaitProblem | None]) -> Price:
+        def compute() -> dict[str, Any]:
+            self.progress(f"solving again with another {price.name}")
+            return _checked(base, price, changed).plain()
+
+        return price_from(self.finished.step("check", {**self.inputs, "quantity": price.name}, compute))
 
 
 class Solved(NamedTuple):
@@ -63,6 +85,7 @@ def prices(
     seed: int = 0,
     checks: int = 3,
     solver: Solver | None = None,
+    finished: Finished | None = None,
     progress: Progress = unwatched,
 ) -> Prices:
     """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
@@ -73,14 +96,19 @@ def prices(
         seed: of the starts.
         checks: how many of the robot's quantities, largest change first, are checked by solving again; all parameters are.
         solver: one that gives multipliers; None for IPOPT, which in any case sharpens what was found.
+        finished: what an earlier call has finished; None to keep nothing.
         progress: told each step when it begins.
 
     Raises:
         InputError: no optimum was found, the solver gives no multipliers, or the problem is too large.
     """
     problem = spec.load()
+    finished, chosen = finished or Finished(), solver or IpoptSettings()
+    asked = {"starts": starts, "seed": seed, "solver": chosen.name, "settings": chosen.plain()}
+    finished.asked("prices", problem, **asked, checks=checks)
+    kept = _KeptPrices(finished, {**fingerprint(problem), **asked}, progress)
     progress("solving")
-    base = solved(problem, starts, seed, solver)
+    base = solved(problem, starts, seed, finished.solver(chosen))
     found = base.optimum
     limits, free = list[Price](), 0
     robot: list[Price] = []
@@ -88,11 +116,11 @@ def prices(
         every = _ranked(_parameter_prices(found))
         limits = [price for price in every if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
         free = len(every) - len(limits)
-        limits = [_checked(base, price, progress, partial(_moved, problem, price)) for price in limits]
+        limits = [kept.checked(base, price, partial(_moved, problem, price)) for price in limits]
         if problem.robot is not None:
-            robot = _ranked(_robot_prices(spec, found, problem.robot, progress))
+            robot = _ranked(kept.of_robot(partial(_robot_prices, spec, found, problem.robot, progress)))
             robot[:checks] = [
-                _checked(base, price, progress, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
+                kept.checked(base, price, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
             ]
     return Prices(
         problem=problem.name,
@@ -176,9 +204,8 @@ def _with_changed_robot(spec: ProblemSpec, price: Price, change: float) -> GaitP
     return with_robot(spec, {price.name: price.value + change})
 
 
-def _checked(base: Solved, price: Price, progress: Progress, changed: Callable[[float], GaitProblem | None]) -> Price:
+def _checked(base: Solved, price: Price, changed: Callable[[float], GaitProblem | None]) -> Price:
     """A price with what solving again says, from the unchanged optimum, a little and a natural step away."""
-    progress(f"solving again with another {price.name}")
     turn = min(abs(reach) for reach in price.reach)
     small = min(CHECK_SHARE * price.step, max(turn / 2, LEAST_CHECK_SHARE * price.step))
     low, high, less, more = (_neighbour(base, changed(d)) for d in (-small, small, -price.step, price.step))

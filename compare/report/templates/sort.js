@@ -1,5 +1,6 @@
 "use strict";
-// A click on a column's head sorts the table by it, a second click the other way round.
+// A click on a column's head sorts the table by it, a second click the other way round. On narrow screens, where the style sets
+// each row as a block, every cell says of which column it is.
 for (const table of document.querySelectorAll("table")) {
   const heads = [...table.tHead.rows[0].cells];
   const body = table.tBodies[0];
@@ -11,6 +12,8 @@ for (const table of document.querySelectorAll("table")) {
     if (typeof a === "number" && typeof b === "number") return a === b ? 0 : a < b ? -1 : 1;
     return String(a).localeCompare(String(b), "en", { numeric: true });
   };
+  table.classList.add("sortable");
+  for (const row of body.rows) [...row.cells].forEach((cell, column) => { cell.dataset.label = heads[column].textContent; });
   heads.forEach((head, column) => {
     head.addEventListener("click", () => {
       const upwards = head.getAttribute("aria-sort") !== "ascending";

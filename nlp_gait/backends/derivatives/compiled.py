@@ -108,13 +108,9 @@ def _stands_for(nlp: Mapping[str, MX], second: bool) -> str:
 def _generator() -> str:
     """Hash of the code that writes the source."""
     digest = hashlib.sha256()
-    for package in (
-        "nlp_gait.backends.derivatives",
-        "nlp_gait.backends.derivatives.native",
-        "nlp_gait.backends.kernel.native",
-    ):
-        folder = files("nlp_gait.backends").joinpath(*package.split(".")[2:])
-        for file in sorted(folder.iterdir(), key=lambda each: each.name):
+    backends = files("nlp_gait.backends")
+    for folder in ("derivatives", "derivatives/native", "kernel/native"):
+        for file in sorted(backends.joinpath(folder).iterdir(), key=lambda each: each.name):
             if file.name.endswith((".py", ".hpp")):
                 digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -19,6 +19,7 @@ from nlp_gait.backends.derivatives.operations import CODES, instructions
 
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 ONE = 0  # place of the number 1
+VALUES, FIRST, SECOND = range(3)  # phases
 RESET, TAPE, RUNS, PRODUCTS, CALL = range(5)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from importlib.resources import files
 
 import casadi as ca
 
-from nlp_gait.backends.derivatives.assembly import FIRST, SECOND, VALUES, NlpPlan
+from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.operations import CODES, EXPRESSIONS
+from nlp_gait.backends.derivatives.plan import FIRST, SECOND, VALUES
 from nlp_gait.backends.derivatives.straight_line import number, straight_line
+from nlp_gait.backends.kernel.compiler import native_source
 
 UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "fabs",
          "log1p", "expm1")  # fmt: skip
@@ -45,13 +46,11 @@ def nlp_source(found: NlpPlan) -> str:
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()
     )
-    lanes = files("nlp_gait.backends.kernel") / "native" / "lanes.hpp"
-    native = files("nlp_gait.backends.derivatives") / "native"
     return "\n".join(
         [
             "#include <stdlib.h>\n#include <string.h>",
-            lanes.read_text(encoding="utf-8"),
-            (native / "operations.hpp").read_text(encoding="utf-8"),
+            native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+            native_source("nlp_gait.backends.derivatives", "operations.hpp"),
             *(f"ONE_ARGUMENT({name})" for name in UNARY),
             *(f"TWO_ARGUMENTS({name})" for name in BINARY),
             *(f"enum {{ {name} = {size} }};" for name, size in sizes.items() if name != "HAS_SECOND"),
@@ -71,15 +70,14 @@ def nlp_source(found: NlpPlan) -> str:
             ),
             _calls(found),
             f"#define OPERATIONS {cases}",
-            (native / "nlp.hpp").read_text(encoding="utf-8"),
+            native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
         ]
     )
 
 
 def casadi_source(found: NlpPlan) -> str:
     """The same with CasADi's interface."""
-    native = files("nlp_gait.backends.derivatives") / "native"
-    return f"{nlp_source(found)}\n{(native / 'casadi.hpp').read_text(encoding='utf-8')}"
+    return f"{nlp_source(found)}\n{native_source('nlp_gait.backends.derivatives', 'casadi.hpp')}"
 
 
 def _rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -64,6 +65,12 @@ class Compiler:
         _run(command, TIME_LIMIT_S)
         if not library.is_file():
             raise CompilerError(f"{Path(self.command[0]).name} exited with status 0, but wrote no library")
+
+
+def native_source(package: str, *names: str) -> str:
+    """C++ of the files in a package's folder ``native``, one after the other."""
+    native = files(package) / "native"
+    return "\n".join((native / name).read_text(encoding="utf-8") for name in names)
 
 
 def find_compiler() -> Compiler:

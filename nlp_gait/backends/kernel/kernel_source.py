@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.exact import ExactModel, exact_model
+from nlp_gait.backends.kernel.compiler import native_source
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.locking import one_at_a_time
 
@@ -82,13 +82,12 @@ def assembled_source(numbers: str, generated: str, sizes: Mapping[str, int], loo
         sizes: macros.
         loop: header of the functions that call it.
     """
-    native = files("nlp_gait.backends.kernel") / "native"
     return "\n".join(
         [
-            (native / numbers).read_text(encoding="utf-8"),
+            native_source("nlp_gait.backends.kernel", numbers),
             f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of {numbers}",
             re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generated),
             *(f"#define {name} {size}" for name, size in sizes.items()),
-            (native / loop).read_text(encoding="utf-8"),
+            native_source("nlp_gait.backends.kernel", loop),
         ]
     )

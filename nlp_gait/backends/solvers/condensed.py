@@ -12,14 +12,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.interrupts import never
-from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
+from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes, native_source
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.backends.solvers.ipopt import WARM_BARRIER, Ipopt, IpoptSettings
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS
@@ -271,8 +270,7 @@ class _Buffered:
 @cache
 def _library() -> ctypes.CDLL:
     """The method as machine code; raises InputError without a compiler."""
-    native = files("nlp_gait.backends.solvers") / "native"
-    source = "\n".join((native / header).read_text(encoding="utf-8") for header in HEADERS)
+    source = native_source("nlp_gait.backends.solvers", *HEADERS)
     try:
         return load_library(source, find_compiler(), (*FLAGS, *lane_flags(native_lanes())), SYMBOLS)[0]
     except CompilerError as error:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.notebook import html_table, pandas
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -34,7 +35,7 @@ def in_space(unit: str, axes: str = "xyz") -> Columns:
     return Columns(unit=unit, labels=tuple(axes))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Signals:
     """Time histories of one gait.
 
@@ -63,6 +64,43 @@ class Signals:
         for name, unit, labels, table in self._tables():
             for label, column in zip(labels, table.T, strict=True):
                 yield f"{name} {label}".strip(), unit, column
+
+    def __getitem__(self, name: str) -> Array:
+        """An array by its name, as ``"tau"``, or one column of it, as ``"tau LKneePitch"``; raises UnknownNameError."""
+        if name in self.arrays:
+            return self.arrays[name]
+        columns = {column: values for column, _, values in self.named_columns()}
+        if name not in columns:
+            raise unknown("time history", name, [*self.arrays, *columns])
+        return columns[name]
+
+    def to_frame(self) -> Any:
+        """A pandas data frame: a column for each of ``named_columns``, indexed by time; ``frame.attrs["units"]`` by column.
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+        """
+        columns = {name: (unit, values) for name, unit, values in self.named_columns()}
+        unit, t = columns.pop("t")
+        module = pandas()
+        index = module.Index(t, name=f"t [{unit}]")
+        frame = module.DataFrame({name: values for name, (_, values) in columns.items()}, index=index)
+        frame.attrs["units"] = {name: unit for name, (unit, _) in columns.items()}
+        return frame
+
+    def __repr__(self) -> str:
+        """One line: how long, how many samples, and what there is."""
+        t = self.arrays["t"]
+        return f"<Signals over {t[-1] - t[0]:.4g} s in {len(t)} samples: {', '.join(self.arrays)}>"
+
+    def _repr_html_(self) -> str:
+        t = self.arrays["t"]
+        rows = [
+            (name, unit, str(len(labels)), " ".join(labels), f"{table.min():.4g} to {table.max():.4g}")
+            for name, unit, labels, table in self._tables()
+        ]
+        note = f"{len(t)} samples over {t[-1] - t[0]:.4g} s; signals[{rows[0][0]!r}] is an array, signals.to_frame() a data frame"
+        return html_table("Time histories", ("name", "unit", "columns", "of", "range"), rows, note)
 
     def _tables(self) -> Iterator[tuple[str, str, tuple[str, ...], Array]]:
         for name, array in self.arrays.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -66,22 +67,52 @@ class Skeleton:
 
     def support(self, k: int) -> Array | None:
         """(M, 2) support polygon at a sample: the hull of the loaded soles, seen from above [m]; None if there is none."""
-        from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
-
         loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
+        return _hull(np.concatenate(loaded)) if loaded else None
+
+    def margin(self) -> Array:
+        """(T,) distance of the zero-moment point from the nearest edge of the support polygon [m], negative outside of it.
+
+        NaN where it is not known, or nothing bears load. At the first and the last instant the soles that bear load are those of
+        the instant beside it: a foot that just touches the ground there bears none over the gait.
+        """
+        if self.zmp is None:
+            return np.full(len(self.t), np.nan)
+        last = len(self.t) - 1
+        bearing = [min(max(k, 1), max(last - 1, 0)) for k in range(last + 1)]
+        return np.array([self._margin_at(k, self.zmp[k], bearing[k]) for k in range(last + 1)])
+
+    def _margin_at(self, k: int, zmp: Array, bearing: int) -> float:
+        loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
         if not loaded:
-            return None
-        points = np.concatenate(loaded)
-        try:
-            return np.asarray(points[ConvexHull(points).vertices])
-        except QhullError:  # soles of no width, as in a planar model
-            return None
+            return math.nan
+        corners = _hull(np.concatenate(loaded)[:, :2])
+        if corners is None:  # a planar model: only its length counts
+            x = np.concatenate(loaded)[:, 0]
+            return float(min(zmp[0] - x.min(), x.max() - zmp[0]))
+        edges = np.roll(corners, -1, axis=0) - corners  # counter-clockwise
+        away = zmp[:2] - corners
+        inside = (edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]) / np.linalg.norm(edges, axis=1)
+        if (inside >= 0.0).all():
+            return float(inside.min())
+        along = np.clip((away * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
+        return -float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
 
     def box(self) -> tuple[Array, Array]:
         """Smallest and largest coordinates of everything that moves, (3,) each [m]."""
         parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
         everything = np.concatenate([part.reshape(-1, 3) for part in parts])
         return everything.min(axis=0), everything.max(axis=0)
+
+
+def _hull(points: Array) -> Array | None:
+    """(M, 2) corners of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
+    from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:  # soles of no width, as in a planar model
+        return None
 
 
 def on_flat_ground(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:

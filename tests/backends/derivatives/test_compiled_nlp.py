@@ -8,7 +8,7 @@ import pytest
 from casadi import DM, MX, SX
 
 import nlp_gait
-from nlp_gait.backends.derivatives import sample
+from nlp_gait.backends.derivatives import plan, sample
 from nlp_gait.backends.derivatives.assembly import plan_of
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.derivatives.structure import NotMapped, structure_of
@@ -80,6 +80,12 @@ def test_a_solver_of_compiled_functions_takes_the_same_path() -> None:
     ends = [solver(x0=[-1.0, 1.0], p=100.0, ubg=1.0) for solver in (interpreted, compiled)]
     assert np.array(ends[0]["x"]) == pytest.approx(np.array(ends[1]["x"]), rel=1e-9)
     assert interpreted.stats()["iter_count"] == compiled.stats()["iter_count"] > 3
+
+
+def test_runs_are_as_long_as_both_lists_of_places_count_upwards() -> None:
+    targets, sources = np.array([4, 5, 6, 9, 10]), np.array([1, 2, 3, 4, 6])
+    assert plan._segments(targets, sources) == [(4, 1, 3), (9, 4, 1), (10, 6, 1)]
+    assert plan._segments(targets[:1], sources[:1]) == [(4, 1, 1)] and plan._segments(targets[:0], sources[:0]) == []
 
 
 def test_what_cannot_be_taken_apart_is_refused() -> None:

@@ -72,6 +72,17 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
         assert {r.definition["stop"]["evaluations"] for r in records if "handling" in r.definition} == {10_000}
 
 
+def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
+    board = leaderboard(["walk12-w015", "ssp-v5"])
+    duels = {s.solver: {duel.other: duel for duel in board.duels(s.solver)} for s in board.standings}
+    for solver, own in duels.items():
+        for other, duel in own.items():
+            back = duels[other][solver]
+            assert (duel.better, duel.worse, duel.undecided) == (back.worse, back.better, back.undecided)
+            assert duel.mean_a12 == pytest.approx(1.0 - back.mean_a12)
+    assert duels["pso"]["random"].better == 2 and duels["random"]["pso"].worse == 2
+
+
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
     """By more than a judge's tolerance of 1e-6 can buy."""
     for id in shipped():

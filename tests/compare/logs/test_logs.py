@@ -77,6 +77,18 @@ def test_a_trace_begins_at_one_evaluation_and_improves(comparisons: list[Compari
             assert min(gaps) >= SMALLEST and evaluations[-1] <= trace.total
 
 
+def test_runs_are_numbered_from_one_and_gaps_are_minimised(comparisons: list[Comparison], tmp_path: Path) -> None:
+    assert NOTHING_FEASIBLE == 1e10  # as documented
+    runs = [str(run + 1) for run in range(15)]
+    for path in (path for path in write_ioh(comparisons[:1], tmp_path / "ioh") if path.suffix == ".json"):
+        header = json.loads(path.read_text())
+        assert [str(run["instance"]) for run in header["scenarios"][0]["runs"]] == runs
+        assert header["maximization"] is False
+    for path in (path for path in write_coco(comparisons[:1], tmp_path / "coco") if path.suffix == ".info"):
+        _, *ends = path.read_text().splitlines()[-1].split(", ")
+        assert [end.partition(":")[0] for end in ends] == runs
+
+
 def test_the_header_is_what_ioh_itself_writes(comparisons: list[Comparison], tmp_path: Path) -> None:
     """The same keys as in a file of ioh's own logger."""
     ioh = pytest.importorskip("ioh", reason="ioh is not installed: pip install 'nlp-gait[suites]'")

@@ -15,5 +15,5 @@ def in_this_process() -> Iterator[None]:
     """No worker processes: each would build every problem again."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (steps, runs):
-            patch.setattr(module, "default_jobs", lambda: 1)
+            patch.setattr(module, "available_cores", lambda: 1)
         yield

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -18,6 +19,7 @@ from compare.questions.certainty import multistart
 from compare.questions.kept import Finished, _outcome, _plain
 from compare.questions.motors import study as motors
 from compare.study.steps import Steps
+from nlp_gait.backends.starts import run_starts
 from nlp_gait.problem.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
 
@@ -31,6 +33,7 @@ WHOLE = {
     ),
     "motors": ("motors", *NAO),
     "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
+    "prices": ("prices", "walk12", "--starts", "2"),
 }  # fmt: skip
 # These take long to their end: how they begin is enough, since all go past finished solves in the same way.
 BEGUN = {
@@ -127,6 +130,18 @@ def test_what_changed_is_said_and_made_again(tmp_path: Path) -> None:
     assert again == heavy and said == "2 of 2 steps were finished by an earlier call\n"
     _, said = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")
     assert said == "sweep-nao-ssp: made again: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
+
+
+def test_steps_of_forked_starts_are_counted(tmp_path: Path) -> None:
+    """Starts that run side by side are steps of this call too."""
+    problem = nlp_gait.load("walk12")
+    points = [problem.start_point(np.random.default_rng(seed)) for seed in range(5)]
+    first = Finished(tmp_path)
+    list(run_starts(first.solver(), problem, points[:3], workers=2))
+    assert first.sentence == ""
+    second = Finished(tmp_path)
+    list(run_starts(second.solver(), problem, points, workers=2))
+    assert second.sentence == "3 of 5 steps were finished by an earlier call"
 
 
 def test_a_kept_outcome_has_every_bit() -> None:

@@ -15,7 +15,7 @@ from compare.study.manifest import Manifest
 from tests.compare.records import study
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(BROWSER is None, reason="no Chromium here")]
 
 QUIET = (
     "--headless",
@@ -45,6 +45,9 @@ found.names = column(0);
 found.sorted = [...table.tHead.rows[0].cells].map((cell) => cell.getAttribute("aria-sort"));
 found.page = [document.documentElement.scrollWidth, innerWidth];
 found.figures = [...document.querySelectorAll("figure svg")].map((svg) => svg.getBoundingClientRect().height);
+const parts = [...document.querySelectorAll("table, figure svg, p, h1, h2, h3")];
+found.right = Math.max(...parts.map((part) => part.getBoundingClientRect().right));
+found.width = innerWidth;
 found.loaded = performance.getEntriesByType("resource").map((entry) => entry.name);
 document.title = JSON.stringify(found);
 </script>
@@ -84,6 +87,7 @@ def test_tables_sort_and_the_page_fits(page: Path, width: int, tmp_path: Path) -
     assert found["names"] == ["colony", "newton", "swarm"]
     assert found["sorted"] == ["ascending", *[None] * (len(found["heads"]) - 1)]
     assert found["page"][0] <= found["page"][1]  # wide tables scroll in themselves
+    assert width > 400 or found["right"] <= found["width"]  # on a phone no part of it is wider than the screen
     assert len(found["figures"]) == 3 and min(found["figures"]) > 50
     assert found["loaded"] == []
 

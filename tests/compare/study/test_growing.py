@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import linecache
+import sys
+import types
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from compare.study.definition import source_of
 from compare.study.record import RunRecord
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import Study, read_records, record_file, run_study
@@ -71,6 +75,7 @@ def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None
     ]
 
 
+@pytest.mark.slow
 def test_a_robot_is_its_content_wherever_its_file_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Made heavier, it is another problem; moved, it is the same."""
 
@@ -116,3 +121,14 @@ def test_a_copy_of_a_record_under_a_key_is_refused(tmp_path: Path) -> None:
     path.with_name(f"{path.stem}.00000000.json").write_text(path.read_text())
     with pytest.raises(InputError, match="belongs to walk12/pso-0000.json"):
         read_records(tmp_path)
+
+
+def test_an_algorithm_of_a_notebook_has_no_source_to_hash(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a class of a main module without a file, nor a function whose text only the notebook knows."""
+    notebook = types.ModuleType("__main__")
+    monkeypatch.setitem(sys.modules, "__main__", notebook)
+    text = "class Mine: ...\ndef search(f, lower, upper, evaluations, seed): ...\n"
+    monkeypatch.setitem(linecache.cache, "/tmp/ipykernel_1/1.py", (len(text), None, text.splitlines(True), ""))
+    exec(compile(text, "/tmp/ipykernel_1/1.py", "exec"), notebook.__dict__)
+    assert source_of(notebook.Mine()) is None and source_of(notebook.search) is None
+    assert source_of(test_an_algorithm_of_a_notebook_has_no_source_to_hash) is not None

@@ -15,7 +15,7 @@ from compare.analysis.editions import told_apart
 from compare.analysis.table import cells, summarise
 from compare.judge import evaluate
 from compare.report import rebuild_report
-from compare.study.imported import imported, read_points
+from compare.study.imported import imported, imported_records, read_points
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import Study, keep_record, read_records, run_study
 from compare.study.task import ProblemSpec, Stop
@@ -67,6 +67,7 @@ def test_histories_give_runs_their_course(tmp_path: Path) -> None:
     assert first.time_s.history == (0.1, 0.5) and first.time_s.solve == 0.5
 
 
+@pytest.mark.slow
 def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
@@ -141,6 +142,7 @@ def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
     assert sorted(labels) == [("walk12", "pso", 0), ("walk12", earlier, 0), ("walk12", earlier, 1)]
 
 
+@pytest.mark.slow
 def test_the_commands(tmp_path: Path) -> None:
     path = finals(tmp_path)
     found = as_json("evaluate", "walk12", "--x", path, "--csv", tmp_path / "judged.csv")
@@ -154,3 +156,52 @@ def test_the_commands(tmp_path: Path) -> None:
     assert (
         json.loads((out / "records/walk12/GA (MATLAB)-0002.json").read_text())["status"] == "imported from finals.csv"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,50,0.5\n0,10,0.4\n1,1,\n2,1,\n", "line 3: evaluations of run 0 must ascend"),
+        ("0,10,0.5\n1,1,\n2,1,\n7,1,\n", "run 7 has no final point"),
+        ("0,10,0.5\n1,1,\n", "run 2 has no history"),
+        ("0,0,0.5\n1,1,\n2,1,\n", "line 2: evaluations must be a whole number .*1"),
+    ],
+)
+def test_a_history_that_is_none_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "h.csv").write_text(f"run,evaluations,objective\n{text}")
+    with pytest.raises(GaitError, match=message):
+        imported(WALK, finals(tmp_path), "ga", tmp_path / "h.csv")
+
+
+def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: Path) -> None:
+    """Runs are rows, seeds are runs; several entries at one count are allowed; every value is in the key."""
+    with pytest.raises(GaitError, match="a run stands twice"):
+        imported(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)
+    plain = imported(WALK, finals(tmp_path), "ga", evaluations=3)
+    assert [(r.run, r.seed, r.evaluations, r.success, r.violation) for r in plain] == [
+        (k, k, {"f": 3}, False, None) for k in range(3)
+    ]
+    for record in plain:
+        assert record.history.objective == (record.verdict.objective if record.verdict.feasible else None,)
+        assert (record.failed_evaluations, record.iterations) == (0, 0)
+    said = {"seed": [7, 8, 9], "time_s": [0.5, "", 2.0], "objective": [1, 2, 3]}
+    full = imported(WALK, finals(tmp_path, extra=said), "ga", evaluations=3)
+    assert [(r.seed, r.success, r.definition["seed"]) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
+    assert (full[0].time_s.solve, full[2].time_s.history) == (0.5, (2.0,)) and math.isnan(full[1].time_s.solve)
+    keys = {r.definition["imported"]["sha256"] for r in (*plain, *full)}
+    assert len(keys) == 6
+    (tmp_path / "h.csv").write_text("run,evaluations,objective\n0,10,\n0,10,0.5\n1,10,0.5\n2,10,0.5\n")
+    first, second, _ = imported(WALK, finals(tmp_path), "ga", tmp_path / "h.csv", evaluations=3)
+    assert first.history.evaluations == (10, 10) and second.evaluations == {"f": 10}
+    assert len(first.time_s.history) == 2 and math.isnan(first.time_s.solve)
+
+
+def test_records_from_elsewhere_belong_to_the_very_problem(tmp_path: Path) -> None:
+    """Another value of a parameter is another problem; a folder without records has none."""
+    own = imported(WALK, finals(tmp_path), "ga", evaluations=3)
+    assert imported_records(tmp_path / "absent", own) == []
+    for record in own:
+        keep_record(record, tmp_path)
+    assert [record.run for record in imported_records(tmp_path, own)] == [0, 1, 2]
+    other = imported(ProblemSpec(name="walk12", values={"lambda": 0.5}), finals(tmp_path), "ga", evaluations=3)
+    assert imported_records(tmp_path, other) == []

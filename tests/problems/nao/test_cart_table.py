@@ -43,8 +43,20 @@ def test_preview_control_is_the_least_squares_optimum() -> None:
 def test_a_course_is_exact_between_its_samples() -> None:
     controller = PreviewController(sample_s=0.02, height_m=0.26)
     course = controller.follow(np.linspace(0.0, 0.1, 50 + controller.preview))
+    assert course.states[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
     assert course.at(np.arange(50) * 0.02) == pytest.approx(course.states[:, 0], abs=1e-15)
     assert course.at(np.array([0.02 - 1e-9])) == pytest.approx(course.states[1, :1], abs=1e-9)
+
+
+def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_image() -> None:
+    walker = Walker(robot=nao("nao-v5", rotational_inertia=True), footsteps=STEPS)
+    first, last = walker.planned_zmp(np.array([0.0, STEPS.period_s])).T
+    assert last == pytest.approx(first * (1, -1) + (STEPS.step_m, 0), abs=1e-12)
+    foot, ankle = walker.robot.feet["left"], walker.robot.joint("LHipYawPitch").origin_m[1]
+    assert -foot.back_m < first[0] < foot.front_m
+    assert first[1] - ankle == pytest.approx(foot.left_m - (first[1] - ankle) - foot.right_m, abs=1e-12)
+    # Every 5 ms, and at the switch.
+    assert len(walker.times) == 201 and walker.times[120] == STEPS.single_s
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +65,7 @@ def walks() -> dict[int, Recorded]:
     return {passes: cart_table_walk(STEPS, passes=passes) for passes in (1, 2)}
 
 
+@pytest.mark.slow
 def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: dict[int, Recorded]) -> None:
     planned = Walker(robot=nao("nao-v5", rotational_inertia=True), footsteps=STEPS).planned_zmp
     errors = {}
@@ -62,6 +75,7 @@ def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: di
     assert (errors[1] < 0.01).all() and (errors[2] < 0.3 * errors[1]).all()
 
 
+@pytest.mark.slow
 def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Recorded]) -> None:
     gait = walks[2]
     hip = histories(gait)["hip"]
@@ -71,10 +85,21 @@ def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Recorded]) 
     assert gait.problem.playback is not None and gait.problem.playback.repeats
 
 
+@pytest.mark.slow
+def test_another_robot_walks_on_its_own_legs() -> None:
+    gait = cart_table_walk(STEPS, robot="nao-v6", passes=1, intervals=2)
+    assert gait.problem.options["robot"] == "nao-v6" and gait.problem.robot is not None
+    assert gait.problem.robot.name == nao("nao-v6", rotational_inertia=True).name
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"hip_height_m": 0.33}, "a hip 0.33 m high reaches no step of 0.05 m: .* lower the hip"),
+        (
+            {"hip_height_m": 0.33},
+            "a hip 0.33 m high reaches no step of 0.05 m: .* the right ankle is too far; lower the hip",
+        ),
+        ({"hip_height_m": 0.335, "step_m": 0.01}, "the left ankle is too far; lower the hip"),
         ({"single_s": 0.0}, "single_s must be a finite number > 0, got 0.0"),
         ({"step_m": float("nan")}, "step_m must be a finite number > 0, got nan"),
     ],

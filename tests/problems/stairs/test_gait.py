@@ -87,6 +87,23 @@ def test_hip_advances_one_step_and_rises_with_it(case: int) -> None:
     assert last - first == pytest.approx([float(size) for size in step(case)], abs=1e-12)
 
 
+@pytest.mark.parametrize("speed", [1.0, 10.0])
+@pytest.mark.parametrize("phase", range(4))
+def test_the_hip_is_a_pendulum_over_the_planned_zmp(phase: int, speed: float) -> None:
+    """Its acceleration is w^2 (x - zmp), also in a step so fast that neither of its exponentials has faded."""
+    times = {name: PLAN[name] / speed for name in ("t1", "t2", "t_bc", "t3")}
+    fast, stair = StairPlan(**{name: SX(value) for name, value in {**PLAN, **times}.items()}), step(2)
+    s, passing = SX.sym("s", 4), SX.sym("passing", 4)
+    motion = in_time(hip(fast, stair, GRAVITY, s), s, passing / fast.durations)
+    at = ca.Function("hip", [s, passing], [motion.position[0], motion.acceleration[0], ca.dot(fast.durations, s)])
+    x, acceleration, t = (float(part) for part in at([1.0] * phase + [0.3] + [0.0] * (3 - phase), np.eye(4)[phase]))
+    way, passed = float(stair.tread) + PLAN["zmp_end"] - PLAN["zmp_start"], t / times["t3"]
+    zmp = PLAN["zmp_start"] + way * passed**2 * (3 - 2 * passed)
+    assert acceleration == pytest.approx(GRAVITY / PLAN["hip_height"] * (x - zmp), rel=1e-9, abs=1e-9)
+    ends = [float(at([end] * 4, [0] * 4)[0]) for end in (0, 1)]
+    assert ends == pytest.approx([PLAN["hip_start"], PLAN["hip_start"] + float(stair.tread)], abs=1e-12)
+
+
 def test_forward_kinematics_of_the_posture_meets_hip_and_ankle() -> None:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     found = posture(toe_foot_biped().rods, plan(), step(2), GRAVITY, s, passing / plan().durations, SX(0.005), Exact())

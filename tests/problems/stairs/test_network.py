@@ -5,9 +5,11 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array
+from nlp_gait.problems.stairs.formulas.leg_network import leg_rates, leg_vector
 from nlp_gait.problems.stairs.network import NetworkSettings, network_angles
 
 THIGH = SHANK = 0.4
@@ -59,6 +61,15 @@ def test_gradients_by_weights_are_those_of_the_error() -> None:
     expected_before, expected_after = (float(value) for value in step(*start))
     assert before.error_m2[0] == pytest.approx(expected_before, rel=1e-6)
     assert after.error_m2[0] == pytest.approx(expected_after, rel=1e-9)
+
+
+def test_rates_of_the_leg_move_its_ankle_as_asked() -> None:
+    angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
+    rates = leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
+    moved = ca.jtimes(leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
+    at = ca.Function("moved", [angles, velocity], [moved, rates])
+    assert at([1.2, 2.0], [0.3, -0.7])[0].full().ravel() == pytest.approx([0.3, -0.7], rel=1e-5)
+    assert np.isfinite(at([1.2, 1.2], [0.3, -0.7])[1].full()).all()  # a straight knee
 
 
 @pytest.mark.parametrize("bad", [{"rule": "newton"}, {"rate": 0.0}, {"hidden": 0}, {"tolerance_m2": -1.0}])

@@ -7,14 +7,29 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
+from compare.papers.stairs.paper import TABLE_3, TABLE_4
 from metaheuristics import ParticleSwarm, minimize
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.problem import GaitProblem
+from nlp_gait.problems.stairs.robot import toe_foot_biped
+from nlp_gait.problems.stairs.stair import CASES, PAPER_TIMES
 
 # Best of 20 starts, case 2 of Table IV.
 BEST_ENERGY_J = 110.880
 # Best known governing parameters rounded: a start from which the optimum is found in a second or two.
 NEAR_BEST = (0.69, 0.09, 0.24, 0.09, 0.7, 1.45, 0.58, 0.8, 1.3, 0.32, 0.12)
+
+
+# Lower and upper limit of each link's angle and of both knees' [rad], and what counts as a violation of 1.
+LIMITS = {
+    **{"HK": (0.2, 2.4), "KA": (0.3, 3.2), "HK'": (0.3, 2.4), "K'A'": (0.8, 2.8), "UH": (0.8, 1.75)},
+    **{"AS": (-0.6, 1.2), "ST": (-0.6, 1.2), "knee": (0.1, 2.5), "knee'": (0.1, 2.5)},
+}
+SCALES = {
+    **{"reach": 0.1, "link_angle": 0.1, "knee_angle": 0.1, "link_acceleration": 10.0, "stance_load": 100.0},
+    **{"friction": 100.0, "stance_zmp": 0.01, "clearance": 0.01, "phase_duration": 0.1},
+}
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +40,24 @@ def problem() -> GaitProblem:
 @pytest.fixture(scope="module")
 def solution(problem: GaitProblem) -> nlp_gait.Solution:
     return nlp_gait.solve(problem, x0=NEAR_BEST)
+
+
+def test_stairs_and_times_are_those_that_the_paper_prints() -> None:
+    """As entered a second time, for the report on the paper."""
+    assert CASES == {k: (case.stair_length_m, case.rise_run_ratio) for k, case in TABLE_4.items()}
+    assert PAPER_TIMES == tuple(TABLE_3[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))
+
+
+def test_limits_and_scales_of_rows(problem: GaitProblem) -> None:
+    model = exact_model(problem)
+    at = model.at(np.array(NEAR_BEST), problem.p)
+    rows = zip(model.row_names, at.lower, at.upper, model.row_scales, strict=True)
+    found = [(*name.rstrip("]").partition("["), *numbers) for name, *numbers in rows]
+    limits = {of.partition(",")[0]: (low, high) for row, _, of, low, high, _ in found if "_angle" in row}
+    assert limits == LIMITS
+    assert {row: scale for row, _, _, _, _, scale in found if row != "bounds"} == SCALES
+    (zmp,) = {(low, high) for row, _, _, low, high, _ in found if row == "stance_zmp"}
+    assert zmp == pytest.approx((0.01, toe_foot_biped().foot_m - 0.01))
 
 
 @pytest.mark.slow
@@ -38,6 +71,7 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
     assert judged.dense["energy_J"] == pytest.approx(solution.objective, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=2_000, seed=0)
     assert found.feasible

@@ -14,9 +14,10 @@ struct Step {
 };
 // Steps of a fraction of the way to the bounds.
 static const double FRACTION = 0.99;
-static const double SIGMAS[] = {1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2,
-                                3e-2, 0.1,  0.3,  1,    3,    10,   30,   100};
+static const double LEAST_SIGMA = 1e-6, LARGEST_SIGMA = 100;
+static const int SECTIONS = 8;
 static const int BOXES = 6;
+static const double LARGEST_MULTIPLIER = 1000;  // at the start
 
 class InteriorPoint {
  public:
@@ -147,7 +148,26 @@ class InteriorPoint {
           sides[3].index.push_back(j), sides[3].z.push_back(settings.warm ? std::max(-slope, 1e-6) : 1);
       }
     measure();
+    if (!settings.warm) estimate_multipliers();
     return true;
+  }
+  // Multipliers of the rows with which the gradient of the Lagrangian is smallest (least squares); 0 if they are large.
+  void estimate_multipliers() {
+    Vector r(n), c(m, 0), towards, estimate;
+    for (int j = 0; j < n; j++) r[j] = newton.fixed[j] ? 0 : -df[j];
+    for (const Side& side : sides)
+      for (size_t k = 0; k < side.gap.size(); k++)
+        (side.owner == VARIABLE ? r : c)[side.index[k]] += side.sign * side.z[k];
+    std::fill(nlp.hessian, nlp.hessian + nlp.hessian_columns[n], 0.0);
+    newton.diagonal.assign(n, 1), newton.D.assign(m, 1), newton.E.assign(m, 1);
+    for (int i = 0; i < m; i++)
+      if (equation[i]) newton.D[i] = newton.E[i] = 0;
+    y.assign(m, 0);
+    if (!newton.factorise(0, 0)) return;
+    newton.solve(r, c, towards, estimate);
+    double largest = 0;
+    for (double value : estimate) largest = std::max(largest, std::fabs(value));
+    if (largest <= LARGEST_MULTIPLIER) y = estimate;
   }
   Vector lower_x, upper_x;
   double distance(const Side& side, size_t k, const Vector& at_x, const Vector& at_t, const Vector& at_a,
@@ -320,38 +340,56 @@ class InteriorPoint {
     }
     return {primal, dual};
   }
-  // Barrier parameter whose step has the best linearised optimality conditions.
+  // Linearised optimality conditions after the step for a share sigma of the mean complementarity.
+  double quality(double sigma, double dual2, double primal2) const {
+    double alpha = 1, beta = 1;
+    for (int s = 0; s < BOXES; s++) {
+      const Side& side = sides[s];
+      const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
+      for (size_t k = 0; k < side.gap.size(); k++) {
+        const int i = side.index[k];
+        alpha = std::min(alpha, until(side.gap[k], side.sign * (u[i] + sigma * (v[i] - u[i])), FRACTION));
+        beta = std::min(beta, until(side.z[k], none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]), FRACTION));
+      }
+    }
+    double sum = 0;
+    for (int s = 0; s < BOXES; s++) {
+      const Side& side = sides[s];
+      const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
+      for (size_t k = 0; k < side.gap.size(); k++) {
+        const int i = side.index[k];
+        const double gap = side.gap[k] + alpha * side.sign * (u[i] + sigma * (v[i] - u[i]));
+        const double z = side.z[k] + beta * (none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]));
+        sum += gap * gap * z * z;
+      }
+    }
+    return (1 - beta) * (1 - beta) * dual2 / (n + m) + (1 - alpha) * (1 - alpha) * primal2 / std::max(m, 1) +
+           sum / std::max(bounded, 1);
+  }
+  // Barrier parameter whose step has the best quality, by golden sections of its logarithm on the better side of 1.
   double best_barrier(double average, double dual2) {
     direction(0, residual, none), direction(average, residual, whole);
-    double best = INF, chosen = 1, primal2 = 0;
+    double primal2 = 0;
     for (double value : residual) primal2 += value * value;
-    for (double sigma : SIGMAS) {
-      double alpha = 1, beta = 1;
-      for (int s = 0; s < BOXES; s++) {
-        const Side& side = sides[s];
-        const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
-        for (size_t k = 0; k < side.gap.size(); k++) {
-          const int i = side.index[k];
-          alpha = std::min(alpha, until(side.gap[k], side.sign * (u[i] + sigma * (v[i] - u[i])), FRACTION));
-          beta = std::min(beta, until(side.z[k], none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]), FRACTION));
-        }
-      }
-      double sum = 0;
-      for (int s = 0; s < BOXES; s++) {
-        const Side& side = sides[s];
-        const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
-        for (size_t k = 0; k < side.gap.size(); k++) {
-          const int i = side.index[k];
-          const double gap = side.gap[k] + alpha * side.sign * (u[i] + sigma * (v[i] - u[i]));
-          const double z = side.z[k] + beta * (none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]));
-          sum += gap * gap * z * z;
-        }
-      }
-      const double quality = (1 - beta) * (1 - beta) * dual2 / (n + m) +
-                             (1 - alpha) * (1 - alpha) * primal2 / std::max(m, 1) + sum / std::max(bounded, 1);
-      if (quality < best) best = quality, chosen = sigma;
+    auto of = [&](double logarithm) { return quality(std::exp(logarithm), dual2, primal2); };
+    const double share = (3 - std::sqrt(5.0)) / 2, below = std::log(0.99);
+    const double at_one = of(0), at_below = of(below);
+    const bool rises = at_below > at_one;
+    const double first = rises ? 0 : std::log(LEAST_SIGMA), last = rises ? std::log(LARGEST_SIGMA) : below;
+    double low = first, high = last, left = low + share * (high - low), right = high - share * (high - low);
+    double at_left = of(left), at_right = of(right);
+    for (int section = 0; section < SECTIONS; section++) {
+      if (at_left > at_right)
+        low = left, left = right, at_left = at_right, right = high - share * (high - low), at_right = of(right);
+      else
+        high = right, right = left, at_right = at_left, left = low + share * (high - low), at_left = of(left);
     }
-    return chosen * average;
+    double best = std::min(at_left, at_right), chosen = at_left < at_right ? left : right;
+    if (high == last && (rises ? of(last) : at_below) < best)
+      chosen = last;
+    else if (low == first && (rises ? at_one : of(first)) < best)
+      chosen = first;
+    return std::exp(chosen) * average;
   }
   // The step for a barrier parameter lies on the line through these two.
   Step none, whole;

@@ -1,0 +1,136 @@
+"""Gaits as one figure: stick figures from the side, power and balance margin over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from compare.drawing.animation import COLOURS, GROUND, MARGIN
+from compare.drawing.figures import INK, Look, legend_below, looks, new_figure, style
+from nlp_gait.errors import InputError
+from nlp_gait.problem import Array, Result, sampled
+from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.problem.motion.signals import JOINT_UNITS
+from nlp_gait.problem.motion.skeleton import TRUNK, Skeleton
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PERIOD_S = 0.02  # between samples
+SIDES = COLOURS | {TRUNK: INK}  # the page's own ink, light or dark
+POSES = 6
+FAINTEST = 0.25  # opacity of the first pose; the last one has 1
+WIDTH_IN, ROW_IN = 7.4, 2.1
+MOST_BESIDE = 6  # gaits in a row of stick figures
+CURVES = {"power": "mechanical power [W]", "margin": "balance margin [mm]"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnGait:
+    """What is drawn of a gait.
+
+    Attributes:
+        skeleton: over time; None for a problem that has none.
+        t: (T,) [s].
+        power: (T,) sum of the joints' |torque x rate| [W]; None for a problem without torques.
+        margin: (T,) of ``Skeleton.margin``, in millimetres; None where no instant has one.
+    """
+
+    skeleton: Skeleton | None
+    t: Array
+    power: Array | None
+    margin: Array | None
+
+
+@one_at_a_time
+def drawn_gait(result: Result) -> DrawnGait:
+    """Time histories of a result as they are drawn.
+
+    Raises:
+        InputError: the problem has no time histories, or time does not run forward in them.
+    """
+    problem = result.problem
+    signals = sampled(result, PERIOD_S)
+    arrays = signals.arrays
+    skeleton = None if problem.skeleton is None else problem.skeleton(signals, problem.parameter_values)
+    margin = None if skeleton is None else skeleton.margin()
+    has_power = all(name in arrays and name in JOINT_UNITS for name in ("tau", "qd"))
+    return DrawnGait(
+        skeleton=skeleton,
+        t=arrays["t"],
+        power=np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1) if has_power else None,
+        margin=None if margin is None or np.isnan(margin).all() else 1000.0 * margin,
+    )
+
+
+def gaits_figure(gaits: Mapping[str, DrawnGait]) -> Figure:
+    """Stick figures of each gait beside each other, and below them the curves of all; gaits by solver or any other name.
+
+    Raises:
+        InputError: there is nothing to draw.
+    """
+    figures = {name: gait.skeleton for name, gait in gaits.items() if gait.skeleton is not None}
+    curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in gaits.values())]
+    if not figures and not curves:
+        raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
+    look = looks(list(gaits))
+    with style():
+        if len(gaits) == 1:
+            figure = new_figure(WIDTH_IN, ROW_IN)
+            axes = list(figure.subplots(1, len(figures) + len(curves), squeeze=False)[0])
+        else:
+            rows = _in_rows(figures)
+            figure = new_figure(WIDTH_IN, ROW_IN * (len(rows) + bool(curves)))
+            parts = figure.subfigures(len(rows) + bool(curves), 1, squeeze=False)[:, 0]
+            axes = []
+            for part, row in zip(parts, rows, strict=False):
+                beside = part.subplots(1, len(rows[0]), squeeze=False, sharey=True)[0]
+                axes += list(beside[: len(row)])
+                for empty in beside[len(row) :]:
+                    empty.set_axis_off()
+            axes += list(parts[-1].subplots(1, len(curves), squeeze=False)[0]) if curves else []
+        for axis, (name, skeleton) in zip(axes, figures.items(), strict=False):
+            _draw_poses(axis, skeleton, name)
+        for axis, curve in zip(axes[len(figures) :], curves, strict=True):
+            _draw_curves(axis, gaits, look, curve)
+        if len(gaits) > 1 and curves:
+            legend_below(figure, axes[-1])
+    return figure
+
+
+def _in_rows(figures: Mapping[str, Skeleton]) -> list[list[str]]:
+    """Names of the gaits in rows of equal length, but for the last one."""
+    names = list(figures)
+    length = -(-len(names) // max(1, -(-len(names) // MOST_BESIDE)))
+    return [names[i : i + length] for i in range(0, len(names), length)] if names else []
+
+
+def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:
+    """Poses of equal distance in time over each other, later ones darker, from the side."""
+    axes.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
+    chosen = np.unique(np.linspace(0, len(skeleton.t) - 1, POSES).round().astype(int)).tolist()
+    for k, opacity in zip(chosen, np.linspace(FAINTEST, 1.0, len(chosen)).tolist(), strict=True):
+        for limb in skeleton.limbs:
+            axes.plot(*limb.points[k][:, (0, 2)].T, color=SIDES[limb.side], alpha=opacity, lw=1.0)
+        for sole in skeleton.soles:
+            axes.plot(*sole.corners[k][:, (0, 2)].T, color=SIDES[sole.side], alpha=opacity, lw=1.6)
+    low, high = skeleton.box()
+    axes.set_xlim(float(low[0]) - MARGIN, float(high[0]) + MARGIN)
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+    axes.tick_params(labelsize=6)
+    axes.set_xlabel("x [m]", fontsize=7)
+    axes.set_title(name, fontsize=8)
+
+
+def _draw_curves(axes: Axes, gaits: Mapping[str, DrawnGait], look: Mapping[str, Look], curve: str) -> None:
+    for name, gait in gaits.items():
+        values = getattr(gait, curve)
+        if values is not None:
+            axes.plot(gait.t, values, color=look[name].colour, linestyle=look[name].line, label=name)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(CURVES[curve])

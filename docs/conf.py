@@ -1,0 +1,66 @@
+"""Documentation site: ``sphinx-build -W -b html docs OUT`` from the root, with the extra ``docs``; needs no network.
+
+What the program can say itself is made from it: ``docs/pages`` writes the pages of problems, algorithms, commands and names to
+``docs/generated``, and the gallery runs the examples.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from docs.pages import algorithms, api, commands, gallery, problems  # noqa: E402
+from docs.pages.api import linked  # noqa: E402
+
+project = "nlp-gait"
+author = "The authors of nlp-gait"
+project_copyright = "the authors of nlp-gait; BSD-3-Clause"
+smartquotes = False  # two hyphens are an option
+release = version = version_of("nlp-gait")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
+exclude_patterns = ["pages", "generated/gallery/*.ipynb", "generated/gallery/*.py", "**/sg_execution_times.*"]
+suppress_warnings = ["config.cache"]  # the gallery's configuration holds functions, which Sphinx cannot pickle
+nitpicky = False
+default_role = "code"
+
+myst_enable_extensions = ["colon_fence", "fieldlist"]
+myst_heading_anchors = 4
+
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_member_order = "bysource"
+autodoc_class_signature = "separated"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_custom_sections = [("Source", "notes")]
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = f"nlp-gait {release}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#005a8c", "color-brand-content": "#005a8c"},
+    "dark_css_variables": {"color-brand-primary": "#56b4e9", "color-brand-content": "#56b4e9"},
+}
+
+sphinx_gallery_conf = gallery.configuration(ROOT)
+
+
+def setup(app):
+    """Write the generated pages before any page is read."""
+    app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-docstring", linked)
+
+
+def write_pages(app):
+    """Pages of problems, algorithms, commands and names."""
+    folder = Path(app.srcdir) / "generated"
+    for part in (problems, algorithms, commands, api):
+        part.write(folder)

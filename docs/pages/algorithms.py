@@ -1,0 +1,40 @@
+"""One page of all algorithms and solvers: what they can be told, and where they come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import metaheuristics
+from compare.study.description import Description, description_of
+from docs.pages.markdown import code, literal, page, table, write_all
+from nlp_gait.backends.solvers.registry import SOLVERS
+
+INTRODUCTION = """# Algorithms and solvers
+
+Every name here stands wherever a command or a study asks for an algorithm, and settings are given in a study file or in Python:
+`metaheuristics.algorithm("pso", population=80)`, `nlp_gait.solver("ipopt", ...)`. `nlp-gait list NAME` prints the same table.
+[Your own algorithm](../bring-your-own.md) takes part as `FILE.py:NAME`. How often each default search comes within 0.1 % of the
+best known point stands on the [page of each problem](problems/index.md)."""
+PARTS = {
+    "Searches": ("They see the compiled objective in batches, and no derivatives.", metaheuristics.ALGORITHMS),
+    "Searches of other packages": ("With the extra `algorithms`.", metaheuristics.ADAPTERS),
+    "NLP solvers": ("They see the lifted NLP with exact derivatives; see [solving](../solving.md).", SOLVERS),
+}
+
+
+def write(folder: Path) -> None:
+    """Write ``algorithms.md`` and nothing else."""
+    blocks = [INTRODUCTION]
+    for title, (words, names) in PARTS.items():
+        blocks += [f"## {title}", words, *(_section(description_of(name)) for name in names)]
+    write_all(folder, {"algorithms.md": page(*blocks)})
+
+
+def _section(description: Description) -> str:
+    rows = [(code(s.name), code(s.default), literal(s.words)) for s in description.settings]
+    return page(
+        f"### {description.name}",
+        literal(description.title),
+        table(("setting", "default", "what"), rows) if rows else "",
+        f"Source: {literal(description.source)}" if description.source else "",
+    ).strip()

@@ -1,0 +1,119 @@
+"""Reference of every public name: what the packages' front doors offer, each described once, from its docstring and types."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from docs.pages.markdown import write_all
+
+# Front doors, and the modules of which scripts and notebooks take names; a name is described where it stands first.
+DOORS = {
+    "nlp_gait": (),
+    "nlp_gait.problem": (),
+    "nlp_gait.problem.solution": ("ActiveConstraint", "ConstraintValue", "Evaluations", "Outcome", "SolveTime"),
+    "nlp_gait.robots": (),
+    "nlp_gait.gaitbench": (),
+    "nlp_gait.simulation.plan": ("Plan", "plan_of"),
+    "nlp_gait.simulation.drive": ("Drive",),
+    "nlp_gait.simulation.playback": ("Trace", "play"),
+    "nlp_gait.simulation.measurements": ("Measurements", "averaged_pressure", "measure"),
+    "nlp_gait.export.formats": ("FORMATS", "write_as"),
+    "nlp_gait.export.setpoints": ("SetPoints", "set_points"),
+    "metaheuristics": (),
+    "compare": (),
+    "compare.study.task": ("Handling", "ProblemSpec", "Stop", "Task"),
+    "compare.study.settings": ("SolverSpec", "StudySettings", "read_settings"),
+    "compare.study.study": (),
+    "compare.study.record": ("History", "RunRecord", "Times", "Verdict"),
+    "compare.questions.sweep.study": ("Axis", "SweepPoint", "parse_axis", "sweep"),
+    "compare.questions.sweep.report": ("sweep_answer",),
+    "compare.questions.pareto.competing": ("competing_objective",),
+    "compare.questions.pareto.front": ("FrontPoint", "pareto_front"),
+    "compare.study.imported": ("imported",),
+    "compare.study.rows": ("frame_of",),
+    "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
+    "compare.analysis.table": ("SolverSummary", "cells", "summarise", "HEADER"),
+    "compare.report": (),
+    "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "text_table"),
+    "compare.report.writing": ("markdown_page", "write_document"),
+    "compare.logs": (),
+}
+CODE = re.compile(r"(``.+?``)")
+SPECIAL = re.compile(r"([*|`]|(?<=\w)_(?!\w))")
+
+
+def names_of(door: str) -> tuple[str, ...]:
+    """Public names of a front door."""
+    return tuple(DOORS[door] or importlib.import_module(door).__all__)
+
+
+def write(folder: Path) -> None:
+    """Write an index and a page for each front door."""
+    pages: dict[str, str] = {}
+    described: dict[int, str] = {}
+    for door in DOORS:
+        blocks = [_heading(door, "="), inspect.getdoc(importlib.import_module(door)) or ""]
+        blocks[1] = "\n".join(_escaped(blocks[1].splitlines()))
+        for name in names_of(door):
+            value = getattr(importlib.import_module(door), name)
+            key, full = id(value), f"{door}.{name}"
+            blocks.append(_heading(name, "-"))
+            if key in described and _kind(value) != "data":
+                blocks.append(f"The same as :py:obj:`{described[key]}`.")
+                continue
+            described[key] = full
+            blocks.append(_directive(value, full))
+        pages[f"{door}.rst"] = "\n\n".join(blocks) + "\n"
+    tree = [".. toctree::", "   :maxdepth: 1", "", *(f"   {door}" for door in DOORS)]
+    words = "Every public name, by the module that it is imported from. Whatever is not here may change without notice."
+    pages["index.rst"] = "\n\n".join([_heading("Names in Python", "="), words, "\n".join(tree)]) + "\n"
+    write_all(folder / "api", pages)
+
+
+def _heading(title: str, line: str) -> str:
+    return f"{title}\n{line * len(title)}"
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, type):
+        return "exception" if issubclass(value, BaseException) else "class"
+    return "function" if inspect.isroutine(value) else "data"
+
+
+def _directive(value: Any, full: str) -> str:
+    kind = _kind(value)
+    if kind == "data":
+        words = f"By name: {', '.join(value)}." if isinstance(value, Mapping) else f"``{_alias(value)}``"
+        return f".. py:data:: {full}\n\n   {words}"
+    members = ["   :members:", "   :show-inheritance:"] if kind == "class" else []
+    return "\n".join([f".. auto{kind}:: {full}", *members])
+
+
+def _alias(value: Any) -> str:
+    """A constant, or what a name of a type stands for, without the modules of the package."""
+    return re.sub(r"\b(?:\w+\.)+(?=\w)", "", str(value))
+
+
+def linked(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Docstrings are plain text in which double backticks hold code: keep reStructuredText from reading more into them."""
+    lines[:] = _escaped(lines)
+
+
+def _escaped(lines: list[str]) -> list[str]:
+    found, literal = [], None  # indentation of the paragraph that a literal block follows
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if literal is not None and line.strip() and indent <= literal:
+            literal = None
+        if literal is None:
+            parts = CODE.split(line)
+            line = "".join(SPECIAL.sub(r"\\\1", part) if k % 2 == 0 else part for k, part in enumerate(parts))
+            if line.rstrip().endswith("::"):
+                literal = indent
+        found.append(line)
+    return found

@@ -1,0 +1,279 @@
+"""A page for each problem, made from the problem itself and from what was measured of it (``docs/difficulty.json``)."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_args, get_origin, get_type_hints
+
+from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
+from compare.analysis.published import published
+from compare.analysis.units import with_unit
+from compare.drawing.gait_figure import drawn_gait, gaits_figure
+from docs.pages.markdown import code, literal, page, table, toctree, write_all
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.gaitbench.definitions import DEFINITIONS
+from nlp_gait.gaitbench.known import known
+from nlp_gait.problem import GaitProblem, Result, load, problem_names
+from nlp_gait.problem.registry import PROBLEMS, problem_maker
+from nlp_gait.problem.solution import ConstraintValue
+from nlp_gait.symbolic.nonsmooth import Exact
+
+LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
+SHOWN = 24  # variables, and binding rows, on a page
+SAME = 1e-6  # relative; another processor rounds otherwise
+OPTION = re.compile(r"^ {4}(\w+) {2,}(.+(?:\n {8,}.+)*)", re.MULTILINE)
+ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
+SOURCE = re.compile(r"^Source:\n((?: {4}.+\n?)+)", re.MULTILINE)
+INTRODUCTION = """# Problems
+
+Each page is made from the problem itself; what is said of solvers was measured by `python -m benchmarks.difficulty` with default
+options and values. Near: within 0.1 % of the best point known. [GaitBench](../../gaitbench.md) freezes variants of them, and
+[your own](../../bring-your-own.md) takes part as `FILE.py:NAME`."""
+PICTURE = "Best known gait: six poses of equal distance in time, later ones darker (left blue, right orange), and what they need."
+
+
+def names() -> list[str]:
+    """Problems that have a page."""
+    return [name for name in problem_names() if name not in LEFT_OUT]
+
+
+def write(folder: Path) -> None:
+    """Write an index, and a page and a picture for each problem."""
+    folder, measured = folder / "problems", difficulties()
+    folder.mkdir(parents=True, exist_ok=True)
+    problems = {name: load(name) for name in names()}
+    pages = {f"{name}.md": _page(problem, measured.get(name), folder) for name, problem in problems.items()}
+    header = ("problem", "what", "variables", "best known", "feasible points", "IPOPT near", "searches near")
+    rows = [_overview(problem, measured.get(name)) for name, problem in problems.items()]
+    pages["index.md"] = page(INTRODUCTION, table(header, rows), toctree(problems))
+    write_all(folder, pages)
+
+
+def _overview(problem: GaitProblem, found: Difficulty | None) -> tuple[str, ...]:
+    first = (f"[`{problem.name}`]({problem.name}.md)", literal(problem.title), str(len(problem.names)))
+    if found is None:
+        return (*first, "", "not measured", "", "")
+    searches = [f"{solver} {_share(reached)}" for solver, reached in found.solvers.items() if solver != "ipopt"]
+    ipopt = found.solvers.get("ipopt")
+    return (
+        *first,
+        "" if found.best is None else with_unit(found.best.objective, problem.objective.unit, ".6g"),
+        _feasible(found),
+        "" if ipopt is None else _share(ipopt),
+        ", ".join(searches) or "cannot be searched",
+    )
+
+
+def _share(reached: Reached) -> str:
+    return f"{reached.near}/{reached.runs}"
+
+
+def _feasible(found: Difficulty) -> str:
+    if not found.points:
+        return "-"
+    if not found.feasible_points:
+        return f"none of {found.points}"
+    return f"{100.0 * found.feasible_points / found.points:.3g} %"
+
+
+def _page(problem: GaitProblem, found: Difficulty | None, folder: Path) -> str:
+    best = None if found is None else found.best
+    return page(
+        f"# {problem.name}",
+        f"**{literal(problem.title)}.** {literal(_words(problem))}",
+        _picture(problem, best, folder),
+        _best(problem, found),
+        _variables(problem, best),
+        _binding(problem, best),
+        _rows(problem),
+        _parameters(problem),
+        _options(problem),
+        _difficulty(problem, found),
+        "## Source",
+        literal(_source(problem)),
+        _published(problem),
+        _use(problem),
+    )
+
+
+def _words(problem: GaitProblem) -> str:
+    """The first paragraph that its module says beyond the title, or else what its maker says."""
+    module = inspect.getdoc(importlib.import_module(PROBLEMS[problem.name].partition(":")[0])) or ""
+    return " ".join(" ".join(module.split("\n\n")[:2]).split())
+
+
+def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
+    if best is None or problem.motion is None:
+        return ""
+    gait = drawn_gait(Result(problem=problem, x=problem.check_x(best.x)))
+    drawing = gaits_figure({problem.name: gait})
+    drawing.savefig(folder / f"{problem.name}.png", dpi=150)
+    return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
+
+
+def _best(problem: GaitProblem, found: Difficulty | None) -> str:
+    objective = problem.objective
+    title = f"## Best known {objective.name}"
+    if found is None or found.best is None:
+        return f"{title}\n\nNot measured yet: `python -m benchmarks.difficulty {problem.name}`."
+    best, exact = found.best, exact_model(problem)
+    value = objective.sign * exact.at(problem.check_x(best.x), problem.p).cost
+    if not math.isclose(value, best.objective, rel_tol=SAME):
+        raise ValueError(
+            f"docs/difficulty.json holds {best.objective} as the best of {problem.name!r}, but the judge finds {value} there: "
+            f"the problem has changed; measure it again by python -m benchmarks.difficulty {problem.name}"
+        )
+    said = [
+        f"**{with_unit(best.objective, objective.unit, '.8g')}**, to {objective.sense}; found by {best.solver}.",
+        *(f"{_share(r)} runs of {solver} end within 0.1 % of it." for solver, r in found.solvers.items()),
+    ]
+    for definition in DEFINITIONS:
+        same = definition.problem == problem.name and not definition.values and not definition.held
+        if same and definition.options.items() <= problem.options.items():
+            said.append(f"As instance `{definition.id}` of GaitBench: {known()[definition.id].evidence}.")
+    return f"{title}\n\n{' '.join(said)}"
+
+
+def _variables(problem: GaitProblem, best: Best | None) -> str:
+    header = ("variable", "lower", "upper", "unit", *(() if best is None else ("best known",)), "what")
+    rows = [
+        (
+            *(code(v.name), f"{v.lower:g}", f"{v.upper:g}", literal(v.unit)),
+            *(() if best is None else (f"{best.x[v.name]:.6g}",)),
+            literal(v.description),
+        )
+        for v in problem.variables[:SHOWN]
+    ]
+    left = len(problem.variables) - len(rows)
+    more = f"And {left} more: `nlp-gait list {problem.name}`." if left else ""
+    return page("## Variables", table(header, rows), more).strip()
+
+
+def _binding(problem: GaitProblem, best: Best | None) -> str:
+    if best is None or not best.active_constraints:
+        return ""
+    rows = [
+        (code(a.name), a.side, with_unit(a.bound, a.unit, "g"), literal(f"{a.price:+.4g} {a.price_unit}"))
+        for a in best.active_constraints[:SHOWN]
+    ]
+    left = len(best.active_constraints) - len(rows)
+    words = f"The price is the change of the best {problem.objective.name} for each unit by which the bound is raised."
+    words += f" {left} cheaper ones are left out." if left else ""
+    return page("## What binds it", words, table(("bound", "side", "at", "price"), rows)).strip()
+
+
+def _rows(problem: GaitProblem) -> str:
+    """Groups of rows with their numbers and bounds; bounds depend on parameters alone."""
+    exact = exact_model(problem)
+    values = exact.rows(exact.at(problem.lower, problem.p))[: -len(problem.names)]
+    over = {c.name: c.over for c in problem.assemble(problem.symbols(), Exact()).constraints}
+    groups: dict[str, list[ConstraintValue]] = {}
+    for row in values:
+        groups.setdefault(row.name.partition("[")[0], []).append(row)
+    rows = [
+        (
+            *(code(name), str(len(group)), literal(group[0].unit)),
+            *(_range([getattr(row, end) for row in group]) for end in ("lower", "upper")),
+            (over.get(name) or "").replace("-", " "),
+        )
+        for name, group in groups.items()
+    ]
+    words = f"{len(values)} rows in {len(groups)} groups, and the variables' bounds. Times of instants are the problem's samples."
+    return page("## Rows", words, table(("group", "rows", "unit", "lower", "upper", "of each"), rows)).strip()
+
+
+def _range(bounds: list[float | None]) -> str:
+    given = [bound for bound in bounds if bound is not None]
+    if not given:
+        return ""
+    low, high = min(given), max(given)
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+
+
+def _parameters(problem: GaitProblem) -> str:
+    if not problem.own_parameters:
+        return ""
+    rows = [(code(q.name), f"{q.default:g}", literal(q.unit), literal(q.description)) for q in problem.own_parameters]
+    words = "Changed by `--set NAME=VALUE` without rebuilding anything, as are the bounds: `--set NAME.upper=VALUE`."
+    return page("## Parameters", words, table(("parameter", "default", "unit", "what"), rows)).strip()
+
+
+def _options(problem: GaitProblem) -> str:
+    make = problem_maker(problem.name)
+    hints, words = get_type_hints(make), dict(_option_words(problem))
+    rows = []
+    for name, parameter in inspect.signature(make).parameters.items():
+        hint = hints.get(name)
+        choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is not None else ""
+        rows.append((code(name), code(str(parameter.default)), choices, literal(words.get(name, ""))))
+    said = "What it is built with: `--option NAME=VALUE`, or keywords of `nlp_gait.load`."
+    return page("## Options", said, table(("option", "default", "one of", "what"), rows)).strip()
+
+
+def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
+    """What options mean: as the family says it, and as the maker itself does."""
+    module = PROBLEMS[problem.name].partition(":")[0]
+    family = importlib.import_module(".".join(module.split(".")[:3])).__doc__ or ""
+    for pattern, text in ((OPTION, family), (ARGUMENT, inspect.getdoc(problem_maker(problem.name)) or "")):
+        for name, words in pattern.findall(text):
+            yield name, " ".join(words.split()).rstrip(".")
+
+
+def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:
+    if found is None:
+        return "## Difficulty\n\nNot measured yet."
+    rows = [
+        (
+            *(solver, str(r.runs), str(r.feasible), str(r.near)),
+            "" if r.median_gap is None else f"{100.0 * max(r.median_gap, 0.0):.2g} %",
+        )
+        for solver, r in found.solvers.items()
+    ]
+    if found.points:
+        words = (
+            f"{_feasible(found)} of {found.points} uniform random points within the bounds are feasible"
+            if found.feasible_points
+            else f"None of {found.points} uniform random points within the bounds is feasible"
+        )
+        words += f"; an evaluation takes {found.evaluation_us:.3g} µs of one core, in a batch. "
+        words += f"Each run of a search has {found.evaluations} evaluations, each run of IPOPT one random start."
+    else:
+        words = (
+            "Its variables are tied by equations, so that no candidate of a search is feasible: gradient methods only."
+        )
+    header = ("solver", "runs", "feasible", "within 0.1 %", "median distance")
+    return page("## Difficulty", words, table(header, rows)).strip()
+
+
+def _source(problem: GaitProblem) -> str:
+    said = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name)) or ''}\n")
+    if said is not None:
+        return " ".join(said[1].split())
+    named = [d.source for d in DEFINITIONS if d.problem == problem.name]
+    if named:
+        return f"{named[0]}."
+    module = inspect.getdoc(importlib.import_module(PROBLEMS[problem.name].partition(":")[0])) or ""
+    after = re.search(r"\(after ([^)]+)\)", module)
+    family = importlib.import_module(".".join(PROBLEMS[problem.name].split(".")[:3])).__doc__ or ""
+    cited = re.search(r"\w+(?:, \w+)+ \(?\d{4}[^)]*\)?", family)
+    return f"After {after[1] if after and 'section 4.2' != after[1] else cited[0] if cited else 'this package'}."
+
+
+def _published(problem: GaitProblem) -> str:
+    entry = published().get(problem.name)
+    return "" if entry is None else literal(entry["note"])
+
+
+def _use(problem: GaitProblem) -> str:
+    search = f"nlp-gait compare {problem.name} --out study\n" if problem.searchable else ""
+    python = f'import nlp_gait\n\nsolution = nlp_gait.solve("{problem.name}", starts={problem.starts})\nsolution.plot()'
+    return (
+        "## Try it\n\n```sh\n"
+        f"nlp-gait solve {problem.name} --out best.json\n{search}nlp-gait list {problem.name}\n```\n\n"
+        f"```python\n{python}\n```"
+    )

@@ -1,0 +1,34 @@
+"""
+A study on a cluster
+====================
+
+The runs of a study go to the workers of a Dask scheduler, wherever these are; records come back as each run ends, and a study
+that was stopped goes on. Here two workers on this machine stand for a cluster. Needs the extra `cluster`. From the command line:
+`nlp-gait compare nao-ssp --scheduler tcp://HOST:8786 --out study`.
+"""
+
+import sys
+from pathlib import Path
+
+from distributed import LocalCluster
+
+from compare.analysis.comparison import compare_problems
+from compare.analysis.table import summarise
+from compare.drawing.distributions import final_gap_figure
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Task
+
+if __name__ == "__main__":  # workers import this file
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "study")
+    tasks = [
+        Task(problem=ProblemSpec(name="nao-dsp"), algorithm=algorithm, run=run)
+        for algorithm in ("ipopt", "pso", "ga")
+        for run in range(4)
+    ]
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        study = Study(tasks=tuple(tasks), folder=folder, scheduler=cluster.scheduler_address)
+        records = run_study(study, progress=lambda task, record: print(record))
+    (comparison,) = compare_problems(records)
+    for row in summarise(comparison):
+        print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
+    figure = final_gap_figure(comparison)

@@ -1,0 +1,34 @@
+"""
+Exporting a motion
+==================
+
+A gait as files that other programs read: Webots' `.motion`, CSV with every time history, NAOqi's set-points. What is written
+can be read back: `nlp-gait evaluate --motion gait.csv` judges it, like any motion from elsewhere.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+import nlp_gait
+from nlp_gait.export.formats import FORMATS, write_as
+from nlp_gait.export.setpoints import set_points
+from nlp_gait.problem import Result
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+problem = nlp_gait.load("nao-ssp")
+solution = nlp_gait.solve(problem, starts=2)
+gait = Result(problem=problem, x=problem.check_x(solution.x))
+for name in ("webots", "csv", "naoqi"):
+    path = folder / f"gait{FORMATS[name]}"
+    write_as(name, path, gait, period_ms=40)
+    print(f"{path.name}: {len(path.read_text().splitlines())} lines")
+print((folder / "gait.motion").read_text()[:180], "...")
+
+points = set_points(gait, period_ms=40)
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+for joint in ("RHipPitch", "RKneePitch", "RAnklePitch"):
+    axes.plot([t / 1000 for t in points.times_ms], points.angles[:, points.joints.index(joint)], label=joint)
+axes.set(xlabel="time [s]", ylabel="set-point [rad]", title="The swinging leg")
+axes.legend()

@@ -1,0 +1,23 @@
+"""
+Power against stability: a front
+================================
+
+The true front between mean power and the mean balance margin to the side. Each point is an optimum with its price, which is the
+front's slope there; NSGA-II and CMOPSO stand beside it in `nlp-gait pareto`.
+"""
+
+import matplotlib.pyplot as plt
+
+import nlp_gait
+from compare.questions.pareto.competing import competing_objective
+from compare.questions.pareto.front import pareto_front
+
+problem = nlp_gait.load("nao-dsp")
+margin = competing_objective("dbm_y_mean", problem)
+front = pareto_front(problem, margin, points=7, starts=1)
+for point in front:
+    print(f"{1000 * point.value:6.2f} mm: {point.power_W:.4f} W, the next millimetre for {point.price / 1000:.4f} W")
+
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+axes.plot([1000 * point.value for point in front], [point.power_W for point in front], "o-")
+axes.set(xlabel="mean balance margin to the side [mm]", ylabel="mean power [W]", title=problem.title)

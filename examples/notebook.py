@@ -1,0 +1,49 @@
+"""
+In a notebook
+=============
+
+Results show themselves: the last value of a cell is a table, time histories and runs become data frames, gaits become figures.
+This page can be downloaded as a notebook.
+"""
+
+import nlp_gait
+from compare.study.rows import frame_of
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+
+# %%
+# A solution is a table of its variables, with the prices of the bounds that hold it back.
+
+solution = nlp_gait.solve("nao-dsp", starts=2)
+solution
+
+# %%
+# Time histories by name: arrays, or a pandas data frame whose index is time.
+
+signals = solution.signals()
+print(signals["tau LKneePitch"].max(), "Nm")
+frame = signals.to_frame()
+frame.iloc[:4, :4]
+
+# %%
+# The gait as a figure.
+
+figure = solution.plot()
+
+# %%
+# A study, and its runs as a data frame; a study with a folder has `study.to_frame()`.
+
+algorithms = {"ipopt": Stop(), "pso": Stop(evaluations=2000)}
+tasks = [
+    Task(problem=ProblemSpec(name="nao-dsp"), algorithm=a, run=k, stop=s)
+    for a, s in algorithms.items()
+    for k in range(3)
+]
+study = Study(tasks=tuple(tasks))
+study
+
+# %%
+
+records = run_study(study)
+runs = frame_of(records)
+runs.groupby("solver")[["objective", "calls_f", "time_s"]].median()

@@ -1,0 +1,43 @@
+"""
+Results from MATLAB in the report
+=================================
+
+Final points of any other program become records of a study: a CSV file with one row a run, the variables by name in any order.
+Each point is judged like every other. From the command line: `nlp-gait import nao-dsp finals.csv --as "GA (MATLAB)"`.
+"""
+
+import csv
+import sys
+from pathlib import Path
+
+from compare.analysis.comparison import compare_problems
+from compare.analysis.table import summarise
+from compare.drawing.distributions import final_gap_figure
+from compare.study.imported import imported
+from compare.study.study import Study, run_study
+from compare.study.task import ProblemSpec, Task
+
+folder, spec = Path(sys.argv[1] if len(sys.argv) > 1 else "."), ProblemSpec(name="nao-dsp")
+
+# %%
+# A file as MATLAB's `writetable` leaves it: here the two points that Gupta, Pratihar and Deb (2023) print for double support,
+# with the power that they report for them (Table 8).
+
+header = [*spec.load().names, "run", "objective", "evaluations"]
+rows = [
+    (0.31, -0.0008, -0.0055, 0.0520, 0.0010, -0.0367, -0.0424, 2.0, 0, 1.0682, 10000),
+    (0.31, 0.0002, -0.0052, 0.0582, 0.0010, -0.0384, -0.0405, 2.0, 1, 1.0685, 10000),
+]
+with (folder / "finals.csv").open("w", newline="") as file:
+    csv.writer(file).writerows([header, *rows])
+
+# %%
+# The records stand beside those of solvers that run here.
+
+records = imported(spec, folder / "finals.csv", "paper (MATLAB)")
+tasks = [Task(problem=spec, algorithm=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
+(comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
+for row in summarise(comparison):
+    claim = "no claim" if row.best_claim is None else f"claims {row.best_claim:.4f} W"
+    print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
+figure = final_gap_figure(comparison)

@@ -1,0 +1,33 @@
+"""What results share in notebooks: small tables as HTML, and data frames where pandas is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from types import ModuleType
+
+from nlp_gait.errors import MissingExtraError
+
+
+def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
+    """A table without any style of its own, so that it takes that of the notebook, dark or light; all text is escaped."""
+    heads = "".join(f"<th>{escape(name)}</th>" for name in header)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    below = f"<p>{escape(note)}</p>" if note else ""
+    return (
+        f'<div style="overflow-x: auto"><p><b>{escape(title)}</b></p>'
+        f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>{below}</div>"
+    )
+
+
+def pandas() -> ModuleType:
+    """The package pandas, which nothing here needs but ``to_frame``.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        import pandas as module
+    except ImportError as error:
+        raise MissingExtraError(f"a data frame needs pandas ({error}); install it with pip install pandas") from error
+    return module

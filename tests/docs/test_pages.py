@@ -1,0 +1,131 @@
+"""Generated pages: none is missing, each says what its object is, and the check of a site finds what is wrong."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+from benchmarks.difficulty import Difficulty, difficulties
+from compare.cli import NAMES, PANELS, app
+from compare.study.task import solver_names
+from docs.check import faults_of
+from docs.pages import algorithms, api, commands, problems
+from docs.pages.gallery import ORDER
+from docs.pages.markdown import literal, table
+from nlp_gait.problem import load, problem_names
+
+ROOT = Path(__file__).parents[2]
+OWN = ("nlp_gait", "metaheuristics", "compare")
+
+
+def imported(text: str) -> set[tuple[str, str]]:
+    """Modules and names that a text in Python imports from this package."""
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom) and node.module]
+    return {(str(n.module), alias.name) for n in nodes if str(n.module).split(".")[0] in OWN for alias in n.names}
+
+
+def test_no_public_name_is_missing_from_the_reference(tmp_path: Path) -> None:
+    """Whatever a front door lists stands in the reference under its own heading, once described and elsewhere linked."""
+    api.write(tmp_path)
+    for door in (*OWN, *(f"{package}.{room}" for package, room in doors())):
+        page = (tmp_path / "api" / f"{door}.rst").read_text(encoding="utf-8")
+        for name in importlib.import_module(door).__all__:
+            assert f"\n{name}\n{'-' * len(name)}\n" in page, f"{door}.{name}"
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in (tmp_path / "api").glob("*.rst"))
+    described = re.findall(r"^\.\. (?:auto\w+|py:data):: (\S+)", pages, re.MULTILINE)
+    assert len(described) == len(set(described)) > 80
+
+
+def doors() -> list[tuple[str, str]]:
+    """Packages and rooms whose ``__init__`` lists what they offer."""
+    found = []
+    for package in OWN:
+        for path in sorted((ROOT / package).glob("*/__init__.py")):
+            if "__all__" in path.read_text(encoding="utf-8"):
+                found.append((package, path.parent.name))
+    return found
+
+
+@pytest.mark.parametrize("name", ORDER)
+def test_what_an_example_imports_is_in_the_reference(name: str) -> None:
+    """Formulas and drawings apart, which are no interface."""
+    named = {(door, known) for door in api.DOORS for known in api.names_of(door)}
+    known = {name for _, name in named}
+    for module, name_ in imported((ROOT / "examples" / name).read_text(encoding="utf-8")):
+        inside = module.split(".")[:2] in (["nlp_gait", "symbolic"], ["compare", "drawing"])
+        assert inside or name_ in known or (module, name_) in named, f"{module}.{name_}"
+
+
+def test_a_page_for_each_command_with_every_option(tmp_path: Path) -> None:
+    commands.write(tmp_path)
+    group = typer.main.get_command(app)
+    for function in (function for functions in PANELS.values() for function in functions):
+        name = NAMES.get(function, function.__name__)
+        page = (tmp_path / "commands" / f"{name}.md").read_text(encoding="utf-8")
+        assert page.startswith(f"# nlp-gait {name}\n")
+        for parameter in group.commands[name].params:
+            flags = parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.strip("[].")]
+            assert all(flag in page for flag in flags), (name, flags)
+    compare = (tmp_path / "commands" / "compare.md").read_text(encoding="utf-8")
+    assert "| `--runs` `INTEGER` | Runs of each search algorithm. Default: `11`. |" in compare
+    assert "nlp-gait compare --resume --out study" in compare
+
+
+def test_every_algorithm_and_solver_is_described(tmp_path: Path) -> None:
+    algorithms.write(tmp_path)
+    page = (tmp_path / "algorithms.md").read_text(encoding="utf-8")
+    assert all(f"\n### {name}\n" in page for name in solver_names())
+
+
+def test_every_problem_has_a_page() -> None:
+    assert set(problems.names()) == {name for name in problem_names() if name != "gaitbench"}
+    assert set(difficulties()) <= set(problems.names())
+
+
+@pytest.mark.slow
+def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
+    problem, found = load("nao-dsp"), difficulties()["nao-dsp"]
+    page = problems._page(problem, found, tmp_path)
+    assert (tmp_path / "nao-dsp.png").stat().st_size > 10_000
+    assert all(f"| `{v.name}` | {v.lower:g} | {v.upper:g} |" in page for v in problem.variables)
+    assert all(f"`{q.name}`" in page for q in problem.own_parameters)
+    assert found.best is not None and f"**{found.best.objective:.8g} W**" in page
+    assert f"| pso | {found.solvers['pso'].runs} |" in page and "µs of one core" in page
+    assert all(f"`{a.name}`" in page for a in found.best.active_constraints[: problems.SHOWN])
+
+
+def test_what_was_measured_of_another_version_is_refused(tmp_path: Path) -> None:
+    found = difficulties()["walk12"]
+    assert found.best is not None
+    wrong = Difficulty(**{**vars(found), "best": type(found.best)(**{**vars(found.best), "objective": 1.5})})
+    with pytest.raises(ValueError, match="the problem has changed"):
+        problems._best(load("walk12"), wrong)
+    assert "Not measured yet" in problems._best(load("walk12"), None)
+
+
+def test_cells_hold_text_not_markup() -> None:
+    assert literal("a|b *c* `d|e` <f>") == r"a\|b \*c\* `d|e` \<f\>"
+    assert table(("a",), [("1",)]) == "| a |\n| --- |\n| 1 |"
+
+
+def test_the_check_of_a_site_finds_what_is_wrong(tmp_path: Path) -> None:
+    text = "words " * 50
+    (tmp_path / "b.html").write_text(f"<h1 id='top'>{text}</h1><a href='a.html'>a</a>")
+    (tmp_path / "a.html").write_text(
+        f"<p>{text}</p><a href='b.html#top'>good</a><a href='b.html#gone'>bad</a><a href='c.html'>bad</a>"
+        "<script src='https://example.org/x.js'></script><img src='none.png'>"
+    )
+    (tmp_path / "empty.html").write_text("<script>" + text + "</script>")
+    faults = faults_of(tmp_path)
+    assert faults == [
+        "a.html loads https://example.org/x.js",
+        "a.html loads none.png, which is not there",
+        "a.html links to b.html#gone, which has no such anchor",
+        "a.html links to c.html, which is not there",
+        "empty.html has no content",
+    ]

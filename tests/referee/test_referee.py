@@ -1,0 +1,152 @@
+"""The papers' problems against themselves, written once more from the papers: every value by name, at a thousand random x.
+
+What a paper does not define (a pose out of reach, the centre of pressure under a foot that nothing loads) is left out, and the
+number of points says how much that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.problem import Array, GaitProblem
+from tests.referee import nao, stairs, stairs_ideal, walk12
+
+POINTS = 1000
+AGREEMENT = 1e-9  # of a row's scale, or of its value where that is larger
+
+Referee = Callable[[Array], Mapping[str, Array]]
+
+
+def drawn(
+    problem: GaitProblem, referee: Referee, drafts: int, allowed: Callable[[Array], Array] | None = None
+) -> Array:
+    """A thousand random x (P, n) within the bounds whose legs reach at every sample."""
+    X = np.random.default_rng(21).uniform(problem.lower, problem.upper, (drafts, len(problem.names)))
+    if allowed is not None:
+        X = X[allowed(X)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rows = referee(X)
+    reached = np.all([rows[name] < 1.0 for name in rows if name.startswith("reach")], axis=0)
+    assert reached.sum() >= POINTS
+    return X[reached][:POINTS]
+
+
+def compared(problem: GaitProblem, referee: Referee, X: Array, of: str = "") -> dict[str, float]:
+    """Largest disagreement by name of row or index, the objective among them; every row but the bounds of x has one.
+
+    Args:
+        problem: of the package.
+        referee: of these tests.
+        X: (P, n).
+        of: only rows whose names begin so.
+    """
+    model = exact_model(problem)
+    cost, _, g, _, _, indexes = (np.array(value) for value in model.function(X.T, problem.p))
+    with np.errstate(invalid="ignore"):  # beyond the arc of the hip, between samples
+        expected = referee(X)
+    named = [*zip(model.row_names, model.row_scales, g, strict=True)]
+    named += [(name, 1.0, values) for name, values in zip(model.index_names, indexes, strict=True)]
+    objective = problem.objective.name if problem.objective.name in expected else model.index_names[0]
+    named.append((objective, 1.0, problem.objective.sign * cost[0]))
+    found: dict[str, float] = {}
+    for name, scale, values in named:
+        if name.startswith("bounds[") or not name.startswith(of):
+            continue
+        known = ~np.isnan(expected[name])
+        assert known.sum() > POINTS // 2, name
+        error = np.abs(values - expected[name])[known] / np.maximum(scale, np.abs(values[known]))
+        found[name] = max(found.get(name, 0.0), float(np.nan_to_num(error, nan=np.inf).max()))
+    return found
+
+
+def worst(found: Mapping[str, float]) -> tuple[float, str]:
+    """Largest disagreement and where it is."""
+    return max((error, name) for name, error in found.items())
+
+
+@pytest.mark.parametrize("phase", ["single_support", "double_support"])
+def test_nao_phases_by_momentum_alone(phase: str) -> None:
+    """All rows, and power, against links whose momenta are Taylor series in time; no recursion of forces, no symbols."""
+    problem = nlp_gait.load({"single_support": "nao-ssp", "double_support": "nao-dsp"}[phase])
+    robot = nao.robot()
+
+    def referee(X: Array) -> Mapping[str, Array]:
+        return getattr(nao, phase)(X, robot)  # type: ignore[no-any-return]
+
+    found = compared(problem, referee, drawn(problem, referee, 1200))
+    assert len(found) == 12 * 11 + 22 * 10 + 2 * 12 + 6
+    assert worst(found)[0] < AGREEMENT, worst(found)
+
+
+@pytest.mark.parametrize(("reading", "static"), [("exact", True), ("moment-free", False)])
+def test_the_walk_of_twelve_joints(reading: str, static: bool) -> None:
+    """Objective, both parts of it, the ZMP's extremes and reach, for eq. (14) and with the true vertical load."""
+    problem = nlp_gait.load("walk12", zmp=reading)
+
+    def referee(X: Array) -> Mapping[str, Array]:
+        return walk12.walk(X, static_load=static)
+
+    found = compared(problem, referee, drawn(problem, referee, 1200))
+    assert len(found) == 22 + 10
+    assert worst(found)[0] < AGREEMENT, worst(found)
+
+
+def in_order(X: Array) -> Array:
+    """Steps on stairs whose four phases each take time."""
+    return np.all(np.diff(X[:, 6:9], axis=1) > 0.05, axis=1)
+
+
+@pytest.mark.parametrize(("length", "ratio", "agreement"), [(0.508, 0.70, AGREEMENT), (0.5588, 0.60, 1e-8)])
+def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: float) -> None:
+    """Energy, jerk and all rows on a stair of Table IV, and on a flatter one, which stretches its cycloid.
+
+    Where that begins, rounding leaves angle - sin(angle) = 1e-15 open by 1e-11 rad.
+    """
+    problem = nlp_gait.load("stairs-plan").with_values(stair_length_m=length, rise_run_ratio=ratio)
+
+    def referee(X: Array) -> Mapping[str, Array]:
+        return stairs.step(X, length, ratio)
+
+    found = compared(problem, referee, drawn(problem, referee, 3600, in_order))
+    assert len(found) == 44 * 22 + 3 * 82 + 4 + 5
+    assert worst(found)[0] < agreement, worst(found)
+
+
+def test_the_ideal_step_on_stairs() -> None:
+    """Effort and all 1,560 variables' rows: continuity, feet, clearance, and the ground's forces of every interval."""
+    problem = nlp_gait.load("stairs-ideal")
+    X = np.random.default_rng(21).uniform(problem.lower, problem.upper, (POINTS, len(problem.names)))
+    X[:, [name.startswith(("rate", "acceleration", "toe", "sole")) for name in problem.names]] *= (
+        0.1  # else it flies as a rule
+    )
+    found = compared(problem, lambda X: stairs_ideal.effort(X, problem.names), X)
+    assert len(found) == 2 * 490 + 14 + 69 + 56 + 10 + 4 + 4 + 2 + 56 + 126 + 56 + 20 + 140 + 70 + 70 + 142 + 4
+    assert worst(found)[0] < AGREEMENT, worst(found)
+
+
+def test_reach_is_judged_alike_out_of_reach() -> None:
+    """Also where the legs do not reach, and at knots out of order, what the papers still define is the same."""
+    ssp, robot = nlp_gait.load("nao-ssp"), nao.robot()
+    X = np.random.default_rng(3).uniform(ssp.lower, ssp.upper, (POINTS, len(ssp.names)))
+    with np.errstate(invalid="ignore"):
+        assert worst(compared(ssp, lambda X: nao.single_support(X, robot), X, "reach"))[0] < AGREEMENT
+    plan = nlp_gait.load("stairs-plan")
+    X = np.random.default_rng(3).uniform(plan.lower, plan.upper, (POINTS, len(plan.names)))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        assert worst(compared(plan, stairs.step, X, "phase_duration"))[0] < AGREEMENT
+
+
+def test_the_referee_sees_a_wrong_sign() -> None:
+    """A rotational term that is left out, as a misread eq. (19) would have it, is no agreement."""
+    problem, robot = nlp_gait.load("nao-ssp", rotational_inertia=False), nao.robot()
+
+    def referee(X: Array) -> Mapping[str, Array]:
+        return nao.single_support(X, robot)
+
+    found = compared(problem, referee, drawn(problem, referee, 1200), "dbm")
+    assert worst(found)[0] > 1e-3
