@@ -48,19 +48,19 @@ def _lshade(exponent: int) -> Opponent:
 # All with their defaults. L-SHADE has epsilon levels, and shrinks over its budget, so there is one for each; SciPy's solvers take
 # 0.5 ms for each evaluation of their own, Bayesian optimisation seconds.
 OPPONENTS = (
-    Opponent(label="random", algorithm="random"),
-    Opponent(label="sobol", algorithm="sobol"),
     Opponent(label="cma", algorithm="cma"),
     Opponent(label="cma-al", algorithm="cma-al"),
-    Opponent(label="de", algorithm="de"),
-    Opponent(label="pso", algorithm="pso"),
-    Opponent(label="ga", algorithm="ga"),
-    Opponent(label="aco", algorithm="aco"),
-    Opponent(label="aco-grid", algorithm="aco-grid"),
     *(_lshade(exponent) for exponent in (3, 4, 5, 6)),
     Opponent(label="SLSQP starts", algorithm="scipy:SLSQP", evaluations=100_000),
-    Opponent(label="COBYQA starts", algorithm="scipy:COBYQA", evaluations=100_000),
+    Opponent(label="de", algorithm="de"),
+    Opponent(label="pso", algorithm="pso"),
     Opponent(label="bayes", algorithm="bayes", evaluations=100, runs=3),
+    Opponent(label="COBYQA starts", algorithm="scipy:COBYQA", evaluations=100_000),
+    Opponent(label="aco", algorithm="aco"),
+    Opponent(label="ga", algorithm="ga"),
+    Opponent(label="aco-grid", algorithm="aco-grid"),
+    Opponent(label="random", algorithm="random"),
+    Opponent(label="sobol", algorithm="sobol"),
 )
 
 

@@ -49,6 +49,7 @@ ALLOWED: dict[str, dict[str, str]] = {
         "12": "variables, the abstract",
         "13": "likewise",
         "100": "population of the searches",
+        "1": "what the ranges of the front count as",
     },
     "nao": {
         "0.015": "swing height of the paper",
