@@ -54,7 +54,7 @@ OPPONENTS = (
     Opponent(label="SLSQP starts", algorithm="scipy:SLSQP", evaluations=100_000),
     Opponent(label="de", algorithm="de"),
     Opponent(label="pso", algorithm="pso"),
-    Opponent(label="bayes", algorithm="bayes", evaluations=100, runs=3),
+    Opponent(label="bayes", algorithm="bayes", evaluations=60, runs=3),
     Opponent(label="COBYQA starts", algorithm="scipy:COBYQA", evaluations=100_000),
     Opponent(label="aco", algorithm="aco"),
     Opponent(label="ga", algorithm="ga"),

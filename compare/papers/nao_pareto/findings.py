@@ -55,8 +55,8 @@ class Measured:
         return np.asarray(at)
 
     def look(self, evaluations: float) -> int:
-        """Number of the last look within some evaluations."""
-        return int(np.flatnonzero(self.evaluations <= evaluations)[-1])
+        """Number of the last look within some evaluations; the first one where there is none."""
+        return max(0, int(np.count_nonzero(self.evaluations <= evaluations)) - 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
