@@ -45,11 +45,15 @@ def price(runs: Sequence[Curve], target: float) -> tuple[float, int]:
 
 
 def leaders(curves: Curves, budget: int) -> list[tuple[str, float]]:
-    """Labels and median gaps of those that are nearest after a budget; who knows its budget takes part at its own only."""
+    """Labels and median gaps of those that are nearest after a budget; who knows its budget takes part at its own only.
+
+    Of those within the tightest target, where runs end, the cheapest come first.
+    """
     plans = {opponent.label: opponent.evaluations for opponent in OPPONENTS if opponent.planned}
     taking_part = [label for label in curves if plans.get(label, budget) == budget and label != "ipopt"]
     gaps = [(label, median_gap(curves[label], budget)) for label in taking_part]
-    return sorted((pair for pair in gaps if math.isfinite(pair[1])), key=lambda pair: pair[1])[:LEADERS]
+    near = [pair for pair in gaps if math.isfinite(pair[1])]
+    return sorted(near, key=lambda pair: (max(pair[1], TARGETS[-1]), price(curves[pair[0]], TARGETS[-1])[0]))[:LEADERS]
 
 
 def write_page(folder: Path, found: Mapping[str, Curves], runs: int) -> list[Path]:

@@ -19,6 +19,7 @@ from compare.questions.pareto.study import ParetoStudy
 from metaheuristics.array import Array
 from nlp_gait.problem import GaitProblem
 
+EVEN_POINTS = 200  # of the true front, which distances are measured from
 NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO", "CMOEAD": "CMOEA/D", "DCNSGA3": "DCNSGA-III"}
 
 
@@ -31,7 +32,8 @@ class Measured:
         budget: evaluations.
         evaluations: (L,) used at each look.
         hypervolume: (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point.
-        igd: (R, L) mean distance from a point of the true front to the nearest one found; infinite without one.
+        igd: (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without
+            one.
         feasible: (R,) share of the evaluated points that meet all constraints.
         first_feasible: (R,) number of the first of these; infinite without one.
         time_s: (R,) processor time [s].
@@ -110,7 +112,7 @@ class PhaseFindings:
         first, scale = Scale(self.first_front), Scale(self.front)
         values, powers = (np.array([getattr(p, key) for p in self.front]) for key in ("value", "power_W"))
         true = scale(values, powers)
-        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(true)
+        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(evenly(true))
         whole = float(hypervolume(true))
         runs = [run for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
         fronts = [[scale(*first.back(look.F)) for look in run.looks] for run in runs]
@@ -139,6 +141,13 @@ class Findings:
 
     phases: tuple[PhaseFindings, ...]
     effort: Effort
+
+
+def evenly(front: Array) -> Array:
+    """(EVEN_POINTS, 2) points evenly along the lines between a front's (k, 2): its own crowd where the searches' best were."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(front, axis=0).T))])
+    places = np.linspace(0.0, along[-1], EVEN_POINTS)
+    return np.column_stack([np.interp(places, along, column) for column in front.T])
 
 
 def points_found(study: ParetoStudy, runs: Sequence[FrontRun]) -> list[FrontPoint]:

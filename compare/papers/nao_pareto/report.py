@@ -7,7 +7,7 @@ from typing import Any
 
 from compare.papers.nao_pareto.claims import FAILS, HOLDS, NEAR, claims
 from compare.papers.nao_pareto.figures import all_figures
-from compare.papers.nao_pareto.findings import Findings, PhaseFindings
+from compare.papers.nao_pareto.findings import EVEN_POINTS, Findings, PhaseFindings
 from compare.papers.nao_pareto.tables import all_tables
 from compare.questions.pareto.search import REFERENCE
 from compare.report.document import Document
@@ -30,6 +30,7 @@ def _values(findings: Findings) -> dict[str, Any]:
         "points": effort.points,
         "samples": effort.intervals + 1,
         "reference": REFERENCE,
+        "even": EVEN_POINTS,
         "near": 100 * NEAR,
         "criterion": ssp.criterion.name,
         "claims": len(verdicts),

@@ -12,7 +12,7 @@ import pytest
 from compare.papers.nao_pareto import report as pareto_report
 from compare.papers.nao_pareto import reproduce as nao_pareto
 from compare.papers.nao_pareto.claims import FAILS, HOLDS, claims
-from compare.papers.nao_pareto.findings import Findings, Measured
+from compare.papers.nao_pareto.findings import Findings, Measured, evenly
 from compare.papers.nao_pareto.runs import ALGORITHMS, Effort, looks_of
 from compare.report.document import Document
 
@@ -108,6 +108,16 @@ def test_verdicts_follow_from_the_numbers(done: tuple[Path, Findings, list[str]]
     assert [claim.verdict for claim in claims(right)][:-1] == [HOLDS] * 7
     wrong = made(("DCNSGA3", "CMOEAD", "NSGA2", "CMOPSO"), "NSGA2", "CMOPSO", "NSGA2")
     assert [claim.verdict for claim in claims(wrong)][:-1] == [FAILS] * 7
+
+
+def test_distances_are_measured_from_points_evenly_along_the_front() -> None:
+    """Points that crowd in a corner move none of them."""
+    plain = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])
+    crowded = np.insert(plain, 1, [[0.0, y] for y in (0.03, 0.02, 0.01)], axis=0)
+    np.testing.assert_allclose(evenly(crowded), evenly(plain), atol=1e-12)
+    np.testing.assert_allclose(
+        np.hypot(*np.diff(evenly(plain), axis=0).T).max(), 2 / (len(evenly(plain)) - 1), rtol=1e-9
+    )
 
 
 def test_looks_are_whole_generations_and_end_with_the_budget() -> None:
