@@ -19,7 +19,7 @@ from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
 from metaheuristics.own import as_algorithm
 from metaheuristics.preparation import check_limits
-from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms
 from metaheuristics.result import History, Interrupted, Result
 
 __all__ = [
@@ -53,5 +53,6 @@ __all__ = [
     "as_algorithm",
     "check_limits",
     "handling",
+    "installed_algorithms",
     "minimize",
 ]

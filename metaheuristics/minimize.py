@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metaheuristics.adapters.function import Ended, FunctionSearch
+from metaheuristics.adapters.function import CallingSearch, Ended
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, Rule
 from metaheuristics.errors import SearchError
@@ -73,9 +73,9 @@ def minimize(
     sequence = checked_seed(seed)
     start = prepared(objective, algorithm.population, evaluations, sequence, initial)
     search = algorithm.start(start)
-    if not isinstance(search, FunctionSearch):
+    if not isinstance(search, CallingSearch):
         check_search(search, algorithm)
-    evaluate = Evaluator(objective, observe, thinned=isinstance(search, FunctionSearch))  # which calls point by point
+    evaluate = Evaluator(objective, observe, thinned=isinstance(search, CallingSearch))  # which calls point by point
     initial_violation: Array | None = None
 
     def generation(X: Array) -> tuple[Array, Array, Array, Rule]:
@@ -117,7 +117,7 @@ def minimize(
         )
 
     try:
-        if isinstance(search, FunctionSearch):
+        if isinstance(search, CallingSearch):
             return result(_called(search, generation, limits_reached))
         while True:
             X, f, violation, rule = generation(checked_points(search.ask(), start.lower, start.upper))
@@ -134,7 +134,7 @@ def minimize(
 
 
 def _called(
-    search: FunctionSearch,
+    search: CallingSearch,
     generation: Callable[[Array], tuple[Array, Array, Array, Rule]],
     limits_reached: Callable[[], list[str]],
 ) -> list[str]:

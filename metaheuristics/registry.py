@@ -7,35 +7,58 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from metaheuristics.adapters.cma import CmaEs
+from metaheuristics.adapters.cma_lagrangian import CmaLagrangian
+from metaheuristics.adapters.egobox import BayesianOptimisation
+from metaheuristics.adapters.many_starts import CobyqaStarts, SlsqpStarts
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.ant_colony import AntColony
 from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.lshade import LShade
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
+from metaheuristics.algorithms.sobol import SobolPoints
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError, shown
 from metaheuristics.interface import Algorithm
-from metaheuristics.settings import check_installed
+from metaheuristics.settings import check_installed, is_installed
 
 T = TypeVar("T")
 
 ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
     {
         factory.name: factory
-        for factory in (ParticleSwarm, GeneticAlgorithm, AntColony, AntColonyGrid, DifferentialEvolution, RandomSearch)
+        for factory in (
+            ParticleSwarm,
+            GeneticAlgorithm,
+            AntColony,
+            AntColonyGrid,
+            DifferentialEvolution,
+            LShade,
+            RandomSearch,
+            SobolPoints,
+        )
     }
 )
 """This package's own algorithms."""
 
+_SINGLE: Mapping[str, Callable[..., Any]] = {  # SciPy's are not asked: they call
+    "cma": CmaEs,
+    "cma-al": CmaLagrangian,
+    "bayes": BayesianOptimisation,
+    "scipy:SLSQP": SlsqpStarts,
+    "scipy:COBYQA": CobyqaStarts,
+}
 ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
-    {"cma": CmaEs} | {f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}
+    {**_SINGLE, **{f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}}
 )
-"""Those of other packages, which `pip install 'nlp-gait[algorithms]'` installs."""
+"""Those of other packages: `pip install 'nlp-gait[algorithms]'` installs them, and `'nlp-gait[bayes]'` that of `bayes`."""
+
+PACKAGES = {"cma-al": "cma", "bayes": "egobox"}  # of adapters whose names do not begin with the package's
 
 HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
     {"deb": Deb, "penalty": StaticPenalty, "epsilon": EpsilonLevel}
@@ -57,8 +80,17 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
             package that it comes from is not installed.
     """
     if isinstance(name, str) and name in ADAPTERS:
-        check_installed(name, name.partition(":")[0])
+        check_installed(name, _package(name))
     return made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
+
+
+def installed_algorithms() -> tuple[str, ...]:
+    """Names of the algorithms that can run here: this package's own, and those whose package is installed."""
+    return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(_package(name))))
+
+
+def _package(name: str) -> str:
+    return PACKAGES.get(name, name.partition(":")[0])
 
 
 def handling(name: str, /, **settings: object) -> ConstraintHandling:

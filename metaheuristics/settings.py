@@ -68,12 +68,18 @@ def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_mos
         raise bad_setting(settings, name, f"a whole number >= {at_least}{upper}")
 
 
+def is_installed(package: str) -> bool:
+    """Whether a package can be imported."""
+    return find_spec(package) is not None
+
+
 def check_installed(algorithm: str, package: str) -> None:
     """Raise SearchError unless the package that an algorithm comes from is installed."""
-    if find_spec(package) is None:
+    if not is_installed(package):
+        extra = "bayes" if package == "egobox" else "algorithms"
         raise SearchError(
             f"algorithm {algorithm!r} needs the package {package}, which is not installed: "
-            "pip install 'nlp-gait[algorithms]'"
+            f"pip install 'nlp-gait[{extra}]'"
         )
 
 

@@ -23,7 +23,7 @@ from tests.fuzz.commands import ended, mutated_line, workplace
 from tests.fuzz.readers import FORMATS
 
 # A hang inside compiled code is not interrupted by a signal: the whole run ends with a traceback.
-HARD_LIMIT_S = 300
+HARD_LIMIT_S = 900
 LINE = "command line"
 CALLS = {"Python arguments": argument_ended, "plug-ins": plugin_ended}
 

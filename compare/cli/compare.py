@@ -17,6 +17,7 @@ from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptio
 from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
+from metaheuristics import installed_algorithms
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import writable_folder
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
 CONDENSED = "condensed"
+ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
 OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
@@ -39,7 +41,11 @@ def compare(
         list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
     ] = None,
     algorithms: Annotated[
-        str, typer.Option(help="Searches and other solvers, separated by commas; see `nlp-gait list`.")
+        str,
+        typer.Option(
+            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` is every search that is "
+            "installed, IPOPT, the condensed method and SLSQP."
+        ),
     ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
         int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
@@ -190,10 +196,12 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:
     """The named solvers with IPOPT before them; without starts, those that need none.
 
-    Where nobody named any, the condensed method takes part too, if there is the compiler that it needs.
+    Where nobody named any, and in all, the condensed method takes part too, if there is the compiler that it needs.
     """
     names = names_in(algorithms)
-    if algorithms == DEFAULT_ALGORITHMS and _has_compiler():
+    if ALL in names:
+        names = [*dict.fromkeys([*ALL_GRADIENT, *installed_algorithms(), *(name for name in names if name != ALL)])]
+    if (algorithms == DEFAULT_ALGORITHMS or ALL in names_in(algorithms)) and _has_compiler():
         names.insert(0, CONDENSED)
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]

@@ -66,18 +66,32 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Adapt the distribution and sample it; see `Search.tell`."""
-        order = rule.order(f, violation)
         if self._strategy is None:
-            self._strategy = self._begin(self._unit(X[order[0]]))
+            self._strategy = self._begin(self._unit(X[rule.best(f, violation)]))
         else:
-            ranks = np.empty(len(order))
-            ranks[order] = np.arange(len(order))
-            self._strategy.tell(self._asked, ranks.tolist())
+            self._strategy.tell(self._asked, self._ranked(X, f, violation, rule))
             if self._strategy.stop():
                 self._size *= self._settings.growth
                 self._strategy = self._begin(self._start.rng.random(max(2, self._free.size)))
         self._asked = self._strategy.ask()
         self._X = self._points(np.array(self._asked))
+
+    def _ranked(self, X: Array, f: Array, violation: Array, rule: Rule) -> list[float]:
+        """What pycma is told of each point: its place in the rule's order."""
+        order = rule.order(f, violation)
+        ranks = np.empty(len(order))
+        ranks[order] = np.arange(len(order))
+        return ranks.tolist()
+
+    def _criteria(self) -> dict[str, float]:
+        """Pycma's criteria on objective values, which it does not see, are switched off; those on the distribution remain."""
+        return {
+            "tolfun": -1.0,
+            "tolfunhist": -1.0,
+            "tolfunrel": -1.0,
+            "tolflatfitness": np.inf,
+            "tolstagnation": np.inf,
+        }
 
     def _begin(self, centre: Array) -> Any:
         from cma import CMAEvolutionStrategy
@@ -87,12 +101,7 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
             "popsize": int(self._size),
             "randn": lambda *shape: self._start.rng.standard_normal(shape),
             "seed": np.nan,  # else it seeds NumPy's global generator
-            # Criteria on objective values, which it does not see; those on the distribution remain.
-            "tolfun": -1.0,
-            "tolfunhist": -1.0,
-            "tolfunrel": -1.0,
-            "tolflatfitness": np.inf,
-            "tolstagnation": np.inf,
+            **self._criteria(),
             "verbose": -9,
             "verb_log": 0,
         }

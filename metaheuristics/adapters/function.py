@@ -73,8 +73,16 @@ def takes_function_arguments(function: Callable[..., object], settings: Mapping[
     return True
 
 
-class FunctionSearch:
-    """A run of `PlainFunction`: it is not asked, it calls."""
+class CallingSearch:
+    """Base of searches that are not asked but call; see `minimize`."""
+
+    def run(self, evaluate: Evaluate) -> str:
+        """Call `evaluate` until it raises `Ended`; to return says why the search ended by itself."""
+        raise NotImplementedError
+
+
+class FunctionSearch(CallingSearch):
+    """A run of `PlainFunction`."""
 
     def __init__(self, settings: PlainFunction, start: Start) -> None:
         self._settings = settings

@@ -23,6 +23,7 @@ def test_random_gaits_are_feasible_and_seeded():
     np.testing.assert_array_equal([gait.x for gait in found], [gait.x for gait in again])
 
 
+@pytest.mark.slow
 def test_too_few_feasible_gaits_are_an_error(monkeypatch):
     monkeypatch.setattr(gaits, "DRAWS", 1)
     monkeypatch.setattr(gaits, "BATCH", 10)

@@ -15,6 +15,7 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.export.solver import export_solver
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
 def test_the_example_in_c_finds_casadis_numbers(tmp_path: Path) -> None:
     problem = nlp_gait.load("walk12")

@@ -48,6 +48,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
     monkeypatch.setattr(ParticleSwarm, "start", counted)
 
 
+@pytest.mark.slow
 def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -64,6 +65,7 @@ def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     assert again.exit_code == 1 and json.loads(again.stdout)["problems"]["walk12"]
 
 
+@pytest.mark.slow
 def test_a_solver_with_a_run_left_is_a_comparison_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, 1)
     done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
@@ -71,6 +73,7 @@ def test_a_solver_with_a_run_left_is_a_comparison_all_the_same(tmp_path: Path, m
     assert "walk12, pso: 1 of 2 runs have no result" in done.stderr and done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_comparison_without_failures_says_nothing(tmp_path: Path) -> None:
     done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
     assert (done.exit_code, done.stderr) == (0, "") and "Failed runs" not in done.stdout

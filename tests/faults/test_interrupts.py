@@ -233,6 +233,7 @@ def a_gait(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["gif", "png"])
 @pytest.mark.parametrize("calls", [1, 7, 40])
 def test_animate_while_a_picture_is_drawn(
@@ -259,6 +260,7 @@ def test_animate_while_a_picture_is_drawn(
     assert list(tmp_path.iterdir()) == [gait]
 
 
+@pytest.mark.slow
 def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
     from nlp_gait.problem import GaitProblem

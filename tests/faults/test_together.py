@@ -135,6 +135,7 @@ def test_an_objective_that_was_used_goes_to_a_pool(method: str, tmp_path: Path) 
     assert done.stdout == "equal\n", done.stderr
 
 
+@pytest.mark.slow
 def test_a_fork_waits_until_no_other_thread_is_inside_casadi() -> None:
     program = """
 import os, threading, nlp_gait

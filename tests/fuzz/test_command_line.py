@@ -25,6 +25,15 @@ KEPT = (
     ("export", "result.json", "--format", "csv", "--period-ms", "9" * 400),
     ("export", "result.json", "--format", "csv", "--out", "x" * 300),
     ("evaluate", "nao-dsp", "--x", "1", "--robot", "x" * 300 + ".urdf"),
+    ("certainty", "walk12", "--check", "certificate.json"),
+    ("simulate", "walk.json", "--steps", "1000000000"),
+    ("simulate", "walk.json", "--period-ms", "1e-9"),
+    ("simulate", "walk.json", "--period-ms", "1e9"),
+    ("motors", "--starts", "1000000000"),
+    ("prices", "walk12", "--starts", "1000000000"),
+    ("robust", "--samples", "1000000000"),
+    ("pareto", "nao-ssp", "--points", "1000000000"),
+    ("certainty", "walk12", "--starts", "1000000000"),
 )
 
 

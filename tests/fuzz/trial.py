@@ -12,6 +12,7 @@ from metaheuristics import SearchError
 from nlp_gait.errors import GaitError
 
 TIME_LIMIT_S = 10.0
+WAITING = 10  # on a busy machine an input may take so many times its limit on the wall
 
 
 class Misread(Exception):
@@ -53,7 +54,10 @@ def _judged(message: str) -> str:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise Hung inside after so long; where the system has no such signal there is no limit."""
+    """Raise Hung inside after so much processor time, or a wait of ``WAITING`` times as long.
+
+    Where the system has no such signals there is no limit.
+    """
     if not hasattr(signal, "setitimer"):
         yield
         return
@@ -61,10 +65,13 @@ def limited(seconds: float) -> Iterator[None]:
     def stop(number: int, frame: object) -> None:
         raise Hung
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    limits = ((signal.SIGPROF, signal.ITIMER_PROF, seconds), (signal.SIGALRM, signal.ITIMER_REAL, WAITING * seconds))
+    before = [signal.signal(number, stop) for number, _, _ in limits]
+    for _, timer, limit in limits:
+        signal.setitimer(timer, limit)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        for (number, timer, _), handler in zip(limits, before, strict=True):
+            signal.setitimer(timer, 0.0)
+            signal.signal(number, handler)

@@ -65,6 +65,7 @@ def test_pymoo_finds_the_same_with_one_row_as_with_all(instance: gaitbench.Insta
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
     """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
     pygmo = package("pygmo")
@@ -110,6 +111,7 @@ def test_ioh_keeps_instances_apart() -> None:
         assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     """SLSQP with our gradients, from the middle of the bounds, in the unit cube."""
     from scipy.optimize import minimize

@@ -101,6 +101,7 @@ def test_called_from_c(built: tuple[str, Path]) -> None:
         assert row[instance.row_names.index(line[3])] == pytest.approx(row.max(), rel=1e-9, abs=EQUAL)
 
 
+@pytest.mark.slow
 def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     """Through the mex file: f, violation and G of several points, to the last digits that are printed."""
     if not (shutil.which("octave-cli") and shutil.which("mkoctfile")):
@@ -127,6 +128,7 @@ def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     assert "one point a row" in refused.stderr
 
 
+@pytest.mark.slow
 def test_two_instances_stand_in_one_program(tmp_path: Path) -> None:
     """Their names do not clash; each says its own optimum. Four points at a time give the same as one."""
     lines = []

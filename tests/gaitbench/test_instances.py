@@ -216,6 +216,7 @@ def test_definitions_are_those_that_were_published() -> None:
         assert entry["subsets"] == (["small", "full"] if definition.small else ["full"])
 
 
+@pytest.mark.slow
 def test_the_catalogue_has_an_entry_for_each() -> None:
     """Plain data, and the file in the documentation is that."""
     made = json.loads(json.dumps(gaitbench.catalogue(), allow_nan=False))

@@ -31,6 +31,7 @@ OTHER: dict[str, Any] = {
     "duration_s": 3.0,
     "instance": "walk12-w100",
 }
+QUICK = ("walk12", "nao-ssp")
 # What the first studies recorded; their records must stay valid.
 FIRST_OPTIONS = ["robot", "intervals", "derivatives", "rotational_inertia", "step_length_m"]
 
@@ -57,7 +58,11 @@ def task(name: str, options: Mapping[str, Any]) -> Task:
 
 @pytest.mark.parametrize(
     ("name", "option", "value"),
-    [pytest.param(name, *case, id=f"{name} {case[0]}") for name in PROBLEMS for case in others(name).items()],
+    [
+        pytest.param(name, *case, id=f"{name} {case[0]}", marks=[] if name in QUICK else [pytest.mark.slow])
+        for name in PROBLEMS
+        for case in others(name).items()
+    ],
 )
 def test_every_option_is_recorded(name: str, option: str, value: Any) -> None:
     """With all that was asked for; equal tasks of a study have equal definitions, and this one is not the default's."""

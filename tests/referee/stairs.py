@@ -120,8 +120,8 @@ def _planned(phase: int, t: Array, ends: Array, x: Mapping[str, Array], run: flo
 
 
 def _first_angle(m: float) -> float:
-    """Root of angle - sin(angle) = m by bisection."""
-    low, high = 0.0, np.pi
+    """Root of angle - sin(angle) = m by bisection; a flat stair begins its cycloid at about 2e-5 rad, not at zero."""
+    low, high, m = 0.0, np.pi, max(m, 1e-15)
     for _ in range(200):
         middle = (low + high) / 2
         low, high = (middle, high) if middle - np.sin(middle) < m else (low, middle)

@@ -13,14 +13,15 @@ from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AnyProblem, AsJson, Code, Seed, name_all
 from compare.cli.questions.answers import Output
+from nlp_gait.errors import InputError
 
 
 @command
 def certainty(
     *,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of IPOPT.")] = 10_000,
+    starts: Annotated[int, typer.Option(min=1, max=1_000_000, help="Random starts of IPOPT.")] = 10_000,
     evaluations: Annotated[
-        int, typer.Option(min=0, help="Budget of one long CMA-ES with restarts; 0 for none.")
+        int, typer.Option(min=0, max=10**12, help="Budget of one long CMA-ES with restarts; 0 for none.")
     ] = 1_000_000,
     tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
     time_limit: Annotated[
@@ -42,6 +43,8 @@ def certainty(
     `nlp-gait certainty --check certainty/walk12-certificate.json`
     """
     if check is not None:
+        if problem != AnyProblem():
+            raise InputError("--check takes the problem and its options from the certificate; leave them out")
         name_all(code)
         _check(check, paths, seed, as_json)
         return

@@ -23,7 +23,9 @@ def motions(
     free_orders: Annotated[
         str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
     ] = "spline-2,spline-4,spline-8,spline-16",
-    starts: Annotated[int, typer.Option(min=0, help="Random starts for each order, beside the simpler optimum.")] = 1,
+    starts: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Random starts for each order, beside the simpler optimum.")
+    ] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
     output: Output,

@@ -16,7 +16,7 @@ from compare.cli.questions.answers import Output
 @command
 def motors(
     *,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts for each variant.")] = 10,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts for each variant.")] = 10,
     seed: Seed = 0,
     problem: NaoPhase,
     output: Output,

@@ -27,8 +27,8 @@ def pareto(
             "separated by commas."
         ),
     ] = "power,dbm_y_mean",
-    points: Annotated[int, typer.Option(min=5, help="Points of the front.")] = 40,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts at every third point.")] = 5,
+    points: Annotated[int, typer.Option(min=5, max=10_000, help="Points of the front.")] = 40,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts at every third point.")] = 5,
     search: Annotated[
         list[str] | None,
         typer.Option(
@@ -37,7 +37,7 @@ def pareto(
             show_default=False,
         ),
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, help="Runs of each search.")] = 11,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search.")] = 11,
     seed: Seed = 0,
     problem: NamedProblem,
     out: Annotated[Path, typer.Option(help="Folder; finished runs in it are kept.")] = Path("pareto"),

@@ -16,7 +16,7 @@ from compare.cli.questions.answers import Output
 @command
 def prices(
     *,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts within the bounds.")] = 10,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts within the bounds.")] = 10,
     seed: Seed = 0,
     checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are checked by solving again.")] = 3,
     problem: NamedProblem,

@@ -20,9 +20,11 @@ def robust(
     sole: Annotated[
         float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
     ] = 2.0,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of the nominal problem.")] = 10,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts of the nominal problem.")] = 10,
     seed: Seed = 0,
-    samples: Annotated[int, typer.Option(min=0, help="Random corners on which each result is checked.")] = 20,
+    samples: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Random corners on which each result is checked.")
+    ] = 20,
     simulate: Annotated[bool, typer.Option(help="Play both gaits in MuJoCo on the worst robots (extra sim).")] = True,
     problem: NaoPhase,
     output: Output,

@@ -34,7 +34,7 @@ def walk(
             help="Planner beside the cheapest gaits, on their footsteps: cart-table, least-torque; repeatable."
         ),
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts where no neighbour helps.")] = 5,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     servos: DriveOptions,
     problem: CycleOptions,

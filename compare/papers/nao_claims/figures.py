@@ -12,7 +12,13 @@ from compare.papers.nao_claims.runs import KINDS, PAPER_HEAT, SHEET_HEAT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GAITS = {"own": "own walk", "own-plain": "own walk,\nplain servos", "optimum-sheet": "optimum"}
+BARS = (  # gait, where, label
+    ("own", "model", "own walk,\nmodel"),
+    ("own", "engine", "own walk,\nengine"),
+    ("own-plain", "engine", "plain servos,\nengine"),
+    ("optimum-sheet", "model", "optimum,\nmodel"),
+    ("optimum-sheet", "engine", "optimum,\nengine"),
+)
 PALETTE = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#CC79A7", "#999999")
 
 
@@ -26,22 +32,18 @@ def joints_figure(findings: Findings) -> Figure:
     with style():
         figure = new_figure(6.3, 3.4)
         axes = figure.subplots()
-        labels, places = [], []
-        for k, (gait, name) in enumerate(GAITS.items()):
-            for j, where in enumerate(("model", "engine")):
-                place, bottom = 2.5 * k + j, 0.0
-                labels.append(f"{name}\n{where}")
-                places.append(place)
-                for kind, colour in zip(KINDS, PALETTE, strict=True):
-                    parts = findings.joints[gait][where][kind]
-                    first = KINDS[kind] if not (k or j) else None
-                    axes.bar(place, parts["sheet"], 0.8, bottom, color=colour, label=first)
-                    bottom += parts["sheet"]
-                    axes.bar(place, parts["mechanical"], 0.8, bottom, color=colour, alpha=0.45)
-                    bottom += parts["mechanical"]
-        axes.set_xticks(places, labels)
+        for place, (gait, where, _) in enumerate(BARS):
+            bottom = 0.0
+            for kind, colour in zip(KINDS, PALETTE, strict=True):
+                parts = findings.joints[gait][where][kind]
+                axes.bar(place, parts["sheet"], 0.7, bottom, color=colour, label=None if place else KINDS[kind])
+                bottom += parts["sheet"]
+                axes.bar(place, parts["mechanical"], 0.7, bottom, color=colour, alpha=0.45)
+                bottom += parts["mechanical"]
+        axes.set_axisbelow(True)
+        axes.set_xticks(range(len(BARS)), [label for *_, label in BARS])
         axes.set_ylabel("energy [J/m]")
-        axes.legend(ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)
     return figure
 
 
@@ -83,7 +85,7 @@ def servos_figure(findings: Findings) -> Figure:
         falls.set_ylabel(f"falls of {findings.servos['none'][0]['disturbances']}")
         speed.set_ylabel("fastest walk [cm/s]")
         for axes in (energy, falls, speed):
-            axes.set_ylim(bottom=0.0)
+            axes.set_ylim(0.0, 1.05 * axes.dataLim.y1 or 1.0)
             axes.set_xlabel("stiffness, share of full")
         energy.legend()
     return figure

@@ -7,10 +7,11 @@ from importlib import resources
 from typing import Any
 
 from compare.papers.nao_claims.claims import claims
+from compare.papers.nao_claims.effort import Effort
 from compare.papers.nao_claims.figures import all_figures
 from compare.papers.nao_claims.findings import Findings
 from compare.papers.nao_claims.published import LIFT_M, SPEED_M_S, STEP_M, STRETCHED_M, TORSO_M, documented
-from compare.papers.nao_claims.runs import FRICTIONS, KINDS, MASS_FACTORS, PUSHES_NS, SLOPES_DEG, Effort, total
+from compare.papers.nao_claims.runs import FRICTIONS, KINDS, MASS_FACTORS, PUSHES_NS, SLOPES_DEG, total
 from compare.report.document import Document, Rows
 from compare.report.template import document_from
 from nlp_gait.simulation.drive import Drive

@@ -7,10 +7,11 @@ from typing import Any
 
 from compare.papers.nao_claims import published
 from compare.papers.nao_claims import runs as claim_runs
+from compare.papers.nao_claims.effort import Effort
 from compare.papers.nao_claims.findings import Findings
 from compare.papers.nao_claims.published import SPEED_M_S
 from compare.papers.nao_claims.report import document
-from compare.papers.nao_claims.runs import SPECS, Effort, gaits_first, walks_then
+from compare.papers.nao_claims.runs import SPECS, gaits_first, walks_then
 from compare.report.writing import write_document
 from compare.study.progress import Progress
 from compare.study.steps import Steps

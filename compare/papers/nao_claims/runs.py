@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
 
+from compare.papers.nao_claims.effort import Effort
 from compare.papers.nao_claims.published import SPEED_M_S, STRETCHED_M, documented
 from compare.questions.sweep.study import Axis
 from compare.questions.walk.study import CYCLE, optimal_gaits
@@ -40,37 +40,7 @@ KINDS = {  # of joints, in words
     **{"AnklePitch": "ankle pitch", "AnkleRoll": "ankle roll", ARMS: ARMS},
 }
 DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-PUSHES_NS, SLOPES_DEG, FRICTIONS, MASS_FACTORS = (0.5, 1.0, 1.5), (3.0, 6.0), (0.3, 0.5), (0.9, 1.1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much is computed.
-
-    Attributes:
-        starts: of IPOPT, where no neighbour helps.
-        speeds_m_s: of the curve, the default speed among them.
-        torsos_m: heights of the robot's own walk.
-        heats: K for the question of straighter knees [W/(Nm)^2].
-        stiffnesses: of the servos, as a share of the full one, which comes first.
-        steps_m: lengths of a step that are tried for the fastest walk, rising.
-        walked: steps that are played.
-        disturbed: whether the walk is disturbed too.
-    """
-
-    starts: int = 2
-    speeds_m_s: tuple[float, ...] = (0.02, 0.04, 0.06, 0.08, SPEED_M_S, 0.11)
-    torsos_m: tuple[float, ...] = (0.28, 0.30, 0.31, 0.315, 0.32, 0.325, 0.33)
-    heats: tuple[float, ...] = (0.025, 0.1, 0.5)
-    stiffnesses: tuple[float, ...] = (1.0, 0.7, 0.5, 0.35, 0.25)
-    steps_m: tuple[float, ...] = (0.04, 0.05, 0.06, 0.07, 0.08)
-    walked: int = 10
-    disturbed: bool = True
-
-    @property
-    def steps(self) -> int:
-        """Calls of progress: curves, heights, heat constants and the data sheet's, four gaits, servos twice, the report."""
-        return 2 + 1 + len(self.heats) + 1 + 4 + 2 * len(self.stiffnesses) + 1
+PUSHES_NS, SLOPES_DEG, FRICTIONS, MASS_FACTORS = (0.5, 1.0), (6.0,), (0.3,), (0.9, 1.1)
 
 
 def gaits_first(effort: Effort) -> list[Step]:

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
-from nlp_gait.backends.solve import solution_of
+from nlp_gait.backends.solve import MOST_STARTS, solution_of
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
+from nlp_gait.errors import checked_count
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Outcome, Solution
 
@@ -29,7 +30,7 @@ class Continuation:
     """
 
     def __init__(self, *, starts: int = 5, seed: int = 0, solver: Solver | None = None, solves: int = 1) -> None:
-        self._starts = starts
+        self._starts = checked_count("starts", starts, at_least=0, at_most=MOST_STARTS)
         self._seed = seed
         self._solver = solver or IpoptSettings()
         self._solves = solves

@@ -65,6 +65,7 @@ def test_small_problems_end_where_ipopt_ends(mathematics: Mathematics, sense: st
     assert {name: prices[name] for name in known} == pytest.approx(known, rel=PRICE_TOLERANCE, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_single_support_ends_in_ipopts_optimum_with_its_prices() -> None:
     problem = nlp_gait.load("nao-ssp")
     expected, found = (solve(problem, starts=2, solver=solver) for solver in (IpoptSettings(), CondensedSettings()))

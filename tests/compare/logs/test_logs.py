@@ -78,6 +78,7 @@ def test_a_trace_begins_at_one_evaluation_and_improves(comparisons: list[Compari
 
 
 def test_runs_are_numbered_from_one_and_gaps_are_minimised(comparisons: list[Comparison], tmp_path: Path) -> None:
+    assert NOTHING_FEASIBLE == 1e10  # as documented
     runs = [str(run + 1) for run in range(15)]
     for path in (path for path in write_ioh(comparisons[:1], tmp_path / "ioh") if path.suffix == ".json"):
         header = json.loads(path.read_text())

@@ -67,6 +67,7 @@ def test_histories_give_runs_their_course(tmp_path: Path) -> None:
     assert first.time_s.history == (0.1, 0.5) and first.time_s.solve == 0.5
 
 
+@pytest.mark.slow
 def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
@@ -141,6 +142,7 @@ def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
     assert sorted(labels) == [("walk12", "pso", 0), ("walk12", earlier, 0), ("walk12", earlier, 1)]
 
 
+@pytest.mark.slow
 def test_the_commands(tmp_path: Path) -> None:
     path = finals(tmp_path)
     found = as_json("evaluate", "walk12", "--x", path, "--csv", tmp_path / "judged.csv")

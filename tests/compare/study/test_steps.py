@@ -14,7 +14,7 @@ import pytest
 import nlp_gait
 from compare.study import steps as module
 from compare.study.definition import fingerprint
-from compare.study.steps import Step, Steps
+from compare.study.steps import Step, Steps, as_json
 
 
 def test_a_step_runs_once_for_equal_inputs(tmp_path: Path) -> None:
@@ -65,6 +65,7 @@ def test_fingerprint_tells_values_and_mathematics_apart() -> None:
     assert one["mathematics_sha256"] != other["mathematics_sha256"]
 
 
+@pytest.mark.slow
 def test_steps_side_by_side_are_kept_one_by_one(tmp_path: Path) -> None:
     """In two processes; what is there already is not computed again."""
     todo = [Step(name=f"root-{k}", inputs={"k": k}, compute=partial(math.sqrt, k)) for k in range(4)]
@@ -110,6 +111,8 @@ def test_what_json_cannot_say_is_not_kept(number: float, tmp_path: Path) -> None
     with pytest.raises(ValueError, match="not JSON compliant"):
         Steps(tmp_path, print)("one", {}, lambda: [number])
     assert not list((tmp_path / "steps").iterdir())
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        as_json([number])
 
 
 def test_why_a_step_is_made_again_is_told(tmp_path: Path) -> None:

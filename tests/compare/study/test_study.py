@@ -65,6 +65,7 @@ def test_one_file_a_run(undisturbed: Path) -> None:
     assert sorted(contents(undisturbed)) == sorted(names)
 
 
+@pytest.mark.slow
 def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> None:
     run_study(Study(tasks=SMALL.tasks(), folder=tmp_path, jobs=2))
     assert contents(tmp_path) == contents(undisturbed)

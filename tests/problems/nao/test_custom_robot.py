@@ -114,6 +114,7 @@ def test_for_nao_the_papers_numbers_come_out_to_the_last_digit(name: str, x_m: f
         np.testing.assert_allclose(ends[key], points, rtol=0, atol=rounding)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_may_be_longer(name: str) -> None:
     problem = load(name, step_length_m=0.08)

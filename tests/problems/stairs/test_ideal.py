@@ -35,11 +35,13 @@ def test_case_2_meets_the_known_optimum(solution: nlp_gait.Solution) -> None:
     assert solution.iterations < 100
 
 
+@pytest.mark.slow
 def test_replay_by_rk4_reaches_the_planned_end_pose(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     _, error = replay(problem.signals(solution.x).arrays, FEEDBACK)
     assert np.abs(error[-1]).max() < REPLAY_TOLERANCE
 
 
+@pytest.mark.slow
 def test_replay_without_feedback_leaves_the_plan_as_an_inverted_pendulum_does(
     problem: GaitProblem, solution: nlp_gait.Solution
 ) -> None:

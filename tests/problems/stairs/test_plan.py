@@ -71,6 +71,7 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
     assert judged.dense["energy_J"] == pytest.approx(solution.objective, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=2_000, seed=0)
     assert found.feasible

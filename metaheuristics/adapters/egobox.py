@@ -1,0 +1,93 @@
+"""Bayesian optimisation by the package egobox, for budgets of a few hundred evaluations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from metaheuristics.array import Array
+from metaheuristics.constraint_handling import Rule
+from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.preparation import completed
+from metaheuristics.settings import check_count, check_installed
+
+MOST = 500  # evaluations: each new point fits a Gaussian process to each constraint, through all points
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class BayesianOptimisation:
+    """Bayesian optimisation: Gaussian processes of the objective and of each constraint say where to look next.
+
+    egobox's own settings: the logarithm of expected improvement within the constraints' predicted means. Each constraint is
+    its worst row, and its excess is told as sign(c) ln(1 + |c|), as it spans many powers of ten. The constraint handling of
+    the study is not asked. After 500 evaluations it stops: fitting takes longer with every point.
+
+    Attributes:
+        population: points evaluated before the first model; 20 are about two for each of 9 variables.
+
+    Raises:
+        SearchError: a setting is not allowed, or egobox is not installed.
+
+    Source:
+        Lafage (2022), egobox, a Rust toolbox for efficient global optimization; Jones, Schonlau, Welch (1998), Efficient
+        global optimization of expensive black-box functions; the transform of constraints after Eriksson, Poloczek (2021),
+        Scalable constrained Bayesian optimization.
+    """
+
+    population: int = 20
+    name: ClassVar[str] = "bayes"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=3, at_most=MOST)
+        check_installed(self.name, "egobox")
+
+    def start(self, start: Start) -> BayesianSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return BayesianSearch(self, start)
+
+
+class BayesianSearch(PopulationSearch[BayesianOptimisation]):
+    """A run of `BayesianOptimisation`; see `Search`. egobox works in the unit cube of the free variables."""
+
+    def __init__(self, settings: BayesianOptimisation, start: Start) -> None:
+        """Ask for the starting points first."""
+        super().__init__(settings, start)
+        self._free = np.flatnonzero(start.upper > start.lower)
+        self._known = np.empty((0, len(self._free)))
+        self._values: Array | None = None
+        self._model: Any = None
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Fit the models and ask for the most promising point; see `Search.tell`."""
+        if not len(self._free):
+            return
+        excess = self._start.excess(X, violation)
+        values = np.column_stack([f, np.sign(excess) * np.log1p(np.abs(excess))])
+        worked = np.isfinite(f)  # egobox is not told of failed evaluations
+        lower, upper = self._start.lower[self._free], self._start.upper[self._free]
+        shares = (X[:, self._free] - lower) / (upper - lower)
+        self._known = np.concatenate([self._known, shares[worked]])
+        self._values = values[worked] if self._values is None else np.concatenate([self._values, values[worked]])
+        self._X = completed(lower + self._next() * (upper - lower), self._start.lower, self._start.upper)
+
+    def stop(self) -> tuple[str, ...]:
+        """Give up where there is nothing to vary, or too much to fit."""
+        if not len(self._free):
+            return ("all variables are fixed",)
+        return (f"fitting to more than {MOST} points takes too long",) if len(self._known) >= MOST else ()
+
+    def _next(self) -> Array:
+        """(1, k) the most promising point; a random one as long as there is too little to fit."""
+        values = self._values
+        if values is None or len(values) < self._settings.population or not np.ptp(values[:, 0]) > 0.0:
+            return self._start.rng.random((1, len(self._free)))
+        if self._model is None:
+            from egobox import CstrSpec, Egor
+
+            cube = np.tile([0.0, 1.0], (len(self._free), 1))
+            self._model = Egor(cube, cstr_specs=[CstrSpec.leq(0.0)] * (values.shape[1] - 1))
+        seed = int(self._start.rng.integers(2**31))
+        suggested: Array = np.asarray(self._model.suggest(self._known, values, seed=seed), dtype=float)
+        return np.clip(suggested, 0.0, 1.0)

@@ -1,0 +1,183 @@
+"""Local solvers of SciPy, begun again from random points until the budget ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from metaheuristics.adapters.function import CallingSearch, Evaluate
+from metaheuristics.array import Array
+from metaheuristics.interface import UNKNOWN, Start
+from metaheuristics.preparation import completed
+from metaheuristics.settings import check_count, check_number
+
+DIFFERENCE = 1.5e-8  # of forward differences, as a share of each variable's range: the root of the machine's precision
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScipyStarts:
+    """What the local solvers of SciPy share: starts, and how they see the constraints.
+
+    Where the objective cannot tell its constraints apart, the total violation is the only one. The constraint handling of the
+    study is not asked.
+
+    Attributes:
+        population: starting points, which all searches share; further starts are drawn uniformly.
+        margin: by which each constraint is to be kept, in units of its scale, as a solver stops a little outside its
+            constraints, and a search counts that as infeasible. The total violation has no inside, and is kept as it is.
+        iterations: limit for one start.
+
+    Raises:
+        SearchError: a setting is not allowed.
+    """
+
+    population: int = 1
+    margin: float = 1e-7
+    iterations: int = 1000
+    name: ClassVar[str]
+    method: ClassVar[str]
+    by_row: ClassVar[bool]
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=1)
+        check_number(self, "margin", at_least=0.0)
+        check_count(self, "iterations", at_least=1)
+
+    def start(self, start: Start) -> ScipyStartsSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return ScipyStartsSearch(self, start)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SlsqpStarts(ScipyStarts):
+    """SciPy's SLSQP from many starts, with forward differences that count as evaluations.
+
+    It sees every row of the constraints, as they are smooth.
+
+    Source:
+        Kraft (1988), A software package for sequential quadratic programming, as in `scipy.optimize.minimize`.
+    """
+
+    name: ClassVar[str] = "scipy:SLSQP"
+    method: ClassVar[str] = "SLSQP"
+    by_row: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CobyqaStarts(ScipyStarts):
+    """SciPy's COBYQA from many starts: quadratic models within a trust region, without derivatives.
+
+    It models each constraint's worst row: with hundreds of rows, each with a model of its own, a step would take seconds.
+
+    Source:
+        Ragonneau (2022), Model-based derivative-free optimization methods and software, as in `scipy.optimize.minimize`.
+    """
+
+    name: ClassVar[str] = "scipy:COBYQA"
+    method: ClassVar[str] = "COBYQA"
+    by_row: ClassVar[bool] = False
+
+
+class _Functions:
+    """Objective and constraints of single points in the unit cube of the free variables; each is evaluated once."""
+
+    def __init__(self, start: Start, settings: ScipyStarts, evaluate: Evaluate) -> None:
+        self._start, self._settings, self._evaluate = start, settings, evaluate
+        self.free = np.flatnonzero(start.upper > start.lower)
+        self._at: tuple[bytes, float, Array] = (b"", 0.0, np.empty(0))
+        self._slope: tuple[bytes, Array, Array] = (b"", np.empty(0), np.empty((0, 0)))
+
+    def unit(self, x: Array) -> Array:
+        """(k,) position of a point (n,)."""
+        lower, upper = self._start.lower[self.free], self._start.upper[self.free]
+        return np.asarray((x[self.free] - lower) / (upper - lower))
+
+    def at(self, z: Array) -> tuple[float, Array]:
+        """Objective, and by how much each constraint is exceeded (m,)."""
+        key = z.tobytes()
+        if self._at[0] != key:
+            f, excess = self._values(z[None])
+            self._at = key, float(f[0]), excess[0]
+        return self._at[1], self._at[2]
+
+    def slope(self, z: Array) -> tuple[Array, Array]:
+        """Forward differences: gradient (k,) of the objective and Jacobian (m, k) of the excess."""
+        key = z.tobytes()
+        if self._slope[0] != key:
+            f, excess = self.at(z)
+            step = np.where(z + DIFFERENCE <= 1.0, DIFFERENCE, -DIFFERENCE)
+            shifted_f, shifted = self._values(z + np.diag(step))
+            self._slope = key, (shifted_f - f) / step, ((shifted - excess) / step[:, None]).T
+        return self._slope[1], self._slope[2]
+
+    def _values(self, Z: Array) -> tuple[Array, Array]:
+        lower, upper = self._start.lower, self._start.upper
+        low, high = lower[self.free], upper[self.free]
+        X = completed(low + np.clip(Z, 0.0, 1.0) * (high - low), lower, upper)
+        f, violation, _ = self._evaluate(X)
+        constraints = self._start.constraints
+        if constraints is None:  # COBYQA takes what is exactly zero for a constraint that binds
+            met = 0.0 if self._settings.by_row else -1.0
+            excess = np.where(violation > 0.0, violation, met)[:, None]
+        else:
+            excess = constraints.excess(X) if self._settings.by_row else constraints.worst(X)
+            excess = excess + self._settings.margin
+        finite = np.clip(np.nan_to_num(excess, nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN), -UNKNOWN, UNKNOWN)
+        return np.minimum(f, UNKNOWN), finite
+
+
+class ScipyStartsSearch(CallingSearch):
+    """A run of `ScipyStarts`; see `CallingSearch`."""
+
+    def __init__(self, settings: ScipyStarts, start: Start) -> None:
+        self._settings, self._start = settings, start
+
+    def run(self, evaluate: Evaluate) -> str:
+        """Start after start, until `evaluate` ends it."""
+        functions = _Functions(self._start, self._settings, evaluate)
+        if not functions.free.size:
+            evaluate(np.array(self._start.initial))
+            return "all variables are fixed"
+        begin = _slsqp if self._settings.method == "SLSQP" else _cobyqa
+        starts = iter(self._start.initial)
+        while True:
+            x0 = next(starts, None)
+            z0 = self._start.rng.random(functions.free.size) if x0 is None else functions.unit(x0)
+            begin(functions, z0, self._settings.iterations)
+
+
+def _slsqp(functions: _Functions, z0: Array, iterations: int) -> Any:
+    return _minimised(
+        functions,
+        z0,
+        method="SLSQP",
+        jac=lambda z: functions.slope(z)[0],
+        constraints={
+            "type": "ineq",
+            "fun": lambda z: -functions.at(z)[1],
+            "jac": lambda z: -functions.slope(z)[1],
+        },
+        options={"maxiter": iterations, "ftol": 1e-10},
+    )
+
+
+def _cobyqa(functions: _Functions, z0: Array, iterations: int) -> Any:
+    from scipy.optimize import NonlinearConstraint
+
+    return _minimised(
+        functions,
+        z0,
+        method="COBYQA",
+        constraints=NonlinearConstraint(lambda z: functions.at(z)[1], -np.inf, 0.0),
+        options={"maxiter": iterations},
+    )
+
+
+def _minimised(functions: _Functions, z0: Array, **how: Any) -> Any:
+    from scipy.optimize import minimize
+
+    value: Callable[[Array], float] = lambda z: functions.at(z)[0]  # noqa: E731
+    return minimize(value, z0, bounds=[(0.0, 1.0)] * len(z0), **how)

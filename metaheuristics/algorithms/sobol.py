@@ -1,0 +1,71 @@
+"""Scrambled Sobol points: the floor that spreads evenly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from metaheuristics.array import Array
+from metaheuristics.constraint_handling import Rule
+from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.preparation import completed
+from metaheuristics.settings import check_count
+
+MOST_VARIABLES = 21201  # for which SciPy has direction numbers
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SobolPoints:
+    """Points of a scrambled Sobol sequence over the variables that are free; nothing is learned.
+
+    Attributes:
+        population: starting points, which all searches share, before the sequence begins.
+        batch: points of the sequence asked for at once.
+
+    Raises:
+        SearchError: a setting is not allowed.
+
+    Source:
+        Sobol (1967), On the distribution of points in a cube; Owen (1998), Scrambling Sobol and Niederreiter-Xing points;
+        as in `scipy.stats.qmc.Sobol`.
+    """
+
+    population: int = 1
+    batch: int = 64
+    name: ClassVar[str] = "sobol"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=1)
+        check_count(self, "batch", at_least=1)
+
+    def start(self, start: Start) -> SobolRun:
+        """Begin a run; see `Algorithm.start`."""
+        return SobolRun(self, start)
+
+
+class SobolRun(PopulationSearch[SobolPoints]):
+    """A run of `SobolPoints`; see `Search`."""
+
+    def __init__(self, settings: SobolPoints, start: Start) -> None:
+        """Ask for the starting points first."""
+        from scipy.stats.qmc import Sobol
+
+        super().__init__(settings, start)
+        self._free = np.flatnonzero(start.upper > start.lower)
+        seed = int(start.rng.integers(2**31))
+        self._sequence = Sobol(len(self._free), seed=np.random.default_rng(seed)) if len(self._free) else None
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Take the next points; see `Search.tell`."""
+        if self._sequence is None:
+            return
+        lower, upper = self._start.lower, self._start.upper
+        low, high = lower[self._free], upper[self._free]
+        shares = self._sequence.random(self._settings.batch)
+        self._X = completed(low + shares * (high - low), lower, upper)
+
+    def stop(self) -> tuple[str, ...]:
+        """Give up if there is nothing to vary."""
+        return ("all variables are fixed",) if self._sequence is None else ()
