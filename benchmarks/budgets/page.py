@@ -120,7 +120,8 @@ def figure(stem: Path, found: Mapping[str, Curves]) -> tuple[Path, Path]:
             for target in TARGETS:
                 axes.axhline(target, color="0.7", linewidth=0.6, linestyle=":")
         panels[0].set_ylabel("median gap to the best known [1]")
-        handles, names = panels[0].get_legend_handles_labels()
-        drawing.legend(handles, names, loc="outside lower center", ncols=6)
+        drawn = {line.get_label(): line for axes in panels for line in axes.get_lines() if line.get_label() in labels}
+        names = [label for label in labels if label in drawn]
+        drawing.legend([drawn[name] for name in names], names, loc="outside lower center", ncols=6)
         drawing.set_figheight(drawing.get_figheight() + 0.19 * -(-len(names) // 6))
         return save(drawing, stem)
