@@ -7,7 +7,7 @@ What the program can say itself is made from it: ``docs/pages`` writes the pages
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version as version_of
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -20,7 +20,7 @@ project = "nlp-gait"
 author = "The authors of nlp-gait"
 project_copyright = "the authors of nlp-gait; BSD-3-Clause"
 smartquotes = False  # two hyphens are an option
-release = version = version_of("nlp-gait")
+release = version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
 exclude_patterns = ["pages", "generated/gallery/*.ipynb", "generated/gallery/*.py", "**/sg_execution_times.*"]
 suppress_warnings = ["config.cache"]  # the gallery's configuration holds functions, which Sphinx cannot pickle

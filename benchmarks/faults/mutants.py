@@ -135,7 +135,7 @@ def variants(node: ast.AST) -> Iterator[ast.AST]:
     elif isinstance(node, ast.Call):
         for i in (k for k, keyword in enumerate(node.keywords) if keyword.arg not in CONVENTIONS):
             yield _with(node, keywords=node.keywords[:i] + node.keywords[i + 1 :])
-    elif isinstance(node, ast.Return) and node.value is not None:
+    elif isinstance(node, ast.Return) and getattr(node.value, "value", node.value) is not None:
         yield _with(node, value=ast.Constant(value=None))
 
 

@@ -16,6 +16,7 @@ from nlp_gait.errors import unknown
 # Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
 REPRODUCTIONS = {
     "nao": "compare.papers.nao.reproduce",
+    "nao-pareto": "compare.papers.nao_pareto.reproduce",
     "walk12": "compare.papers.walk12.reproduce",
     "stairs": "compare.papers.stairs.reproduce",
     "nao-claims": "compare.papers.nao_claims.reproduce",

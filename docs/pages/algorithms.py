@@ -7,6 +7,7 @@ from pathlib import Path
 import metaheuristics
 from compare.study.description import Description, description_of
 from docs.pages.markdown import code, literal, page, table, write_all
+from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
 INTRODUCTION = """# Algorithms and solvers
@@ -17,9 +18,15 @@ Every name here stands wherever a command or a study asks for an algorithm, and 
 best known point stands on the [page of each problem](problems/index.md)."""
 PARTS = {
     "Searches": ("They see the compiled objective in batches, and no derivatives.", metaheuristics.ALGORITHMS),
-    "Searches of other packages": ("With the extra `algorithms`.", metaheuristics.ADAPTERS),
+    "Searches of other packages": (
+        "With the extra `algorithms`; `bayes` with the extra of its name.",
+        metaheuristics.ADAPTERS,
+    ),
+    "For several objectives": ("For `nlp-gait pareto` only, with the extra `algorithms`.", FRONT_ALGORITHMS),
     "NLP solvers": ("They see the lifted NLP with exact derivatives; see [solving](../solving.md).", SOLVERS),
 }
+FRONTS = """They search a front, with operators of pymoo (extra `algorithms`): `nlp-gait pareto` puts them beside the true one,
+and `metaheuristics.multi_objective.front_algorithm(NAME)` makes one."""
 
 
 def write(folder: Path) -> None:
@@ -27,6 +34,7 @@ def write(folder: Path) -> None:
     blocks = [INTRODUCTION]
     for title, (words, names) in PARTS.items():
         blocks += [f"## {title}", words, *(_section(description_of(name)) for name in names)]
+    blocks += ["## Several objectives", FRONTS, ", ".join(code(name) for name in FRONT_ALGORITHMS)]
     write_all(folder, {"algorithms.md": page(*blocks)})
 
 

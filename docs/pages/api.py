@@ -25,6 +25,7 @@ DOORS = {
     "nlp_gait.export.formats": ("FORMATS", "write_as"),
     "nlp_gait.export.setpoints": ("SetPoints", "set_points"),
     "metaheuristics": (),
+    "metaheuristics.multi_objective": (),
     "compare": (),
     "compare.study.task": ("Handling", "ProblemSpec", "Stop", "Task"),
     "compare.study.settings": ("SolverSpec", "StudySettings", "read_settings"),

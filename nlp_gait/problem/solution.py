@@ -228,7 +228,7 @@ class Solution:
         x = [(name, f"{value:.6g}", bounds.pop(f"bounds[{name}]", "")) for name, value in list(self.x.items())[:SHOWN]]
         rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
         left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
-        note = f"{self.status}; " + (f"{left_out} more rows in .x and .active_constraints" if left_out else "all of x")
+        note = self.status + (f"; {left_out} more rows in .x and .active_constraints" if left_out else "")
         return html_table(
             repr(self)[1:-1], ("variable or row", "value", "price of raising its bound"), [*x, *rows], note
         )

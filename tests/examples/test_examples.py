@@ -7,6 +7,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 from matplotlib.figure import Figure
 
@@ -61,6 +62,7 @@ def test_example(
     printed = capsys.readouterr().out
     assert EXPECTED[name] in printed
     assert isinstance(found["figure"], Figure) and found["figure"].axes
+    plt.close("all")
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import compare.study.apart
+from compare.study.record import RunRecord
 from compare.study.runner import attempt
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import Study, read_records, run_study
@@ -18,6 +19,7 @@ from tests.compare.cli.calls import nlp_gait
 
 WALK = ProblemSpec(name="walk12")
 STOP = Stop(evaluations=200, time_limit_s=0.5)
+PATIENT = Stop(evaluations=200, time_limit_s=60.0)  # on a busy machine a process may begin late
 
 ALGORITHM = """
 import os, sys, time
@@ -123,7 +125,7 @@ def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
 
 def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
     bad = f"{written(tmp_path, 'bad', 'ends its process')}:Algorithm"
-    tasks = [Task(problem=WALK, algorithm=a, label=b, stop=STOP) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
+    tasks = [Task(problem=WALK, algorithm=a, label=b, stop=PATIENT) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
     records = run_study(Study(tasks=tuple(tasks), jobs=2))
     assert [record.success for record in records] == [False, True, True] and "by status 7" in records[0].status
 
@@ -143,11 +145,14 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient:
         "def few(f, lower):\n    f(lower)\n"
     )
 
-    def status(name: str) -> str:
-        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=STOP)).status
+    def record(name: str, stop: Stop) -> RunRecord:
+        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=stop))
 
-    assert "did not return" in status("stubborn")
-    deaf = attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:deaf", stop=STOP))
+    def status(name: str) -> str:
+        return record(name, PATIENT).status
+
+    assert "did not return" in record("stubborn", STOP).status
+    deaf = record("deaf", PATIENT)
     assert (deaf.status, deaf.evaluations) == ("evaluation budget used", {"f": 200})
     assert "returned without any call of f" in status("lazy")
     assert "f takes one point of shape (4,)" in status("wrong")

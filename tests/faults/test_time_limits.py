@@ -36,11 +36,14 @@ def slow_iterations(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
 
 
 def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a clock that goes on by a second each time that somebody looks at it."""
     problem = nlp_gait.load("walk12")
-    slow_iterations(monkeypatch, 0.02)
-    solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=0.05))
+    nlp_gait.solve(problem)  # what is built is built
+    clock = iter(range(10_000))
+    monkeypatch.setattr(iteration_watch.time, "perf_counter", lambda: float(next(clock)))
+    solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=4.0))
     assert not solution.success and "stopped at the time limit" in solution.status
-    assert 1 <= solution.iterations <= 3 and solution.time_s.solve >= 0.05
+    assert 1 <= solution.iterations <= 4
     x = np.array(list(solution.x.values()))
     assert (x >= problem.lower).all() and (x <= problem.upper).all() and np.isfinite(solution.objective)
 

@@ -122,6 +122,7 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     assert result.fun == pytest.approx(instance.best_known, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_pycma(instance: gaitbench.Instance) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
     cma = package("cma")

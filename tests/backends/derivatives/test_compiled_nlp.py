@@ -64,6 +64,7 @@ def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monk
     assert compared(chain(), np.array([1.1, 0.7]), points) < TOLERANCE
 
 
+@pytest.mark.slow
 def test_single_support_gives_the_same_values_and_derivatives_also_outside_the_bounds() -> None:
     problem = nlp_gait.load("nao-ssp")
     model = nlp_model(problem)

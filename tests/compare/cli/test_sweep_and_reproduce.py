@@ -42,7 +42,7 @@ def test_every_reproduction_can_be_called_alike() -> None:
 
 
 def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["reproduce", "nap", "--out", str(tmp_path / "out")])
+    done = RUN.invoke(app, ["reproduce", "walk1", "--out", str(tmp_path / "out")])
     assert done.exit_code == 1
-    assert done.stderr == "nlp-gait: unknown reproduction 'nap'; did you mean 'nao'?\n"
+    assert done.stderr == "nlp-gait: unknown reproduction 'walk1'; did you mean 'walk12'?\n"
     assert not (tmp_path / "out").exists()

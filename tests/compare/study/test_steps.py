@@ -99,7 +99,7 @@ def test_workers_are_as_many_as_asked_for_and_no_more_than_steps(
         asked.append(workers)
         yield from ((number, compute()) for number, compute in work.items())
 
-    monkeypatch.setattr(module, "default_jobs", lambda: processors)
+    monkeypatch.setattr(module, "available_cores", lambda: processors)
     monkeypatch.setattr(module, "side_by_side", side_by_side)
     todo = [Step(name=f"root-{k}", inputs={"k": k}, compute=partial(math.sqrt, k)) for k in range(count)]
     assert Steps(tmp_path, print).side_by_side(todo, jobs) == [math.sqrt(k) for k in range(count)]
