@@ -74,7 +74,9 @@ def _knees(findings: Findings) -> Claim:
 def _straight(findings: Findings) -> Claim:
     heights = findings.torsos
     own = next(point for point in heights if point["torso_m"] == TORSO_M)
-    told, tallest_best, taller_better = [], [], []
+    told: list[str] = []
+    tallest_best: list[bool] = []
+    taller_better: list[bool] = []
     for heat, name in (("sheet", "data sheet"), ("paper", "paper")):
         key = f"{heat}_J_per_m"
         best = min(heights, key=lambda point: float(point[key]))
@@ -158,7 +160,8 @@ def _fast(findings: Findings) -> Claim:
 
 
 def _speed(findings: Findings) -> Claim:
-    found, told = [], []
+    found: list[float] = []
+    told: list[str] = []
     for heat in (PAPER_HEAT, SHEET_HEAT):
         least, here = findings.cheapest(heat), findings.at_default(heat)
         above = 100.0 * (here["cost_of_transport"] / least["cost_of_transport"] - 1.0)

@@ -26,7 +26,7 @@ class Effort:
     speeds_m_s: tuple[float, ...] = (0.03, 0.06, 0.08, SPEED_M_S, 0.12, 0.15)
     torsos_m: tuple[float, ...] = (0.28, 0.30, 0.31, 0.315, 0.32, 0.325, 0.33)
     heats: tuple[float, ...] = (0.025, 0.1, 0.5)
-    stiffnesses: tuple[float, ...] = (1.0, 0.7)
+    stiffnesses: tuple[float, ...] = (1.0, 0.7, 0.5)
     steps_m: tuple[float, ...] = (0.04, 0.06, 0.08)
     walked: int = 6
     disturbed: bool = True
