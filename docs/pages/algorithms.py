@@ -25,8 +25,6 @@ PARTS = {
     "For several objectives": ("For `nlp-gait pareto` only, with the extra `algorithms`.", FRONT_ALGORITHMS),
     "NLP solvers": ("They see the lifted NLP with exact derivatives; see [solving](../solving.md).", SOLVERS),
 }
-FRONTS = """They search a front, with operators of pymoo (extra `algorithms`): `nlp-gait pareto` puts them beside the true one,
-and `metaheuristics.multi_objective.front_algorithm(NAME)` makes one."""
 
 
 def write(folder: Path) -> None:
@@ -34,7 +32,6 @@ def write(folder: Path) -> None:
     blocks = [INTRODUCTION]
     for title, (words, names) in PARTS.items():
         blocks += [f"## {title}", words, *(_section(description_of(name)) for name in names)]
-    blocks += ["## Several objectives", FRONTS, ", ".join(code(name) for name in FRONT_ALGORITHMS)]
     write_all(folder, {"algorithms.md": page(*blocks)})
 
 
