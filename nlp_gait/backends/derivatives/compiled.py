@@ -26,6 +26,8 @@ FLAGS = ("-std=c++17", "-O1", "-fvisibility=hidden", "-ffp-contract=off", "-fno-
 VALUES, DERIVATIVES = ("nlp_f", "nlp_g"), {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
 # Detects a wrong library, not rounding: derivatives are compared with differences over this step.
 STEP, CHECK_TOLERANCE, CHECK_POINTS = 1e-6, 1e-3, 5
+# Near a singular pose differences are all rounding: there they change with the step, and another point is drawn.
+OTHER_STEP, MOST_POINTS = 1e-5, 50
 
 
 class CompiledNlp:
@@ -63,7 +65,7 @@ class CompiledNlp:
         self.options: dict[str, Any] = {"no_nlp_grad": True, "calc_lam_p": False, **derivatives}
 
     def _check(self, nlp: Mapping[str, MX], p: Array, library: str) -> None:
-        """Compare values with the virtual machine's, and derivatives with differences, at more than half of some points.
+        """Compare values with the virtual machine's, and derivatives with differences, at some points: most must agree.
 
         Raises:
             CompilerError: they differ: the compiler is broken, or is not for this machine.
@@ -71,23 +73,30 @@ class CompiledNlp:
         machine = ca.Function("machine", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]])
         rng = np.random.default_rng(0)
         n, m = nlp["x"].shape[0], nlp["g"].shape[0]
-        alike = 0
-        for _ in range(CHECK_POINTS):
+        alike = checked = 0
+        for _ in range(MOST_POINTS):
             w, d, weights = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n), rng.uniform(-1.0, 1.0, m)
+            slope, other = (
+                (_numbers(machine(w + step * d, p)) - _numbers(machine(w - step * d, p))) / (2 * step)
+                for step in (STEP, OTHER_STEP)
+            )
+            if not _alike(slope, other):
+                continue
             sides = [(w + step * d, p) for step in (STEP, -STEP)]
             values, found = (
                 _numbers(machine(w, p)),
                 [self.functions[name](w, p) for name in DERIVATIVES.values() if name != "nlp_hess_l"],
             )
             pairs = [(values, _numbers([found[0][0], found[1][0]]))]
-            slope = (_numbers(machine(*sides[0])) - _numbers(machine(*sides[1]))) / (2 * STEP)
             pairs.append((slope, _numbers([ca.dot(found[0][1], d), found[1][1] @ d])))
             if "nlp_hess_l" in self.functions:
                 curved = [self._gradient(*side, weights) for side in sides]
                 H = self.functions["nlp_hess_l"](w, p, 1.0, weights)
                 pairs.append(((curved[0] - curved[1]) / (2 * STEP), _numbers([ca.triu2symm(H) @ d])))
             alike += all(_alike(expected, value) for expected, value in pairs)
-        if 2 * alike <= CHECK_POINTS:
+            if (checked := checked + 1) == CHECK_POINTS:
+                break
+        if 2 * alike <= checked:
             raise CompilerError(
                 f"{library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
             )

@@ -54,7 +54,7 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
         (["--objectives", "power,dbm_z"], ["unknown objective beside power 'dbm_z'", "dbm_y_mean"]),
         (["--objectives", "power"], ["--objectives takes power and one or two of", "got 'power'"]),
         (["--search", "NSGA2"], ["--search takes NAME=BUDGET,BUDGET", "'NSGA2'"]),
-        (["--search", "NSGA3=100"], ["one of NSGA2, CMOPSO", "'NSGA3'"]),
+        (["--search", "NSGA3=100"], ["Known: NSGA2, CMOPSO", "'NSGA3'"]),
         (["--search", "NSGA2=10"], ["at least the population of 100", "[10]"]),
         (["--objectives", "power,dbm_y_mean,speed", "--search", "NSGA2=100"], ["leave out --search"]),
     ],
