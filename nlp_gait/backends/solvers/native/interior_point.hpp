@@ -340,35 +340,41 @@ class InteriorPoint {
     }
     return {primal, dual};
   }
-  // Linearised optimality conditions after the step for a share sigma of the mean complementarity.
-  double quality(double sigma, double dual2, double primal2) const {
-    double alpha = 1, beta = 1;
+  // For each bound its distance, multiplier, and how both move: without a barrier, and what the mean one adds.
+  Vector gaps, multipliers, moved, more, turned, more_turned;
+  void gather() {
+    for (Vector* each : {&gaps, &multipliers, &moved, &more, &turned, &more_turned}) each->clear();
     for (int s = 0; s < BOXES; s++) {
       const Side& side = sides[s];
       const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
       for (size_t k = 0; k < side.gap.size(); k++) {
         const int i = side.index[k];
-        alpha = std::min(alpha, until(side.gap[k], side.sign * (u[i] + sigma * (v[i] - u[i])), FRACTION));
-        beta = std::min(beta, until(side.z[k], none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]), FRACTION));
+        gaps.push_back(side.gap[k]), multipliers.push_back(side.z[k]);
+        moved.push_back(side.sign * u[i]), more.push_back(side.sign * (v[i] - u[i]));
+        turned.push_back(none.z[s][k]), more_turned.push_back(whole.z[s][k] - none.z[s][k]);
       }
     }
-    double sum = 0;
-    for (int s = 0; s < BOXES; s++) {
-      const Side& side = sides[s];
-      const Vector &u = none.of(side.owner), &v = whole.of(side.owner);
-      for (size_t k = 0; k < side.gap.size(); k++) {
-        const int i = side.index[k];
-        const double gap = side.gap[k] + alpha * side.sign * (u[i] + sigma * (v[i] - u[i]));
-        const double z = side.z[k] + beta * (none.z[s][k] + sigma * (whole.z[s][k] - none.z[s][k]));
-        sum += gap * gap * z * z;
-      }
+  }
+  // Linearised optimality conditions after the step for a share sigma of the mean complementarity.
+  double quality(double sigma, double dual2, double primal2) const {
+    const size_t count = gaps.size();
+    double nearer = 0, smaller = 0, sum = 0;  // largest shares of what is left, without branches
+    for (size_t k = 0; k < count; k++) {
+      nearer = std::max(nearer, -(moved[k] + sigma * more[k]) / gaps[k]);
+      smaller = std::max(smaller, -(turned[k] + sigma * more_turned[k]) / multipliers[k]);
+    }
+    const double alpha = nearer > FRACTION ? FRACTION / nearer : 1, beta = smaller > FRACTION ? FRACTION / smaller : 1;
+    for (size_t k = 0; k < count; k++) {
+      const double product = (gaps[k] + alpha * (moved[k] + sigma * more[k])) *
+                             (multipliers[k] + beta * (turned[k] + sigma * more_turned[k]));
+      sum += product * product;
     }
     return (1 - beta) * (1 - beta) * dual2 / (n + m) + (1 - alpha) * (1 - alpha) * primal2 / std::max(m, 1) +
            sum / std::max(bounded, 1);
   }
   // Barrier parameter whose step has the best quality, by golden sections of its logarithm on the better side of 1.
   double best_barrier(double average, double dual2) {
-    direction(0, residual, none), direction(average, residual, whole);
+    direction(0, residual, none), direction(average, residual, whole), gather();
     double primal2 = 0;
     for (double value : residual) primal2 += value * value;
     auto of = [&](double logarithm) { return quality(std::exp(logarithm), dual2, primal2); };
