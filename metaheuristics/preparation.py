@@ -73,6 +73,29 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
     return lower, upper
 
 
+class UnitCube:
+    """The variables that are free, as shares of their ranges: where searches work that want a cube.
+
+    Attributes:
+        size: k, number of free variables.
+    """
+
+    def __init__(self, start: Start) -> None:
+        self._start = start
+        self._free = np.flatnonzero(start.upper > start.lower)
+        self._lower = start.lower[self._free]
+        self._range = start.upper[self._free] - self._lower
+        self.size = int(self._free.size)
+
+    def shares(self, X: Array) -> Array:
+        """(..., k) positions in the cube of points (..., n)."""
+        return np.asarray((X[..., self._free] - self._lower) / self._range)
+
+    def points(self, Z: Array) -> Array:
+        """Points (P, n) within the bounds at positions (P, k)."""
+        return completed(self._lower + Z * self._range, self._start.lower, self._start.upper)
+
+
 def completed(free: Array, lower: Array, upper: Array) -> Array:
     """Points (P, n) within the bounds (n,), from values (P, k) of the variables that are free: their bounds differ."""
     points = np.tile(lower, (len(free), 1))

@@ -10,7 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_number
 
 
@@ -59,7 +59,7 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
     def __init__(self, settings: CmaEs, start: Start) -> None:
         """Ask for the starting points first."""
         super().__init__(settings, start)
-        self._free = np.flatnonzero(start.upper > start.lower)
+        self._cube = UnitCube(start)
         self._size = float(settings.population)
         self._strategy: Any = None
         self._asked: list[Array] = []
@@ -67,14 +67,14 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Adapt the distribution and sample it; see `Search.tell`."""
         if self._strategy is None:
-            self._strategy = self._begin(self._unit(X[rule.best(f, violation)]))
+            self._strategy = self._begin(self._centre(X[rule.best(f, violation)]))
         else:
             self._strategy.tell(self._asked, self._ranked(X, f, violation, rule))
             if self._strategy.stop():
                 self._size *= self._settings.growth
-                self._strategy = self._begin(self._start.rng.random(max(2, self._free.size)))
+                self._strategy = self._begin(self._start.rng.random(max(2, self._cube.size)))
         self._asked = self._strategy.ask()
-        self._X = self._points(np.array(self._asked))
+        self._X = self._cube.points(np.array(self._asked)[:, : self._cube.size])
 
     def _ranked(self, X: Array, f: Array, violation: Array, rule: Rule) -> list[float]:
         """What pycma is told of each point: its place in the rule's order."""
@@ -107,14 +107,6 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
         }
         return CMAEvolutionStrategy(centre, self._settings.sigma, options)
 
-    def _unit(self, x: Array) -> Array:
+    def _centre(self, x: Array) -> Array:
         """Position (max(2, free),) of a point in the unit cube."""
-        lower, upper = self._start.lower[self._free], self._start.upper[self._free]
-        idle = np.full(max(0, 2 - self._free.size), 0.5)
-        return np.concatenate([(x[self._free] - lower) / (upper - lower), idle])
-
-    def _points(self, unit: Array) -> Array:
-        """Points (P, n) of positions in the unit cube."""
-        lower, upper = self._start.lower, self._start.upper
-        low, high = lower[self._free], upper[self._free]
-        return completed(low + unit[:, : low.size] * (high - low), lower, upper)
+        return np.concatenate([self._cube.shares(x), np.full(max(0, 2 - self._cube.size), 0.5)])

@@ -10,7 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_installed
 
 MOST = 500  # evaluations: each new point fits a Gaussian process to each constraint, through all points
@@ -54,27 +54,25 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
     def __init__(self, settings: BayesianOptimisation, start: Start) -> None:
         """Ask for the starting points first."""
         super().__init__(settings, start)
-        self._free = np.flatnonzero(start.upper > start.lower)
-        self._known = np.empty((0, len(self._free)))
+        self._cube = UnitCube(start)
+        self._known = np.empty((0, self._cube.size))
         self._values: Array | None = None
         self._model: Any = None
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Fit the models and ask for the most promising point; see `Search.tell`."""
-        if not len(self._free):
+        if not self._cube.size:
             return
         excess = self._start.excess(X, violation)
         values = np.column_stack([f, np.sign(excess) * np.log1p(np.abs(excess))])
         worked = np.isfinite(f)  # egobox is not told of failed evaluations
-        lower, upper = self._start.lower[self._free], self._start.upper[self._free]
-        shares = (X[:, self._free] - lower) / (upper - lower)
-        self._known = np.concatenate([self._known, shares[worked]])
+        self._known = np.concatenate([self._known, self._cube.shares(X)[worked]])
         self._values = values[worked] if self._values is None else np.concatenate([self._values, values[worked]])
-        self._X = completed(lower + self._next() * (upper - lower), self._start.lower, self._start.upper)
+        self._X = self._cube.points(self._next())
 
     def stop(self) -> tuple[str, ...]:
         """Give up where there is nothing to vary, or too much to fit."""
-        if not len(self._free):
+        if not self._cube.size:
             return ("all variables are fixed",)
         return (f"fitting to more than {MOST} points takes too long",) if len(self._known) >= MOST else ()
 
@@ -82,11 +80,11 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
         """(1, k) the most promising point; a random one as long as there is too little to fit."""
         values = self._values
         if values is None or len(values) < self._settings.population or not np.ptp(values[:, 0]) > 0.0:
-            return self._start.rng.random((1, len(self._free)))
+            return self._start.rng.random((1, self._cube.size))
         if self._model is None:
             from egobox import CstrSpec, Egor
 
-            cube = np.tile([0.0, 1.0], (len(self._free), 1))
+            cube = np.tile([0.0, 1.0], (self._cube.size, 1))
             self._model = Egor(cube, cstr_specs=[CstrSpec.leq(0.0)] * (values.shape[1] - 1))
         seed = int(self._start.rng.integers(2**31))
         suggested: Array = np.asarray(self._model.suggest(self._known, values, seed=seed), dtype=float)

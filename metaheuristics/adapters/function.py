@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -73,12 +74,12 @@ def takes_function_arguments(function: Callable[..., object], settings: Mapping[
     return True
 
 
-class CallingSearch:
+class CallingSearch(ABC):
     """Base of searches that are not asked but call; see `minimize`."""
 
+    @abstractmethod
     def run(self, evaluate: Evaluate) -> str:
         """Call `evaluate` until it raises `Ended`; to return says why the search ended by itself."""
-        raise NotImplementedError
 
 
 class FunctionSearch(CallingSearch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,7 +10,7 @@ import numpy as np
 from metaheuristics.adapters.function import CallingSearch, Evaluate
 from metaheuristics.array import Array
 from metaheuristics.interface import UNKNOWN, Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_number
 
 DIFFERENCE = 1.5e-8  # of forward differences, as a share of each variable's range: the root of the machine's precision
@@ -86,14 +85,9 @@ class _Functions:
 
     def __init__(self, start: Start, settings: ScipyStarts, evaluate: Evaluate) -> None:
         self._start, self._settings, self._evaluate = start, settings, evaluate
-        self.free = np.flatnonzero(start.upper > start.lower)
+        self.cube = UnitCube(start)
         self._at: tuple[bytes, float, Array] = (b"", 0.0, np.empty(0))
         self._slope: tuple[bytes, Array, Array] = (b"", np.empty(0), np.empty((0, 0)))
-
-    def unit(self, x: Array) -> Array:
-        """(k,) position of a point (n,)."""
-        lower, upper = self._start.lower[self.free], self._start.upper[self.free]
-        return np.asarray((x[self.free] - lower) / (upper - lower))
 
     def at(self, z: Array) -> tuple[float, Array]:
         """Objective, and by how much each constraint is exceeded (m,)."""
@@ -114,9 +108,7 @@ class _Functions:
         return self._slope[1], self._slope[2]
 
     def _values(self, Z: Array) -> tuple[Array, Array]:
-        lower, upper = self._start.lower, self._start.upper
-        low, high = lower[self.free], upper[self.free]
-        X = completed(low + np.clip(Z, 0.0, 1.0) * (high - low), lower, upper)
+        X = self.cube.points(np.clip(Z, 0.0, 1.0))
         f, violation, _ = self._evaluate(X)
         constraints = self._start.constraints
         if constraints is None:  # COBYQA takes what is exactly zero for a constraint that binds
@@ -138,14 +130,15 @@ class ScipyStartsSearch(CallingSearch):
     def run(self, evaluate: Evaluate) -> str:
         """Start after start, until `evaluate` ends it."""
         functions = _Functions(self._start, self._settings, evaluate)
-        if not functions.free.size:
+        cube = functions.cube
+        if not cube.size:
             evaluate(np.array(self._start.initial))
             return "all variables are fixed"
         begin = _slsqp if self._settings.method == "SLSQP" else _cobyqa
         starts = iter(self._start.initial)
         while True:
             x0 = next(starts, None)
-            z0 = self._start.rng.random(functions.free.size) if x0 is None else functions.unit(x0)
+            z0 = self._start.rng.random(cube.size) if x0 is None else cube.shares(x0)
             begin(functions, z0, self._settings.iterations)
 
 
@@ -179,5 +172,4 @@ def _cobyqa(functions: _Functions, z0: Array, iterations: int) -> Any:
 def _minimised(functions: _Functions, z0: Array, **how: Any) -> Any:
     from scipy.optimize import minimize
 
-    value: Callable[[Array], float] = lambda z: functions.at(z)[0]  # noqa: E731
-    return minimize(value, z0, bounds=[(0.0, 1.0)] * len(z0), **how)
+    return minimize(lambda z: functions.at(z)[0], z0, bounds=[(0.0, 1.0)] * len(z0), **how)

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from metaheuristics.algorithms.differential_evolution import crossed
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
@@ -156,9 +157,9 @@ class LShadeSearch(PopulationSearch[LShade]):
         mutants = X + F * (towards - X) + F * (X[first] - others[second])
         mutants = np.where(mutants < start.lower, (start.lower + X) / 2, mutants)
         mutants = np.where(mutants > start.upper, (start.upper + X) / 2, mutants)
-        crossed = rng.random((count, n)) < self._CR[:, None]
-        crossed[np.arange(count), rng.integers(n, size=count)] = True
-        return np.clip(np.where(crossed, mutants, X), start.lower, start.upper)
+        draws = rng.random((count, n)) < self._CR[:, None]
+        trials = crossed(X, mutants, rng.integers(n, size=len(X)), draws, exponential=False)
+        return np.clip(trials, start.lower, start.upper)
 
 
 def _drawn_weights(centres: Array, rng: np.random.Generator) -> Array:

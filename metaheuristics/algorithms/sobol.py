@@ -10,7 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count
 
 MOST_VARIABLES = 21201  # for which SciPy has direction numbers
@@ -53,18 +53,14 @@ class SobolRun(PopulationSearch[SobolPoints]):
         from scipy.stats.qmc import Sobol
 
         super().__init__(settings, start)
-        self._free = np.flatnonzero(start.upper > start.lower)
+        self._cube = UnitCube(start)
         seed = int(start.rng.integers(2**31))
-        self._sequence = Sobol(len(self._free), seed=np.random.default_rng(seed)) if len(self._free) else None
+        self._sequence = Sobol(self._cube.size, seed=np.random.default_rng(seed)) if self._cube.size else None
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Take the next points; see `Search.tell`."""
-        if self._sequence is None:
-            return
-        lower, upper = self._start.lower, self._start.upper
-        low, high = lower[self._free], upper[self._free]
-        shares = self._sequence.random(self._settings.batch)
-        self._X = completed(low + shares * (high - low), lower, upper)
+        if self._sequence is not None:
+            self._X = self._cube.points(self._sequence.random(self._settings.batch))
 
     def stop(self) -> tuple[str, ...]:
         """Give up if there is nothing to vary."""
