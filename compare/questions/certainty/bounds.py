@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 from compare.questions.certainty.boxes import Assessed, BoxBounds
@@ -33,4 +34,10 @@ def bounds_of(problem: GaitProblem) -> Bounds:
         InputError: an operation that cannot be enclosed.
         CompilerError: there is no compiler, or it fails.
     """
-    return PowerBounds(problem) if has_power_form(problem) else BoxBounds(problem)
+    return _power_bounds(problem) if has_power_form(problem) else BoxBounds(problem)
+
+
+@lru_cache(maxsize=1)
+def _power_bounds(problem: GaitProblem) -> PowerBounds:
+    """Takes a second to build."""
+    return PowerBounds(problem)
