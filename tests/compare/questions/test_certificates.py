@@ -12,6 +12,7 @@ import pytest
 import nlp_gait
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
+from benchmarks.guarantees.nao import around as box_around
 from compare.questions.certainty import branch_and_bound, certificate, power_form
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
@@ -39,8 +40,7 @@ PHASES = ("nao-dsp", "nao-ssp")
 def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
     """A phase with bounds this part of the ranges around the best known gait, and that gait."""
     problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
-    half = part * (problem.upper - problem.lower) / 2
-    return within(problem, np.maximum(problem.lower, best - half), np.minimum(problem.upper, best + half)), best
+    return box_around(problem, best, part), best
 
 
 def within(problem: GaitProblem, lower: np.ndarray, upper: np.ndarray) -> GaitProblem:
