@@ -60,6 +60,10 @@ def humanoid_cycle(
 
     ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
     parameter: the step length follows from it.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
+        cycle are this package's own.
     """
     body = humanoid(robot)
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")

@@ -47,7 +47,11 @@ def humanoid_dsp(
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
-    """Double support, the right foot a step ahead; for the options see ``problems.humanoid``."""
+    """Double support, the right foot a step ahead; for the options see ``problems.humanoid``.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
+    """
     body = humanoid(robot)
     step = body.step_length(step_length_m)
     real = humanoid_motors(motors, body)

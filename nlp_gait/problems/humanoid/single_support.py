@@ -36,7 +36,11 @@ def humanoid_ssp(
     drive_limits: bool = True,
     motors: str = "",
 ) -> GaitProblem:
-    """Single support; the swing foot moves by twice the step length. For the options see ``problems.humanoid``."""
+    """Single support; the swing foot moves by twice the step length. For the options see ``problems.humanoid``.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
+    """
     body = humanoid(robot)
     step = body.step_length(step_length_m)
     real = humanoid_motors(motors, body)

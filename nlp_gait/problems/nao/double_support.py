@@ -62,7 +62,11 @@ def nao_dsp(
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
-    """Double support of NAO; for the options see ``problems.nao``."""
+    """Double support of NAO; for the options see ``problems.nao``.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), sections 3.2 and 4.2.
+    """
     check_step_length(step_length_m)
     real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model

@@ -53,7 +53,11 @@ def nao_ssp(
     objective: Criterion = "power",
     motors: str = "",
 ) -> GaitProblem:
-    """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
+    """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), sections 3.1 and 4.1.
+    """
     check_step_length(step_length_m)
     real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model
