@@ -28,9 +28,10 @@ from nlp_gait.problems.biped.double_support import (
     margins_in,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import goal_of
 from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
 from nlp_gait.problems.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL, Humanoid, humanoid

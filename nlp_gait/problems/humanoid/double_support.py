@@ -17,8 +17,9 @@ from nlp_gait.problems.biped.double_support import (
     double_support_mean_margins,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.humanoid.body import GRAVITY, LETTERS, Humanoid, humanoid

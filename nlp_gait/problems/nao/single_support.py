@@ -9,8 +9,9 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.curves import Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.problems.biped.instant import Loader, PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
-from nlp_gait.problems.biped.phase import Derivatives, Loader, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Derivatives, Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
