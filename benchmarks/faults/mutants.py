@@ -54,7 +54,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/backends/kernel/affine.py": ("tests/backends/kernel/test_affine.py",),
     "nlp_gait/backends/over_time": ("tests/backends/over_time/test_guarantee.py",),
     "nlp_gait/backends/derivatives/plan.py": ("tests/backends/derivatives/test_compiled_nlp.py",),
-    "nlp_gait/backends/solvers/condensed.py": ("tests/backends/solvers/test_condensed.py",),
+    "nlp_gait/backends/solvers/working_set.py": ("tests/backends/solvers/test_working_set.py",),
     "nlp_gait/simulation/drive.py": ("tests/simulation/test_drive.py", "tests/simulation/test_playback.py"),
     "nlp_gait/simulation/measurements.py": ("tests/simulation/test_measurements.py",),
     "nlp_gait/references.py": ("tests/problem/test_own_problems.py", "tests/compare/cli/test_own_code.py"),
