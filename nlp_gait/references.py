@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, OwnCodeError, unknown
-from nlp_gait.files import read_bytes
+from nlp_gait.files import check_path, read_bytes
 
 T = TypeVar("T")
 Kind = Literal["problem", "algorithm"]
@@ -296,6 +296,7 @@ def _source(found: Reference, text: str) -> tuple[str, bytes]:
     """Path and content of the file or module."""
     if found.is_file:
         path = found.home
+        check_path(path, f"code of {text!r}, {path!r}", OwnCodeError)
     else:
         try:
             spec = importlib.util.find_spec(found.home)
