@@ -32,7 +32,7 @@ def test_best_gait_of_each_solver_is_drawn() -> None:
 @pytest.mark.parametrize(
     ("name", "x", "why"),
     [
-        ("nao-dsp", {"a": 1.0}, "other variables"),
+        ("nao-dsp", {"a": 1.0}, "must name every variable once"),
         ("never.py:seen", {"a": 1.0}, "never.py"),
     ],
 )
