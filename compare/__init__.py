@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # in place of typing's, whose import takes longer than all that Ctrl-C waits for; checkers know the name
+TYPE_CHECKING = (
+    False  # in place of typing's, whose import takes longer than all that Ctrl-C waits for; checkers know the name
+)
 if TYPE_CHECKING:
     from typing import Any
 
