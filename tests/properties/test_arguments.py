@@ -66,7 +66,6 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "time_limit_s": (lambda value: minimized(time_limit_s=value), (None, 1.5, 10**40)),
     "initial": (lambda value: minimized(initial=value), (None,)),
     "observe": (lambda value: minimized(observe=value), (None, type)),
-    "parameter": (lambda value: PROBLEM.value(value), ()),
 }
 
 
