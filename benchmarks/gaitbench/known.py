@@ -1,5 +1,6 @@
 """Best known points of GaitBench, the evidence for them, and probe values: ``python -m benchmarks.gaitbench.known``.
 
+Searched for with IPOPT from random starts, with CMA-ES, and from the best points that the baseline's solvers have found.
 Finished instances are kept in ``nlp_gait/gaitbench/known.json``; a call goes on with those that are missing. A better point
 than the one there may replace it, with ``--again``; probe values never change once they are published.
 """
@@ -10,6 +11,8 @@ import argparse
 import json
 import math
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -17,6 +20,7 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
+from compare.bench.baseline import baseline_records, shipped
 from compare.questions.certainty.branch_and_bound import certify
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
@@ -55,6 +59,7 @@ SHARES, TIMED = 100_000, 20_000
 # Slack that the best known point keeps to every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10
 PROOF_TOLERANCE = 1e-3
+BASELINE_POINTS = 5  # of the best runs of its solvers, from which is begun too
 
 
 class NothingFound(Exception):
@@ -100,12 +105,13 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
     best = strictly_feasible(instance, np.array(ends[0].x))
     best_known = float(instance(best[None])[0][0])
     searched = long_search(instance, effort) if n <= effort.cma_most_variables else None
-    if searched is not None and searched[0] < best_known:  # CMA-ES is better: its point, refined by IPOPT
-        refined = nlp_gait.solve(problem, starts=1, x0=searched[1])
-        for x in (searched[1], strictly_feasible(instance, np.array(list(refined.x.values())))):
-            f, violation = instance(x[None])
-            if violation[0] == 0.0 and f[0] < best_known:
-                best, best_known = x, float(f[0])
+    others = [] if searched is None else [searched]
+    for objective, point in others + best_of_baseline(id):
+        if objective < best_known:
+            for x in near(instance, point):
+                f, violation = instance(x[None])
+                if violation[0] == 0.0 and f[0] < best_known:
+                    best, best_known = x, float(f[0])
     if published is not None and published.best_known < best_known:
         best, best_known = np.array(published.best_x), published.best_known
     proven = proof(instance, best, prove_s)
@@ -146,6 +152,25 @@ def long_search(instance: Instance, effort: Effort) -> tuple[float, Array]:
     ]
     best = min(results, key=lambda result: (result.violation, result.objective))
     return (best.objective if best.feasible else math.inf), np.array(best.x)
+
+
+def near(instance: Instance, point: Array) -> Iterator[Array]:
+    """A search's point, where IPOPT ends from there, and strictly feasible points next to both."""
+    yield point
+    refined = nlp_gait.solve(instance.gait_problem, starts=1, x0=np.clip(point, instance.lower, instance.upper))
+    for x in (point, np.array(list(refined.x.values()))):
+        with suppress(NothingFound):
+            yield strictly_feasible(instance, x)
+
+
+def best_of_baseline(id: str) -> list[tuple[float, Array]]:
+    """Objective and point of the best feasible runs of the baseline, the best first; none where no records are shipped."""
+    if id not in shipped():
+        return []
+    runs = sorted(
+        (record for record in baseline_records(id) if record.verdict.feasible), key=lambda r: r.verdict.objective
+    )
+    return [(record.verdict.objective, np.array(list(record.x.values()))) for record in runs[:BASELINE_POINTS]]
 
 
 def proof(instance: Instance, best: Array, limit_s: float) -> float | None:

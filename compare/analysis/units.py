@@ -1,8 +1,12 @@
-"""Numbers with their units, as tables and figures show them. The unit of a pure number is "1" and is not shown."""
+"""Numbers with their units, and lists, as tables, figures and sentences show them.
+
+The unit of a pure number is "1" and is not shown.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 
 def number(value: float, digits: str) -> str:
@@ -33,3 +37,9 @@ def heading(words: str, unit: str) -> str:
 def millimetres(value_m: float | None, digits: str = ".1f") -> str:
     """A length [m], for example ``24.3 mm``; a dash for None."""
     return with_unit(None if value_m is None else 1000 * value_m, "mm", digits)
+
+
+def listed(parts: Iterable[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``; nothing of nothing."""
+    *most, last = [*parts] or [""]
+    return f"{', '.join(most)} and {last}" if most else last

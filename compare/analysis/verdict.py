@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from compare.analysis.comparison import Comparison
 from compare.analysis.significance import compare_pairs
 from compare.analysis.table import count, percent
-from compare.analysis.units import with_unit
+from compare.analysis.units import listed, with_unit
 
 # A run whose gap is at most this has found the best known.
 FOUND = 1e-6
@@ -36,7 +36,9 @@ def _found(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
     best = with_unit(comparison.reference, comparison.objective.unit)
-    return f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {_listed(finders) or 'one run'}"
+    return (
+        f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {listed(finders) or 'one run'}"
+    )
 
 
 def _distance(comparison: Comparison) -> str:
@@ -47,7 +49,7 @@ def _distance(comparison: Comparison) -> str:
     pairs = compare_pairs(comparison)
     different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)
     tests = f" ({different} of {len(pairs)} pairs differ at the 5 % level, Holm-corrected)" if pairs else ""
-    return f"on {comparison.problem} {_listed(parts)}{tests}"
+    return f"on {comparison.problem} {listed(parts)}{tests}"
 
 
 def _cost(comparison: Comparison) -> str:
@@ -59,9 +61,5 @@ def _cost(comparison: Comparison) -> str:
         f"{solver.name} {count(cost)} evaluations" + ("" if math.isnan(seconds) else f" or {seconds:.2g} s")
         for solver, cost, seconds in reached
     ]
-    text = f"on {comparison.problem} {_listed(parts) or 'no solver'}"
-    return text + (f", never by {_listed(never)}" if never else "")
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + (" and " if parts else "") + "".join(parts[-1:])
+    text = f"on {comparison.problem} {listed(parts) or 'no solver'}"
+    return text + (f", never by {listed(never)}" if never else "")

@@ -18,8 +18,10 @@ from compare.cli.report import plain_plays, play_best, print_plays
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms
+from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
+from metaheuristics.adapters.egobox import BayesianOptimisation
 from nlp_gait.backends.interrupts import Interrupted
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
@@ -27,8 +29,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
-CONDENSED = "condensed"
-ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
+ALL, ALL_GRADIENT, BAYES = "all", (IPOPT, "slsqp"), BayesianOptimisation.name
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
 OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
@@ -44,7 +45,7 @@ def compare(
         str,
         typer.Option(
             help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` is every search that is "
-            "installed, IPOPT, the condensed method and SLSQP."
+            f"installed (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
@@ -100,7 +101,7 @@ def compare(
         settings = as_named(known, f"the study in {str(out)!r}")
     else:
         specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
-        solvers = _solvers(algorithms, starts, searches.polish)
+        solvers = chosen_solvers(algorithms, starts, searches)
         settings = searches.study(specs, solvers, max(starts, 1))
     study = Study(
         tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
@@ -193,31 +194,25 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     stdout.print(HOW_TO_READ)
 
 
-def _solvers(algorithms: str, starts: int, polish: bool) -> list[SolverSpec]:
+def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
     """The named solvers with IPOPT before them; without starts, those that need none.
 
-    Where nobody named any, and in all, the condensed method takes part too, if there is the compiler that it needs.
+    Bayesian optimisation is one of all only where it can use up the budget.
     """
     names = names_in(algorithms)
     if ALL in names:
-        names = [*dict.fromkeys([*ALL_GRADIENT, *installed_algorithms(), *(name for name in names if name != ALL)])]
-    if (algorithms == DEFAULT_ALGORITHMS or ALL in names_in(algorithms)) and _has_compiler():
-        names.insert(0, CONDENSED)
+        every = [*ALL_GRADIENT, *installed_algorithms()]
+        if searches.evaluations > MOST_OF_BAYES and BAYES in every and BAYES not in names:
+            say(
+                f"without {BAYES}, which is for at most {MOST_OF_BAYES} evaluations; name it beside {ALL} to have it run"
+            )
+            every.remove(BAYES)
+        names = [*dict.fromkeys([*every, *(name for name in names if name != ALL)])]
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]
     elif IPOPT not in names:
         names.insert(0, IPOPT)
-    return [SolverSpec(algorithm=name, polish=polish and name not in GRADIENT_SOLVERS) for name in names]
-
-
-def _has_compiler() -> bool:
-    from nlp_gait.backends.kernel.compiler import find_compiler
-
-    try:
-        find_compiler()
-    except CompilerError:
-        return False
-    return True
+    return [SolverSpec(algorithm=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
 
 
 def _refuse_others(context: typer.Context, flag: str) -> None:

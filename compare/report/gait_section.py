@@ -5,14 +5,9 @@ from __future__ import annotations
 from compare.analysis.comparison import Comparison
 from compare.drawing.gait_figure import DrawnGait, drawn_gait, gaits_figure
 from compare.report.document import Figure
-from compare.study.record import RunRecord
-from compare.study.task import ProblemSpec
-from nlp_gait.decoding import decoded
-from nlp_gait.errors import GaitError, InputError
+from compare.study.record import RunRecord, gait_of
+from nlp_gait.errors import GaitError
 from nlp_gait.files import file_safe
-from nlp_gait.problem import Result
-from nlp_gait.problem.result import StoredProblem
-from nlp_gait.references import named_as
 
 CAPTION = (
     "Best gait of each solver: six poses of equal distance in time, later ones darker (left blue, right orange). Mechanical "
@@ -39,11 +34,5 @@ def gaits_part(comparison: Comparison) -> Figure | str | None:
 
 def _gait(record: RunRecord) -> DrawnGait | None:
     """A record's gait; None for a problem without time histories."""
-    stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
-    name = named_as(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
-    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
-    if problem.motion is None:
-        return None
-    if set(record.x) != set(problem.names):
-        raise InputError(f"{stored.name!r} has other variables than the record of {record.algorithm}, run {record.run}")
-    return drawn_gait(Result(problem=problem, x=problem.check_x(record.x)))
+    gait = gait_of(record)
+    return None if gait.problem.motion is None else drawn_gait(gait)

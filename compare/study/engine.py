@@ -8,14 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.record import RunRecord, run_file
-from compare.study.task import LABEL, ProblemSpec
+from compare.study.record import RunRecord, gait_of, run_file
+from compare.study.task import LABEL
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, writable_folder, write_json
 from nlp_gait.problem import Result
-from nlp_gait.problem.result import StoredProblem
-from nlp_gait.references import named_as
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.measurements import measure
@@ -92,8 +90,8 @@ def play_records(
     version = f"mujoco {mujoco().__version__}"
     found = []
     for record in records:
-        result = _result(record)
-        if result is not None:
+        result = gait_of(record)
+        if result.problem.playback is not None:
             found.append(_played(folder, record, result, drive, version))
         if progress is not None:
             progress(f"{record.problem} {record.algorithm}")
@@ -146,14 +144,6 @@ def _played(folder: Path, record: RunRecord, result: Result, drive: Drive, versi
     writable_folder(path.parent)
     write_json(path, {"schema": SCHEMA, "played": asdict(played)})
     return played
-
-
-def _result(record: RunRecord) -> Result | None:
-    """A record's gait; None if its problem cannot be played."""
-    stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
-    name = named_as(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
-    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
-    return None if problem.playback is None else Result(problem=problem, x=problem.check_x(record.x))
 
 
 def _gait(record: RunRecord) -> dict[str, Any]:

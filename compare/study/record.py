@@ -10,15 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from compare.judge import Evaluation
-from compare.study.task import LABEL, Task
+from compare.study.task import LABEL, ProblemSpec, Task
 from nlp_gait.backends.over_time.guarantee import Guarantee
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, without_nan
 from nlp_gait.notebook import html_table
-from nlp_gait.problem import Objective
+from nlp_gait.problem import Objective, Result
 from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import ActiveConstraint, Evaluations
+from nlp_gait.references import named_as
 
 SCHEMA = 2
 REMEDY = "delete it to have it made anew"
@@ -223,6 +224,19 @@ class _Definition:
     stop: Mapping[str, Any] | None = None
     polishes: Mapping[str, Any] | None = None
     start: Mapping[str, float] | None = None
+
+
+def gait_of(record: RunRecord) -> Result:
+    """Problem and x of a record.
+
+    Raises:
+        GaitError: the problem cannot be loaded: it is a file or module of one's own that is not named in this call, say; or it
+            has other variables than the record.
+    """
+    stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
+    name = named_as(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
+    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
+    return Result(problem=problem, x=problem.check_x(record.x))
 
 
 def run_file(folder: Path, problem: str, solver: str, run: int) -> Path:

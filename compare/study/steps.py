@@ -40,7 +40,8 @@ class Steps:
         out: folder of the work.
         progress: told the name of each step before it runs, and of each that need not run again.
         code: modules that compute the results; steps run again when their text has changed.
-        anew: told of each step that was made from other inputs, and of what has changed; None for ``progress``.
+        anew: told of each step that was made from other inputs, and of what has changed; None to tell ``progress`` so in
+            place of the step's name.
     """
 
     def __init__(
@@ -48,7 +49,8 @@ class Steps:
     ) -> None:
         self._folder = writable_folder(out / "steps")
         remove_leftovers(self._folder)
-        self._progress, self._anew = progress, anew or progress
+        self._progress, self._anew = progress, anew
+        self._changed: dict[str, str] = {}  # what to say of steps that are made again
         self._code = "".join(inspect.getsource(module) for module in code)
 
     def __call__(self, name: str, inputs: Mapping[str, Any], compute: Callable[[], Any]) -> Any:
@@ -81,7 +83,7 @@ class Steps:
                 self._progress(f"{step.name}: kept from an earlier run")
                 results[k] = kept.result
         waiting = {k: step for k, step in enumerate(steps) if k not in results}
-        for k, computed in _computed(waiting, min(jobs or available_cores(), len(waiting)), self._progress):
+        for k, computed in self._computed(waiting, min(jobs or available_cores(), len(waiting))):
             results[k] = self.keep(steps[k].name, steps[k].inputs, computed)
         return [results[k] for k in range(len(steps))]
 
@@ -97,9 +99,10 @@ class Steps:
         if not isinstance(content, dict) or not content.keys() >= {"inputs", "result"}:
             return None
         if content.get("sha256") != sha256_of(inputs, self._code):
-            self._anew(
-                f"{name}: made again: {input_differences(content['inputs'], inputs) or 'the program has changed'}"
-            )
+            why = input_differences(content["inputs"], inputs) or "the program has changed"
+            self._changed[name] = f"{name}: made again: {why}"
+            if self._anew is not None:
+                self._anew(self._changed.pop(name))
             return None
         return Kept(content["result"]) if content.get("result_sha256") == sha256_of(content["result"]) else None
 
@@ -114,19 +117,21 @@ class Steps:
         write_json(self._folder / f"{name}.json", {"inputs": inputs, "result": result, **digests})
         return result
 
+    def _computed(self, steps: Mapping[int, Step], workers: int) -> Iterator[tuple[int, Any]]:
+        """Number and result of each step, as it finishes."""
+        if workers <= 1:
+            for number, step in steps.items():
+                self._tell(step)
+                yield number, step.compute()
+            return
+        for number, result in side_by_side({number: step.compute for number, step in steps.items()}, workers):
+            self._tell(steps[number])
+            yield number, result
+
+    def _tell(self, step: Step) -> None:
+        self._progress(self._changed.pop(step.name, step.name))
+
 
 def as_json(data: Any) -> Any:
     """Plain data as JSON gives it back."""
     return json.loads(json.dumps(data, allow_nan=False))
-
-
-def _computed(steps: Mapping[int, Step], workers: int, progress: Progress) -> Iterator[tuple[int, Any]]:
-    """Number and result of each step, as it finishes."""
-    if workers <= 1:
-        for number, step in steps.items():
-            progress(step.name)
-            yield number, step.compute()
-        return
-    for number, result in side_by_side({number: step.compute for number, step in steps.items()}, workers):
-        progress(steps[number].name)
-        yield number, result

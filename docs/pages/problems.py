@@ -251,17 +251,11 @@ def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:
 
 
 def _source(problem: GaitProblem) -> str:
-    said = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name)) or ''}\n")
-    if said is not None:
-        return " ".join(said[1].split())
-    named = [d.source for d in DEFINITIONS if d.problem == problem.name]
-    if named:
-        return f"{named[0]}."
-    module = inspect.getdoc(importlib.import_module(PROBLEMS[problem.name].partition(":")[0])) or ""
-    after = re.search(r"\(after ([^)]+)\)", module)
-    family = importlib.import_module(".".join(PROBLEMS[problem.name].split(".")[:3])).__doc__ or ""
-    cited = re.search(r"\w+(?:, \w+)+ \(?\d{4}[^)]*\)?", family)
-    return f"After {after[1] if after and 'section 4.2' != after[1] else cited[0] if cited else 'this package'}."
+    """The section of that name in what its maker says."""
+    said = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name))}\n")
+    if said is None:
+        raise ValueError(f"the docstring of the maker of {problem.name!r} has no section 'Source:'")
+    return " ".join(said[1].split())
 
 
 def _published(problem: GaitProblem) -> str:

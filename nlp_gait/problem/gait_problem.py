@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.errors import InputError, shown, unknown
+from nlp_gait.errors import InputError, UnknownNameError, shown, unknown
 from nlp_gait.problem.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
 from nlp_gait.problem.locking import CASADI, one_at_a_time
 from nlp_gait.problem.motion.grid import Grid
@@ -357,9 +357,15 @@ class GaitProblem:
         return found
 
     def _parameter(self, name: str) -> Parameter:
-        for parameter in self.parameters:
-            if isinstance(name, str) and parameter.name == name:
-                return parameter
+        if isinstance(name, str):
+            for parameter in self.parameters:
+                if parameter.name == name:
+                    return parameter
+            if name in self.options:
+                raise UnknownNameError(
+                    f"{name!r} is an option of {self.name}, no parameter: another value makes another problem; "
+                    f"build it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
     def _check_pairs(self) -> None:

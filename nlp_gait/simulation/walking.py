@@ -48,10 +48,7 @@ class Walk:
 def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
     """Numbers of one simulation of so many steps."""
     measurements = measure(plan, trace, drive)
-    feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
-    planned = float(feet[-1, 0] - feet[0, 0]) / 2
-    middle = trace.feet.mean(axis=1)
-    walked, drift = (float(value) for value in (middle[-1] - middle[0])[:2])
+    planned, (walked, drift) = planned_m(plan), walked_m(trace)
     energy = measurements.measured.total_W * plan.duration_s
     fell = trace.fell_at_s
     return Walk(
@@ -66,3 +63,16 @@ def measure_walk(plan: Plan, trace: Trace, drive: Drive, steps: int) -> Walk:
         engine_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
         measurements=measurements,
     )
+
+
+def planned_m(plan: Plan) -> float:
+    """Planned way forward of the point halfway between the feet [m]."""
+    feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
+    return float(feet[-1, 0] - feet[0, 0]) / 2
+
+
+def walked_m(trace: Trace) -> tuple[float, float]:
+    """Way forward and to the left of the point halfway between the feet, from start to rest [m]."""
+    middle = trace.feet.mean(axis=1)
+    forward, left = (middle[-1] - middle[0])[:2].tolist()
+    return forward, left

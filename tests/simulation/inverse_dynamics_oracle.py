@@ -11,7 +11,7 @@ from casadi import SX
 
 from nlp_gait.problem import Array, Result, Signals
 from nlp_gait.problems.biped.double_support import torso_shares
-from nlp_gait.problems.biped.phase import BOTH_FEET
+from nlp_gait.problems.biped.instant import BOTH_FEET
 from nlp_gait.problems.nao.body import GRAVITY
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from

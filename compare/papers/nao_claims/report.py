@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib import resources
 from typing import Any
 
+from compare.analysis.units import listed
 from compare.papers.nao_claims.claims import claims
 from compare.papers.nao_claims.effort import Effort
 from compare.papers.nao_claims.figures import all_figures
@@ -42,11 +42,11 @@ def _values(effort: Effort) -> dict[str, Any]:
         "starts": effort.starts,
         "full_error": Drive().full_error_rad,
         "walked": effort.walked,
-        "pushes": _listed(PUSHES_NS),
-        "slopes": _listed(SLOPES_DEG),
-        "frictions": _listed(FRICTIONS),
-        "masses": _listed(MASS_FACTORS),
-        "lengths": _listed(round(1000 * length) for length in effort.steps_m),
+        "pushes": listed(f"{value:g}" for value in PUSHES_NS),
+        "slopes": listed(f"{value:g}" for value in SLOPES_DEG),
+        "frictions": listed(f"{value:g}" for value in FRICTIONS),
+        "masses": listed(f"{value:g}" for value in MASS_FACTORS),
+        "lengths": listed(f"{1000 * length:.0f}" for length in effort.steps_m),
     }
 
 
@@ -102,8 +102,3 @@ def _joints(findings: Findings) -> Rows:
         if where == "model" or found["fell_at_s"] is None
         for heat in HEATS
     ]
-
-
-def _listed(values: Iterable[float]) -> str:
-    *most, last = (f"{value:g}" for value in values)
-    return f"{', '.join(most)} and {last}" if most else last

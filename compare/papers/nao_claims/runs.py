@@ -26,7 +26,8 @@ from nlp_gait.robots import Robot
 from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import Plan, plan_of
-from nlp_gait.simulation.playback import Trace, play
+from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.walking import planned_m, walked_m
 
 PAPER_HEAT, SHEET_HEAT = "K of the paper", "K of the data sheet"
 SPECS = {
@@ -163,15 +164,15 @@ def by_joint(drive: Drive, x: Mapping[str, float], heat: str, steps: int) -> dic
     trace = play(plan, drive=drive)
     during = trace.t <= plan.duration_s
     arrays = plan.signals.arrays
-    planned_m, walked_m = _planned_m(plan), _walked_m(trace)
+    planned, (walked, _) = planned_m(plan), walked_m(trace)
     return {
         "fell_at_s": trace.fell_at_s,
-        "planned_m": planned_m,
-        "walked_m": walked_m,
+        "planned_m": planned,
+        "walked_m": walked,
         "duration_s": plan.duration_s,
         "knee_deg": knee_deg(result),
-        "model": _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_m),
-        "engine": _kinds(plan, trace.torque[during], trace.qd[during], trace.t[during], walked_m),
+        "model": _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], planned),
+        "engine": _kinds(plan, trace.torque[during], trace.qd[during], trace.t[during], walked),
     }
 
 
@@ -180,7 +181,7 @@ def on_servos(drive: Drive, steps: int, lengths: Sequence[float], disturbed: boo
     plan = plan_of(own_walk(documented()), steps)
     trace = play(plan, drive=drive)
     during = trace.t <= plan.duration_s
-    walked = _walked_m(trace)
+    walked, _ = walked_m(trace)
     fell = trace.fell_at_s is not None
     energy = _kinds(plan, trace.torque[during], trace.qd[during], trace.t[during], walked).values()
     worlds = _worlds() if disturbed else []
@@ -190,10 +191,10 @@ def on_servos(drive: Drive, steps: int, lengths: Sequence[float], disturbed: boo
         longer = plan_of(own_walk(documented(step_m=length)), steps)
         tried = play(longer, drive=drive)
         if tried.fell_at_s is None:
-            fastest = max(fastest, _walked_m(tried) / longer.duration_s)
+            fastest = max(fastest, walked_m(tried)[0] / longer.duration_s)
     return {
         "fell": fell,
-        "walked_share": None if fell else walked / _planned_m(plan),
+        "walked_share": None if fell else walked / planned_m(plan),
         "speed_m_s": None if fell else walked / plan.duration_s,
         "sheet_J_per_m": None if fell else total(energy, "sheet"),
         "paper_J_per_m": None if fell else total(energy, "paper"),
@@ -244,24 +245,13 @@ def _kinds(plan: Plan, torque: Array, rate: Array, t: Array, way_m: float) -> di
 def _model(plan: Plan) -> dict[str, float]:
     """Energy for each metre by the model, with the heat constant of the paper and with those of the data sheet [J/m]."""
     arrays = plan.signals.arrays
-    kinds = _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], _planned_m(plan)).values()
+    kinds = _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_m(plan)).values()
     return {f"{heat}_J_per_m": total(kinds, heat) for heat in ("paper", "sheet")}
 
 
 def total(kinds: Iterable[Mapping[str, float]], heat: str) -> float:
     """Energy of all kinds of joints [J/m]; ``heat`` is ``paper`` or ``sheet``."""
     return sum(parts["mechanical"] + parts[heat] for parts in kinds)
-
-
-def _planned_m(plan: Plan) -> float:
-    feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
-    return float(feet[-1, 0] - feet[0, 0]) / 2
-
-
-def _walked_m(trace: Trace) -> float:
-    """Way of the point halfway between the feet, from start to rest."""
-    middle = trace.feet.mean(axis=1)
-    return float(middle[-1, 0] - middle[0, 0])
 
 
 def _worlds() -> list[Conditions]:

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.analysis.statistics.tests import rank_sum
+from compare.papers.nao.claims import FAILS, HOLDS, SIGNIFICANT
 from compare.papers.nao_pareto.findings import NAMES, Findings, Measured, PhaseFindings
 from compare.papers.nao_pareto.runs import ALGORITHMS
 from metaheuristics.array import Array
 
-HOLDS, FAILS = "holds", "does not hold"
-SIGNIFICANT = 0.05
 EARLY = 0.1  # share of the budget that counts as the beginning
 COMPETITIVE = 0.02  # of the true front's hypervolume, behind the best
 NEAR = 0.9  # share of the true front's hypervolume that counts as near it

@@ -14,13 +14,14 @@ from compare.questions.pareto.compare import Challenge
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
 from compare.questions.pareto.knees import Bends, bends
+from compare.questions.pareto.report import SEARCH_NAMES
 from compare.questions.pareto.search import REFERENCE, Scale
 from compare.questions.pareto.study import ParetoStudy
 from metaheuristics.array import Array
 from nlp_gait.problem import GaitProblem
 
 EVEN_POINTS = 200  # of the true front, which distances are measured from
-NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO", "CMOEAD": "CMOEA/D", "DCNSGA3": "DCNSGA-III"}
+NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,6 +157,6 @@ def points_found(study: ParetoStudy, runs: Sequence[FrontRun]) -> list[FrontPoin
     found = []
     for run in runs:
         values, powers = scale.back(run.looks[-1].F)
-        for value, power, x in zip(values.tolist(), powers.tolist(), run.X.tolist(), strict=True):
+        for value, power, x in zip(values.tolist(), powers.tolist(), run.looks[-1].X.tolist(), strict=True):
             found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
     return nondominated(found)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
-from compare.papers.nao_pareto.claims import FAILS, HOLDS, NEAR, claims
+from compare.analysis.units import listed
+from compare.papers.nao.claims import FAILS, HOLDS
+from compare.papers.nao_pareto.claims import NEAR, claims
 from compare.papers.nao_pareto.figures import all_figures
 from compare.papers.nao_pareto.findings import EVEN_POINTS, Findings, PhaseFindings
 from compare.papers.nao_pareto.tables import all_tables
@@ -25,7 +27,7 @@ def _values(findings: Findings) -> dict[str, Any]:
     effort, verdicts = findings.effort, [claim.verdict for claim in claims(findings)]
     return {
         "runs": effort.runs,
-        "budgets": " and ".join(f"{budget:,}" for budget in effort.budgets),
+        "budgets": listed(f"{budget:,}" for budget in effort.budgets),
         "largest": f"{effort.budgets[-1]:,}",
         "points": effort.points,
         "samples": effort.intervals + 1,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
@@ -15,8 +15,7 @@ from compare.questions.pareto.search import PowerAndCompeting, Scale
 from compare.study.definition import fingerprint
 from compare.study.steps import Step
 from compare.study.task import ProblemSpec
-from metaheuristics.array import Array
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm, minimize_many
+from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
 from nlp_gait.backends.kernel.compiled import compile_objective
 
 ALGORITHMS = tuple(FRONT_ALGORITHMS)
@@ -47,27 +46,6 @@ class Effort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
-    """What a run had found after some evaluations; see ``metaheuristics.multi_objective.Snapshot``.
-
-    Attributes:
-        evaluations: used until then.
-        feasible: of these.
-        first_feasible: number of the first of these; None without one.
-        time_s: processor time until then [s].
-        objective_time_s: part of it in the objectives [s].
-        F: (k, 2) scaled objectives of the feasible nondominated members.
-    """
-
-    evaluations: int
-    feasible: int
-    first_feasible: int | None
-    time_s: float
-    objective_time_s: float
-    F: Array
-
-
-@dataclass(frozen=True, kw_only=True)
 class FrontRun:
     """One run.
 
@@ -75,15 +53,13 @@ class FrontRun:
         algorithm: its name.
         run: its number.
         budget: evaluations that it was given.
-        looks: in the order of their evaluations; the last is the end.
-        X: (k, n) points of the last look, in the order of its ``F``.
+        looks: in the order of their evaluations; the last is the end, and only that one keeps its points.
     """
 
     algorithm: str
     run: int
     budget: int
-    looks: tuple[Look, ...]
-    X: Array
+    looks: tuple[Snapshot, ...]
 
 
 def spec_of(phase: str, effort: Effort) -> ProblemSpec:
@@ -131,21 +107,19 @@ def search(spec: ProblemSpec, ends: Sequence[FrontPoint], name: str, looks: Sequ
         compile_objective(criterion.freed(problem), threads=1), criterion, Scale([ends[0], ends[-1]])
     )
     snapshots = minimize_many(objectives, front_algorithm(name), evaluations=looks, seed=seed)
-    plain = [
-        {
-            "evaluations": s.evaluations,
-            "feasible": s.feasible,
-            "first_feasible": s.first_feasible,
-            "time_s": s.time_s,
-            "objective_time_s": s.objective_time_s,
-            "F": s.F.tolist(),
-        }
-        for s in snapshots
-    ]
-    return {"looks": plain, "X": snapshots[-1].X.tolist()}
+    points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
+    return {
+        "looks": [
+            {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()}
+            for snapshot, X in zip(snapshots, points, strict=True)
+        ]
+    }
 
 
 def run_of(name: str, run: int, budget: int, kept: dict[str, Any]) -> FrontRun:
     """The run of a step's result."""
-    looks = tuple(Look(**{**look, "F": np.array(look["F"]).reshape(-1, 2)}) for look in kept["looks"])
-    return FrontRun(algorithm=name, run=run, budget=budget, looks=looks, X=np.array(kept["X"]))
+    looks = tuple(
+        Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)})
+        for look in kept["looks"]
+    )
+    return FrontRun(algorithm=name, run=run, budget=budget, looks=looks)

@@ -10,8 +10,8 @@ from casadi import MX, SX
 
 from nlp_gait.problem import Start, Variable
 from nlp_gait.problems.biped.foot_loads import FootLimits, PlannedWrench, planned_loads
+from nlp_gait.problems.biped.instant import BOTH_FEET, Loader, Loads, Planner
 from nlp_gait.problems.biped.parts import Margins, Part
-from nlp_gait.problems.biped.phase import BOTH_FEET, Loader, Loads, Planner
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import below, combined_zmp, ground_load, zmp_of_wrench

@@ -19,8 +19,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, InstantPoint, Point, Start, Variable
 from nlp_gait.problem.assembly import parameters as table
 from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.instant import BOTH_FEET, Loader, Loads, PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import Contribution, Part, rows
-from nlp_gait.problems.biped.phase import BOTH_FEET, Loader, Loads, PlannedInstant, Planner
 from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from

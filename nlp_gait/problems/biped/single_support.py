@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 
 from casadi import SX
 
-from nlp_gait.problems.biped.phase import Loader, Loads
+from nlp_gait.problems.biped.instant import Loader, Loads
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import below, zmp_of_wrench

@@ -14,7 +14,7 @@ from casadi import DM, SX
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Parameter, Variable
 from nlp_gait.problems.biped.goals import HEAT_LOSS
-from nlp_gait.problems.biped.phase import BOTH_FEET, PlannedInstant
+from nlp_gait.problems.biped.instant import BOTH_FEET, PlannedInstant
 from nlp_gait.problems.humanoid.newton import newton_steps
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, biped_of

@@ -28,9 +28,10 @@ from nlp_gait.problems.biped.double_support import (
     margins_in,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import goal_of
 from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
 from nlp_gait.problems.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL, Humanoid, humanoid
@@ -60,6 +61,10 @@ def humanoid_cycle(
 
     ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
     parameter: the step length follows from it.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
+        cycle are this package's own.
     """
     body = humanoid(robot)
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")

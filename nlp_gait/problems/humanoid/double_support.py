@@ -17,8 +17,9 @@ from nlp_gait.problems.biped.double_support import (
     double_support_mean_margins,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.humanoid.body import GRAVITY, LETTERS, Humanoid, humanoid
@@ -47,7 +48,11 @@ def humanoid_dsp(
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
-    """Double support, the right foot a step ahead; for the options see ``problems.humanoid``."""
+    """Double support, the right foot a step ahead; for the options see ``problems.humanoid``.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
+    """
     body = humanoid(robot)
     step = body.step_length(step_length_m)
     real = humanoid_motors(motors, body)

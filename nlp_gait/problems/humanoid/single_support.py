@@ -8,8 +8,9 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.curves import HIP_CURVES, Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
@@ -36,7 +37,11 @@ def humanoid_ssp(
     drive_limits: bool = True,
     motors: str = "",
 ) -> GaitProblem:
-    """Single support; the swing foot moves by twice the step length. For the options see ``problems.humanoid``."""
+    """Single support; the swing foot moves by twice the step length. For the options see ``problems.humanoid``.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
+    """
     body = humanoid(robot)
     step = body.step_length(step_length_m)
     real = humanoid_motors(motors, body)

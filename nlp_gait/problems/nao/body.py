@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from casadi import DM, SX, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problems.biped.phase import PlannedInstant
+from nlp_gait.problems.biped.instant import PlannedInstant
 from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld

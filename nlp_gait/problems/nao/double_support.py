@@ -21,8 +21,9 @@ from nlp_gait.problems.biped.double_support import (
     double_support_mean_margins,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN
-from nlp_gait.problems.biped.phase import Derivatives, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Derivatives, Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
@@ -62,7 +63,11 @@ def nao_dsp(
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
-    """Double support of NAO; for the options see ``problems.nao``."""
+    """Double support of NAO; for the options see ``problems.nao``.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), sections 3.2 and 4.2.
+    """
     check_step_length(step_length_m)
     real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model

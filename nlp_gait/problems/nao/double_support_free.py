@@ -17,8 +17,9 @@ from nlp_gait.problems.biped.double_support import (
     double_support_mean_margins,
     support_box,
 )
+from nlp_gait.problems.biped.instant import PlannedInstant
 from nlp_gait.problems.biped.parts import REACH_MARGIN, AngleLimits, Contribution, Part, rows
-from nlp_gait.problems.biped.phase import Phase, PlannedInstant
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.samples import Samples, Trace
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.closed_chain import YAW_PITCHES, check_yaw_pitches, closure, leaning_legs

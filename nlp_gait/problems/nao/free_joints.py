@@ -20,6 +20,7 @@ from casadi import DM, MX, SX
 from nlp_gait.problem import Array, Constraint, InstantPoint, Point, Signals
 from nlp_gait.problem.blocks import labels
 from nlp_gait.problems.biped.curves import Splines, Trajectory
+from nlp_gait.problems.biped.instant import Loader, PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import (
     REACH_MARGIN,
     Contribution,
@@ -28,7 +29,7 @@ from nlp_gait.problems.biped.parts import (
     limit_rows,
     rows,
 )
-from nlp_gait.problems.biped.phase import Loader, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT

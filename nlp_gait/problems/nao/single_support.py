@@ -9,8 +9,9 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.problem import GaitProblem, InstantPoint, Point, Variable, maker
 from nlp_gait.problems.biped.curves import Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.problems.biped.instant import Loader, PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN, FootClearance, Margins
-from nlp_gait.problems.biped.phase import Derivatives, Loader, Phase, PlannedInstant, Planner
+from nlp_gait.problems.biped.phase import Derivatives, Phase
 from nlp_gait.problems.biped.problem import Criterion, goal_of
 from nlp_gait.problems.biped.samples import LEAST_DURATION
 from nlp_gait.problems.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
@@ -53,7 +54,11 @@ def nao_ssp(
     objective: Criterion = "power",
     motors: str = "",
 ) -> GaitProblem:
-    """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``."""
+    """Single support of NAO; the swing foot moves by twice the step length. For the options see ``problems.nao``.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), sections 3.1 and 4.1.
+    """
     check_step_length(step_length_m)
     real = nao_motors(motors, nao(robot, rotational_inertia))
     model = real.model

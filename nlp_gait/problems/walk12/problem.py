@@ -72,6 +72,9 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
 
     Raises:
         InputError: an option that is not allowed.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), section 5.
     """
     if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")

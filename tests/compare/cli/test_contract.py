@@ -65,8 +65,8 @@ def test_solve_search_and_compare(tmp_path):
     assert (out / "report.md").read_text().count("| pso | 2 |") == 1
     assert "<svg" in (out / "report.html").read_text()
     assert (out / "nao-ssp-convergence.png").stat().st_size > 10_000
-    # One start each of IPOPT and the condensed method, and two runs each of pso, ga and aco.
-    assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 8
+    # One start of IPOPT, and two runs each of pso, ga and aco.
+    assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 7
 
 
 def test_fixed_variable_and_parameter():
@@ -94,6 +94,7 @@ def test_same_seed_same_result_with_one_or_two_processes():
         (["search", "nao-ssp", "--algorithm", "psso"], ["unknown algorithm 'psso'", "pso"]),
         (["solve", "nao-ssp", "--fix", "swing_hight_m=0.02"], ["unknown variable", "swing_height_m"]),
         (["solve", "nao-ssp", "--set", "torque_change_limit=0.02"], ["unknown parameter", "torque_change_limit_Nm"]),
+        (["sweep", "nao-ssp", "--over", "intervals=10:20:2"], ["is an option of nao-ssp", "--option intervals="]),
         (["solve", "nao-ssp", "--robot", "nao-v7"], ["unknown robot 'nao-v7'", "nao-v"]),
         (["evaluate", "nao-ssp", "--x", "0.31,2"], ["must have 9 values"]),
         (["evaluate", "nao-ssp", "--x", "nan" + PSO_OF_THE_PAPER[4:]], ["hip_height_m must be finite", "nan"]),

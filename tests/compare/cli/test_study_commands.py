@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
+from compare.cli.compare import chosen_solvers
+from compare.cli.options import SearchOptions
 from tests.compare.cli.calls import as_json, one_sentence, process
 
 STUDY = """
@@ -80,3 +83,16 @@ def test_search_stops_for_the_reason_asked_for_and_polishes() -> None:
     (run,), (polished,) = found["runs"], found["polished"]
     assert run["status"] == "target reached" and run["objective"] <= 1.0 and run["evaluations"] < 10_000
     assert polished["objective"] == pytest.approx(0.845868, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("algorithms", "evaluations", "takes_part"),
+    [("all", 500, True), ("all", 501, False), ("all,bayes", 501, True), ("pso", 500, False)],
+)
+def test_all_are_those_that_can_use_up_the_budget(
+    algorithms: str, evaluations: int, takes_part: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules[chosen_solvers.__module__], "installed_algorithms", lambda: ("pso", "bayes"))
+    solvers = chosen_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
+    names = [solver.algorithm for solver in solvers]
+    assert ("bayes" in names) == takes_part and {"ipopt", "pso"} <= set(names)

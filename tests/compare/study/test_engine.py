@@ -6,6 +6,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -97,7 +98,8 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
-    monkeypatch.setattr(engine, "_result", lambda _: None)
+    still = SimpleNamespace(problem=SimpleNamespace(playback=None))
+    monkeypatch.setattr(engine, "gait_of", lambda _: still)
     assert play_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
     write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())

@@ -126,3 +126,10 @@ def test_why_a_step_is_made_again_is_told(tmp_path: Path) -> None:
     file.write_text(json.dumps({**content, "result": 2}))
     assert Steps(tmp_path, print, code=[nlp_gait], anew=told.append)("one", {"starts": 10}, lambda: 3) == 3
     assert len(told) == 2  # damaged
+
+
+def test_progress_counts_a_step_that_is_made_again_once(tmp_path: Path) -> None:
+    told: list[str] = []
+    for starts in (5, 10):
+        Steps(tmp_path, told.append)("one", {"starts": starts}, lambda: 1)
+    assert told == ["one", "one: made again: starts 5 -> 10"]

@@ -6,8 +6,8 @@ from casadi import SX, vertcat
 
 from nlp_gait.problem import InstantPoint, Variable
 from nlp_gait.problems.biped.cycle_motion import LIFT, TIMES, Coordinate, between, cycle_from, cycle_variables
+from nlp_gait.problems.biped.instant import PlannedInstant, Planner
 from nlp_gait.problems.biped.parts import REACH_MARGIN
-from nlp_gait.problems.biped.phase import PlannedInstant, Planner
 from nlp_gait.problems.biped.single_support import swing_foot
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, upright_plan
 from nlp_gait.problems.nao.legs import hip_variables, leg_geometry

@@ -58,6 +58,9 @@ def nao_cycle(
         samples_per_interval: above 1 for a denser grid; 0 for what suits the loads: 4 where they are planned, else 1.
         motors: what of the real motors is taken into account; the mean square of a continuous torque is that of each phase.
         load_degree: of the planned wrench over double support.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     real, at_given_speed = nao_motors(motors, nao(robot, rotational_inertia)), objective != "energy-per-metre"

@@ -13,8 +13,9 @@ from casadi import DM, MX, SX
 
 from nlp_gait.problem import Array, Constraint, NumericPoint, Parameter, Point, Signals, Stretch, Variable
 from nlp_gait.problem.blocks import labels
+from nlp_gait.problems.biped.instant import BOTH_FEET
 from nlp_gait.problems.biped.parts import Contribution, Part, rows
-from nlp_gait.problems.biped.phase import BOTH_FEET, COLUMNS, WRENCHES, Phase
+from nlp_gait.problems.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.problems.biped.samples import LEAST_DURATION, Samples
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.free_joints import KNEES

@@ -13,8 +13,8 @@ from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
 from nlp_gait.problems.biped.cycle import cycle_problem
 from nlp_gait.problems.biped.cycle_motion import STEP, TIMES
 from nlp_gait.problems.biped.double_support import double_support_margins, double_support_mean_margins, support_box
+from nlp_gait.problems.biped.instant import Loader
 from nlp_gait.problems.biped.parts import Part
-from nlp_gait.problems.biped.phase import Loader
 from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
