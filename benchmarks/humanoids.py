@@ -1,6 +1,6 @@
 """Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [cart-table] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.problems.humanoid.body import GRAVITY
 from nlp_gait.robots.biped import NAO_LEG_M, biped_of
 from tests.pinocchio_oracle import floating_model, stand
+
+if TYPE_CHECKING:
+    from nlp_gait.simulation.walking import Walk
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
@@ -236,6 +240,45 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         )
 
 
+def cart_table(files: dict[str, str]) -> Iterator[str]:
+    """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda: model / engine."""
+    from compare.questions.sweep.study import parse_axis
+    from compare.questions.walk.planners import CART_TABLE, rivals
+    from compare.questions.walk.study import optimal_gaits, played
+    from compare.study.task import ProblemSpec
+    from nlp_gait.simulation.drive import Drive
+
+    yield header(
+        "robot", "speed m/s", "step m", "times s", "textbook", "optimum", "saved", "textbook's hip, and limits broken"
+    )
+    for name, file in files.items():
+        spec = ProblemSpec(name="humanoid-cycle", options={"robot": file, "objective": "power"})
+        problem = spec.load()
+        (least,) = optimal_gaits(spec, parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1, seed=0)
+        if not least.found.feasible:
+            yield cells(name, f"{least.at:.4f}", "-", "-", "-", least.found.status, "-", "-")
+            continue
+        least = played(spec, least, STEPS, Drive())
+        (cart,) = rivals(spec, [least], [CART_TABLE], starts=1, seed=0, steps=STEPS, drive=Drive())
+        powers = [watts(gait.indexes, gait.walk, least.at) for gait in (cart, least)]
+        saved = [100.0 * (1.0 - better / worse) for worse, better in zip(*powers, strict=True)]
+        yield cells(
+            name,
+            f"{least.at:.4f}",
+            f"{least.indexes['step_length_m']:.3f}",
+            " + ".join(f"{least.found.x[key]:.3f}" for key in problem.durations),
+            *(" / ".join(f"{value:.3f}" for value in pair) + " W" for pair in powers),
+            " / ".join(f"{value:.1f}" for value in saved) + " %",
+            "; ".join(filter(None, (cart.note, *cart.broken))),
+        )
+
+
+def watts(indexes: Mapping[str, float], walk: Walk | None, speed_m_s: float) -> tuple[float, float]:
+    """Mean power of a walk in the model and in the engine [W]; NaN where it has none, or falls."""
+    engine = None if walk is None else walk.engine_J_per_planned_m
+    return indexes.get("power_W", np.nan), np.nan if engine is None else engine * speed_m_s
+
+
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
     assert problem.robot is not None
@@ -249,6 +292,7 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "searches": searches,
     "steps": steps,
     "cycles": cycles,
+    "cart-table": cart_table,
 }
 
 
