@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -19,6 +19,7 @@ from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, 
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.solvers.stages import StagedSolver
+from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import Outcome
@@ -50,7 +51,7 @@ class IpoptSettings(Solver):
 
     Attributes:
         tolerance: IPOPT's ``tol``.
-        iterations: limit of iterations for each stage.
+        iterations: limit of iterations for each stage, and in the first for each set of rows, see ``working_set``.
         time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
         hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
         compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
@@ -127,9 +128,8 @@ class Ipopt(StagedSolver):
         self.linear_solver = linear_solver(settings.linear_solver)
         self.time_limit_s = settings.time_limit_s
         self.watch = IterationWatch(model.nlp)
-        options: dict[str, Any] = {
+        general: dict[str, Any] = {
             **QUIET,
-            "iteration_callback": self.watch,
             "ipopt.mu_strategy": "adaptive",
             "ipopt.tol": settings.tolerance,
             "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits by what IPOPT relaxes them
@@ -139,6 +139,7 @@ class Ipopt(StagedSolver):
             **({} if settings.linear_solver is None else {"ipopt.linear_solver": settings.linear_solver}),
             **({"ipopt.mumps_pivot_order": PIVOT_ORDER} if self.linear_solver.lower() == "mumps" else {}),
         }
+        options = {**general, "iteration_callback": self.watch}
         self.compiled = bool(settings.compiled)
         nlp, self._native = model.nlp, None
         if self.compiled:
@@ -156,9 +157,26 @@ class Ipopt(StagedSolver):
             "ipopt.warm_start_slack_bound_push": 1e-6,
             "ipopt.warm_start_mult_bound_push": 1e-6,
         }
-        self.cold = self._of_ipopt
         self.warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
+        rows = nlp["g"].shape[0]
+        self.cold = self._of_ipopt if rows < LEAST_ROWS else self._on_few_rows(problem, general)
         self.create_s = time.perf_counter() - started
+
+    def _on_few_rows(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:
+        """A first stage that begins with few rows: what ties lifted variables, equations, and what one run shows to matter.
+
+        That run is by the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
+        """
+        model = self.model
+        usual = problem.with_values(**{parameter.name: parameter.default for parameter in problem.parameters})
+        bounds, width = model.bounds(usual), model.widths[0]
+        always = bounds["lbg"] == bounds["ubg"]
+        always[len(model.row_names) :] = True
+        cold = WorkingSet(model.nlp, self.functions(), options, self._of_ipopt, self.watch, always)
+        self.watch.begin(never, time.perf_counter() + self.time_limit_s)
+        start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
+        cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
+        return cold
 
     def functions(self) -> dict[str, ca.Function]:
         """Functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""

@@ -19,12 +19,12 @@ REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limi
 class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
-    def __init__(self, nlp: Mapping[str, MX]) -> None:
-        """Take the NLP's size: CasADi's dictionary of x, p, f, g."""
+    def __init__(self, nlp: Mapping[str, MX], beside: IterationWatch | None = None) -> None:
+        """Take the NLP's size: CasADi's dictionary of x, p, f, g; what ``beside`` is told, this one heeds too."""
         ca.Callback.__init__(self)
         n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))
         self._sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": k}
-        self._of_thread = threading.local()
+        self._of_thread: threading.local = threading.local() if beside is None else beside._of_thread
         self.construct("watch", {})
 
     def begin(self, stop: Callable[[], bool], deadline: float) -> None:

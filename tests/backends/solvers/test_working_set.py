@@ -1,0 +1,83 @@
+"""IPOPT on the rows that matter: it ends where IPOPT on all rows does, and every row holds there."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.ipopt_installation import QUIET
+from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
+from nlp_gait.backends.solvers.working_set import WorkingSet
+from nlp_gait.problem import load
+
+SIDES = 200
+NAMES = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
+
+
+def polygon(*, linear: bool = False) -> tuple[WorkingSet, ca.Function, IterationWatch, dict[str, Any]]:
+    """The point of a polygon of many sides about the unit circle that is nearest to (2, 1), or farthest in a direction."""
+    x, p = MX.sym("x", 2), MX.sym("p")
+    angles = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+    f = -x[0] - p * x[1] if linear else (x[0] - 2) ** 2 + p * (x[1] - 1) ** 2 + 0.1 * ca.sin(x[0])
+    nlp = {"x": x, "p": p, "f": f, "g": ca.DM(np.cos(angles)) * x[0] + ca.DM(np.sin(angles)) * x[1]}
+    watch = IterationWatch(nlp)
+    whole = ca.nlpsol("whole", "ipopt", nlp, {**QUIET, "iteration_callback": watch})
+    functions = {name: whole.get_function(name) for name in NAMES}
+    few = WorkingSet(nlp, functions, QUIET, whole, watch, np.zeros(SIDES, dtype=bool))
+    inf = np.full(2, np.inf)
+    arguments = {"p": [1.0], "lbx": -inf, "ubx": inf, "lbg": np.full(SIDES, -np.inf), "ubg": np.ones(SIDES)}
+    watch.begin(never, math.inf)
+    return few, whole, watch, {**arguments, "x0": np.array([0.1, -0.2])}
+
+
+def same(found: Any, expected: Any) -> bool:
+    """Point and multipliers, to IPOPT's tolerance."""
+    pairs = ((np.array(found[key]).ravel(), np.array(expected[key]).ravel()) for key in ("x", "lam_g", "lam_x"))
+    return all(np.allclose(a, b, rtol=0.0, atol=1e-6) for a, b in pairs)
+
+
+def test_rows_that_are_violated_join_until_none_is() -> None:
+    few, whole, _, arguments = polygon()
+    found = few(**arguments)
+    assert same(found, whole(**arguments))
+    assert few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]  # one round after the other
+    first = few.stats()["iter_count"]
+    few.learn(**arguments)
+    assert same(few(**arguments), whole(**arguments)) and few.stats()["iter_count"] < first  # all in one round
+    assert few.stats()["n_call_nlp_hess_l"] <= first
+
+
+def test_where_some_rows_are_not_enough_all_are_taken() -> None:
+    """Without rows a linear objective has no least value."""
+    few, whole, _, arguments = polygon(linear=True)
+    assert same(few(**arguments), whole(**arguments))
+    assert few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]
+
+
+def test_a_run_that_is_ended_is_not_begun_again() -> None:
+    few, _, watch, arguments = polygon()
+    watch.begin(lambda: True, math.inf)
+    found = few(**arguments)
+    assert watch.reason == INTERRUPTED and not few.stats()["success"] and few.stats()["iter_count"] <= 1
+    assert np.array(found["lam_g"]).ravel().shape == (SIDES,)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_gait_has_few_rows_that_matter(compiled: bool) -> None:
+    """Its start does not depend on the copy of the problem that was solved first, and no limit is broken in the end."""
+    problem = load("nao-dsp")
+    x0 = problem.start_point(np.random.default_rng(5))
+    settings = IpoptSettings(compiled=compiled)
+    found = settings.ready_for(problem).run(problem, x0)
+    assert found.success and found.violation == pytest.approx(0.0, abs=1e-8)
+    assert found.objective == pytest.approx(0.53188583, rel=1e-7)
+    other = load("nao-dsp", intervals=10)
+    settings.ready_for(other).run(other.with_values(torque_change_limit_Nm=5.0), x0)
+    assert settings.ready_for(other).run(other, x0).x.tolist() == found.x.tolist()
