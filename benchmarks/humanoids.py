@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +24,6 @@ from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.problems.humanoid.body import GRAVITY
 from nlp_gait.robots.biped import NAO_LEG_M, biped_of
 from tests.pinocchio_oracle import floating_model, stand
-
-if TYPE_CHECKING:
-    from nlp_gait.simulation.walking import Walk
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
@@ -241,42 +237,54 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
 
 
 def cart_table(files: dict[str, str]) -> Iterator[str]:
-    """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda: model / engine."""
+    """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda, and that cycle."""
     from compare.questions.sweep.study import parse_axis
     from compare.questions.walk.planners import CART_TABLE, rivals
     from compare.questions.walk.study import optimal_gaits, played
     from compare.study.task import ProblemSpec
     from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.feedback import FEEDBACKS
 
     yield header(
-        "robot", "speed m/s", "step m", "times s", "textbook", "optimum", "saved", "textbook's hip, and limits broken"
+        "robot", "speed m/s", "step m", "times s", "textbook W, optimum W, saved", "engine", "textbook's notes"
     )
     for name, file in files.items():
         spec = ProblemSpec(name="humanoid-cycle", options={"robot": file, "objective": "power"})
         problem = spec.load()
         (least,) = optimal_gaits(spec, parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1, seed=0)
         if not least.found.feasible:
-            yield cells(name, f"{least.at:.4f}", "-", "-", "-", least.found.status, "-", "-")
+            yield cells(name, f"{least.at:.4f}", "-", "-", least.found.status, "-", "-")
             continue
-        least = played(spec, least, STEPS, Drive())
-        (cart,) = rivals(spec, [least], [CART_TABLE], starts=1, seed=0, steps=STEPS, drive=Drive())
-        powers = [watts(gait.indexes, gait.walk, least.at) for gait in (cart, least)]
-        saved = [100.0 * (1.0 - better / worse) for worse, better in zip(*powers, strict=True)]
+        engine = []
+        for feedback, words in ((None, "open loop"), (FEEDBACKS["torso-spring"], "torso-spring")):
+            drive = Drive(feedback=feedback)
+            best = played(spec, least, STEPS, drive)
+            (cart,) = rivals(spec, [least], [CART_TABLE], starts=1, seed=0, steps=STEPS, drive=drive)
+            if cart.walk is None or best.walk is None:
+                break  # no height of the hip reaches
+            fell = [walk.measurements.fell_at_s for walk in (cart.walk, best.walk)]
+            energies = [walk.engine_J_per_planned_m or np.nan for walk in (cart.walk, best.walk)]
+            if fell == [None, None]:
+                engine.append(f"{words}: {watts(*(energy * least.at for energy in energies))}")
+                break
+            said = [
+                f"{who} falls at {at_s:.1f} s" for who, at_s in zip(("textbook", "optimum"), fell, strict=True) if at_s
+            ]
+            engine.append(f"{words}: {', '.join(said)}")
         yield cells(
             name,
             f"{least.at:.4f}",
             f"{least.indexes['step_length_m']:.3f}",
             " + ".join(f"{least.found.x[key]:.3f}" for key in problem.durations),
-            *(" / ".join(f"{value:.3f}" for value in pair) + " W" for pair in powers),
-            " / ".join(f"{value:.1f}" for value in saved) + " %",
-            "; ".join(filter(None, (cart.note, *cart.broken))),
+            watts(cart.indexes.get("power_W", np.nan), least.indexes["power_W"]),
+            "; ".join(engine),
+            "; ".join((cart.note, *cart.broken)),
         )
 
 
-def watts(indexes: Mapping[str, float], walk: Walk | None, speed_m_s: float) -> tuple[float, float]:
-    """Mean power of a walk in the model and in the engine [W]; NaN where it has none, or falls."""
-    engine = None if walk is None else walk.engine_J_per_planned_m
-    return indexes.get("power_W", np.nan), np.nan if engine is None else engine * speed_m_s
+def watts(textbook: float, optimum: float) -> str:
+    """Mean powers [W], and what the optimum saves."""
+    return f"{textbook:.3f}, {optimum:.3f}, {100.0 * (1.0 - optimum / textbook):.1f} %"
 
 
 def leg_of(problem: GaitProblem) -> float:
