@@ -109,7 +109,7 @@ def handling(name: str, /, **settings: object) -> ConstraintHandling:
 def made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
     """What a factory makes of settings, by its name; SearchError as `algorithm` raises it."""
     if not isinstance(name, str):
-        raise SearchError(f"the name of a {kind} must be a text, got {shown(name)}")
+        raise SearchError(f"the name of {'an' if kind[0] in 'aeiou' else 'a'} {kind} must be a text, got {shown(name)}")
     if name not in factories:
         raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
     factory = factories[name]

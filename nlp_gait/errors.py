@@ -54,7 +54,7 @@ class OutputError(GaitError):
 
 
 class WorkerError(GaitError):
-    """Worker processes of a study keep dying."""
+    """Worker processes die, or do not begin."""
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
@@ -66,17 +66,22 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
         known: all allowed names.
     """
     if not isinstance(name, str):
-        return UnknownNameError(f"the name of a {kind} must be a text, got {shown(name)}")
+        return UnknownNameError(f"the name of {_a(kind)} must be a text, got {shown(name)}")
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
     return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
 
 
+def _a(kind: str) -> str:
+    """With its article."""
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+
+
 def check_name(kind: str, name: object) -> None:
     """Raise InputError unless what should name a problem, a solver or the like is a text."""
     if not isinstance(name, str):
-        raise InputError(f"the name of a {kind} must be a text, got {shown(name)}")
+        raise InputError(f"the name of {_a(kind)} must be a text, got {shown(name)}")
 
 
 def checked_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:

@@ -226,13 +226,22 @@ def temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Itera
 
 
 def check_name(path: Path) -> None:
-    """Refuse a path that records, reports and messages could not name.
+    """Refuse a path to write to that records, reports and messages could not name.
 
     Raises:
         OutputError: it is no valid UTF-8.
     """
-    if any("\ud800" <= sign <= "\udfff" for sign in str(path)):
-        raise OutputError(f"cannot write to {str(path)!r}: its name is no valid UTF-8; choose another name")
+    check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
+
+
+def check_path(path: str, owner: str, error: type[GaitError]) -> None:
+    """Refuse a path that records could not name; ``owner`` begins the message.
+
+    Raises:
+        GaitError: of that class: it is no valid UTF-8.
+    """
+    if any("\ud800" <= sign <= "\udfff" for sign in path):
+        raise error(f"{owner}: its name is no valid UTF-8; choose another name")
 
 
 def writable_folder(path: Path) -> Path:

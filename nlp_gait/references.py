@@ -15,6 +15,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout, suppress
+from functools import cache, lru_cache
 from importlib.abc import SourceLoader
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -22,7 +23,7 @@ from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, OwnCodeError, unknown
-from nlp_gait.files import read_bytes
+from nlp_gait.files import check_path, read_bytes
 
 T = TypeVar("T")
 Kind = Literal["problem", "algorithm"]
@@ -70,7 +71,13 @@ def is_own(text: str, kind: Kind) -> bool:
 
 def installed(kind: Kind) -> dict[str, str]:
     """References of installed packages' entry points by name."""
-    return {point.name: point.value for point in entry_points(group=GROUPS[kind])}
+    return dict(_entry_points(kind))
+
+
+@cache
+def _entry_points(kind: Kind) -> tuple[tuple[str, str], ...]:
+    """Name and reference of each, looked for once: to go through all packages takes long."""
+    return tuple((point.name, point.value) for point in entry_points(group=GROUPS[kind]))
 
 
 def short_name(text: str) -> str:
@@ -125,13 +132,18 @@ def source_sha256(text: str, kind: Kind) -> str:
 def source_digest(path: Path, content: bytes, name: str) -> str:
     """Hash of the source that a name of a file is made of, see ``source_sha256``; of the whole file where it cannot be told."""
     try:
-        tree = ast.parse(content)
+        used, parts = _parsed(content, name)
     except (SyntaxError, ValueError):
         return hashlib.sha256(content).hexdigest()
-    used = _used_by(name, tree.body)
-    parts = [ast.dump(statement) for statement in used]
-    parts += [hashlib.sha256(file.read_bytes()).hexdigest() for file in _beside(path, used)]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    beside = [hashlib.sha256(file.read_bytes()).hexdigest() for file in _beside(path, used)]
+    return hashlib.sha256("\n".join([*parts, *beside]).encode()).hexdigest()
+
+
+@lru_cache(maxsize=16)
+def _parsed(content: bytes, name: str) -> tuple[list[ast.stmt], list[str]]:
+    """Statements of a file that a name depends on, and what counts of each."""
+    used = _used_by(name, ast.parse(content).body)
+    return used, [ast.dump(statement) for statement in used]
 
 
 def _used_by(name: str, body: Sequence[ast.stmt]) -> list[ast.stmt]:
@@ -296,6 +308,7 @@ def _source(found: Reference, text: str) -> tuple[str, bytes]:
     """Path and content of the file or module."""
     if found.is_file:
         path = found.home
+        check_path(path, f"code of {text!r}, {path!r}", OwnCodeError)
     else:
         try:
             spec = importlib.util.find_spec(found.home)

@@ -196,8 +196,8 @@ def test_a_question_is_one_folder_and_one_line() -> None:
         solution = nlp_gait.solve(nlp_gait.load(problem), starts=2)
         typer.echo(solution.active_constraints[0].name)
 
-    done = CliRunner().invoke(own, ["heaviest-bound", "nao-ssp"])
-    assert done.exit_code == 0 and done.output.strip() == "dbm_y_mean"
+    done = CliRunner().invoke(own, ["heaviest-bound", "walk12"])
+    assert done.exit_code == 0 and done.output.strip() == "bounds[step_length_m]"
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.trajectories import Motion, at_rest, stack
+from nlp_gait.symbolic.trajectories import Motion, at_rest, cubic_of_sums, stack
 from nlp_gait.symbolic.world_frame import world_frame_dynamics
 
 STEP_M, PHASE, REACH_MARGIN = 0.06, 0.3, 0.01
@@ -74,7 +74,9 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     at = InstantPoint.of(ca.vertcat(z[0], *sums, z[-2], time), SX(0, 1), names, ())
     if in_world:  # without the quotients, which cancel
         ends = ((z[0], z[0]), stance.hip_x, stance.hip_y)
-        parts = [_hermite(*end, z[k], z[k + 1], time, phase) for end, k in zip(ends, (1, 3, 5), strict=True)]
+        parts = [
+            _timed(cubic_of_sums(*end, z[k], z[k + 1], phase), time) for end, k in zip(ends, (1, 3, 5), strict=True)
+        ]
         hip = stack(parts[1], parts[2], parts[0])
     else:
         hip = hip_motion(at, stance.hip_x, stance.hip_y, time, phase)
@@ -93,14 +95,9 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     return ca.Function("sample", [z], [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS), zmp))])
 
 
-def _hermite(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, time: SX, s: SX) -> Motion:
-    """Cubic through given ends, from half the sum and half the difference of w = v T at both."""
-    rise = end - start
-    return Motion(
-        start + s**2 * (3 - 2 * s) * rise + s * (1 - s) * ((1 - 2 * s) * half_sum + half_difference),
-        (6 * s * (1 - s) * rise + (1 - 6 * s * (1 - s)) * half_sum + (1 - 2 * s) * half_difference) / time,
-        ((6 - 12 * s) * rise + (12 * s - 6) * half_sum - 2 * half_difference) / time**2,
-    )
+def _timed(motion: Motion, time: SX) -> Motion:
+    """A motion of unit time in another time."""
+    return Motion(motion.position, motion.velocity / time, motion.acceleration / time**2)
 
 
 def main() -> None:

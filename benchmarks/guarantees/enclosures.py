@@ -18,6 +18,7 @@ import ival
 import numpy as np
 
 from nlp_gait.backends.kernel.affine import AffineFunction, Forms
+from nlp_gait.backends.kernel.quadratic import QuadraticForms, QuadraticFunction
 
 COUNT = 100_000
 SEED = 19
@@ -62,6 +63,30 @@ OPERATIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any], tuple[float,
 }
 
 
+# The same of what has a form of degree two: only points at which the smaller one of x and 0.5 is x are of interest.
+_SHARED = ("add", "sub", "mul", "div", "divided by a negative", "tiny product", "sq", "sqrt", "fabs")
+QUADRATIC: dict[str, tuple[Callable[..., Any], Callable[..., Any], tuple[float, float]]] = {
+    **{name: OPERATIONS[name] for name in _SHARED},
+    "larger than a number": (lambda x, y: ca.fmax(x, 0.1), lambda x, y: ival.max(x, ival.Interval(0.1)), (-1.0, 1.0)),
+    "at most a number": (lambda x, y: ca.fmin(x, 2.0) * y, lambda x, y: x * y, (-1.0, 1.0)),
+    "only below a number": (
+        lambda x, y: ca.if_else(x < 0.1, y, 0),
+        lambda x, y: y if x.sup < 0.1 else 0 * y,
+        (-1.0, 1.0),
+    ),
+    "composed": (
+        lambda x, y: x * y / (1.5 + x * y * y) - ca.sqrt(x * x + 1) * (x - y) * y,
+        lambda x, y: x * y / (1.5 + x * y * y) - ival.sqrt(x * x + 1) * (x - y) * y,
+        (-1.0, 1.0),
+    ),
+    "composed of squares": (
+        lambda x, y: (x - y) ** 2 - x**2 + 2 * x * y - y**2 + 1 / (2 + x),
+        lambda x, y: 1 / (2 + x),
+        (-1.0, 1.0),
+    ),
+}
+
+
 def tiny(x: Any, y: Any) -> Any:
     """Product that underflows on the way, in exact arithmetic."""
     exact = Fraction(x.inf) * Fraction(1e-200) * Fraction(y.inf) * Fraction(1e-200) * Fraction(1e300)
@@ -85,13 +110,14 @@ def random_boxes(range_: tuple[float, float], count: int, rng: np.random.Generat
     return np.stack([np.clip(middle - half, low, high), np.clip(middle + half, low, high)], -1)
 
 
-def lost(name: str, count: int, rng: np.random.Generator) -> list[str]:
+def lost(name: str, count: int, rng: np.random.Generator, *, quadratic: bool = False) -> list[str]:
     """Random points of random boxes whose exact value an enclosure of an operation does not hold, in words."""
-    operation, tight, range_ = OPERATIONS[name]
+    operation, tight, range_ = (QUADRATIC if quadratic else OPERATIONS)[name]
     x = ca.SX.sym("x", 2)
-    function = AffineFunction(ca.Function("operation", [x], [ca.SX(operation(x[0], x[1]))]))
+    expression = ca.Function("operation", [x], [ca.SX(operation(x[0], x[1]))])
     boxes = random_boxes(range_, count, rng)
-    forms = function(boxes, np.arange(2))
+    forms: Forms | QuadraticForms
+    forms = QuadraticFunction(expression)(boxes) if quadratic else AffineFunction(expression)(boxes, np.arange(2))
     found = []
     for k, box in enumerate(boxes):
         point = np.clip(rng.uniform(box[:, 0], box[:, 1]), box[:, 0], box[:, 1])
@@ -102,24 +128,29 @@ def lost(name: str, count: int, rng: np.random.Generator) -> list[str]:
             continue
         # The exact value lies between two neighbouring doubles: a bound holds it if it holds the one beyond it. What is
         # composed has bounds that are not tight, and must only meet.
-        ends = (value.sup, value.inf) if name == "composed" else (value.inf, value.sup)
+        ends = (value.sup, value.inf) if name.startswith("composed") else (value.inf, value.sup)
         if not (forms.lower[k, 0] <= ends[0] and ends[1] <= forms.upper[k, 0] and in_form(forms, k, box, point, ends)):
             found.append(f"{name} at {point.tolist()} of {box.tolist()}: {value}")
     return found
 
 
-def in_form(forms: Forms, k: int, box: Array, point: Array, ends: tuple[float, float]) -> bool:
+def in_form(forms: Forms | QuadraticForms, k: int, box: Array, point: Array, ends: tuple[float, float]) -> bool:
     """Whether both ends lie within a form at a point of its box, in exact arithmetic."""
     if not np.isfinite(forms.error[k, 0]):
         return True
-    linear = Fraction(float(forms.middle[k, 0]))
-    for i, slope in enumerate(forms.slopes[k, 0].tolist()):
-        centre = 0.5 * box[i, 0] + 0.5 * box[i, 1]
-        half = reach(box[i, 0], box[i, 1], centre)
-        if half:
-            linear += Fraction(slope) * (Fraction(float(point[i])) - Fraction(float(centre))) / Fraction(half)
+    half_width = quadratic_reach if isinstance(forms, QuadraticForms) else reach
+    e = []
+    for (low, high), at in zip(box.tolist(), point.tolist(), strict=True):
+        centre = 0.5 * low + 0.5 * high
+        half = half_width(low, high, centre)
+        e.append((Fraction(at) - Fraction(centre)) / Fraction(half) if half else Fraction(0))
+    value = Fraction(float(forms.middle[k, 0]))
+    value += sum(Fraction(slope) * at for slope, at in zip(forms.slopes[k, 0].tolist(), e, strict=True))
+    if isinstance(forms, QuadraticForms):
+        pairs = [e[i] * e[j] for j in range(len(e)) for i in range(j + 1)]
+        value += sum(Fraction(bend) * pair for bend, pair in zip(forms.bends[k, 0].tolist(), pairs, strict=True))
     error = Fraction(float(forms.error[k, 0]))
-    return linear - error <= Fraction(ends[0]) and Fraction(ends[1]) <= linear + error
+    return value - error <= Fraction(ends[0]) and Fraction(ends[1]) <= value + error
 
 
 def reach(low: float, high: float, centre: float) -> float:
@@ -132,18 +163,28 @@ def reach(low: float, high: float, centre: float) -> float:
     return float(ends[0])
 
 
+def quadratic_reach(low: float, high: float, centre: float) -> float:
+    """The same of forms of degree two, as ``reach`` in native/quadratic.hpp has it."""
+    far = max(high - centre, centre - low)
+    return far + (2.0**-51 * abs(far) + 1e-290)
+
+
 def main() -> None:
     """Check all operations."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
     rng = np.random.default_rng(SEED)
-    each = -(-count // len(OPERATIONS))
-    total = 0
-    for name in OPERATIONS:
-        missing = lost(name, each, rng)
-        total += len(missing)
-        for text in missing[:3]:
-            print(text)
-    print(f"{each * len(OPERATIONS):,} points of random boxes over {len(OPERATIONS)} operations: {total} lost")
+    for quadratic, operations in ((False, OPERATIONS), (True, QUADRATIC)):
+        each = -(-count // len(operations))
+        total = 0
+        for name in operations:
+            missing = lost(name, each, rng, quadratic=quadratic)
+            total += len(missing)
+            for text in missing[:3]:
+                print(text)
+        kind = "forms of degree two" if quadratic else "affine forms"
+        print(
+            f"{kind}: {each * len(operations):,} points of random boxes over {len(operations)} operations, {total} lost"
+        )
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import functools
 import inspect
 import io
 import os
+import select
 import sys
 import unicodedata
 from collections.abc import Callable, Iterator
@@ -84,17 +85,28 @@ def run_app(app: Callable[[], object]) -> None:
 
 
 def _say(error: OSError) -> None:
-    """The sentence for output that could not be written; none where its reader has gone, as with ``| head``.
+    """The sentence for what could not be written; none where the output's reader has gone, as with ``| head``.
 
     Raises:
         OSError: it is another one.
     """
     if error.errno not in (*NO_ROOM, errno.EPIPE):
         raise error
+    gone = error.errno == errno.EPIPE and _readers_gone()
     # What is left in the buffers is dropped, so that the interpreter does not fail on it at its end.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
         say_error(f"cannot write the output: {error.strerror}")
+    elif not gone:
+        say_error("a process that this one began has ended before its time")
+
+
+def _readers_gone() -> bool:
+    """Whether an output is a pipe that nobody reads any more."""
+    outputs = select.poll()
+    for stream in (sys.stdout, sys.stderr):
+        outputs.register(stream.fileno(), select.POLLOUT)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in outputs.poll(0))
 
 
 def _open_outputs() -> None:

@@ -21,7 +21,7 @@ from metaheuristics import installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
 from metaheuristics.adapters.egobox import BayesianOptimisation
 from nlp_gait.backends.interrupts import Interrupted
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
-CONDENSED = "condensed"
 ALL, ALL_GRADIENT, BAYES = "all", (IPOPT, "slsqp"), BayesianOptimisation.name
 # Options that say how and where a study runs; all others decide what it computes and stand in a study file.
 OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
@@ -46,7 +45,7 @@ def compare(
         str,
         typer.Option(
             help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` is every search that is "
-            f"installed (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT, the condensed method and SLSQP."
+            f"installed (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
@@ -198,8 +197,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
     """The named solvers with IPOPT before them; without starts, those that need none.
 
-    Where nobody named any, and in all, the condensed method takes part too, if there is the compiler that it needs. Bayesian
-    optimisation is one of all only where it can use up the budget.
+    Bayesian optimisation is one of all only where it can use up the budget.
     """
     names = names_in(algorithms)
     if ALL in names:
@@ -210,23 +208,11 @@ def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
             )
             every.remove(BAYES)
         names = [*dict.fromkeys([*every, *(name for name in names if name != ALL)])]
-    if (algorithms == DEFAULT_ALGORITHMS or ALL in names_in(algorithms)) and _has_compiler():
-        names.insert(0, CONDENSED)
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]
     elif IPOPT not in names:
         names.insert(0, IPOPT)
     return [SolverSpec(algorithm=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
-
-
-def _has_compiler() -> bool:
-    from nlp_gait.backends.kernel.compiler import find_compiler
-
-    try:
-        find_compiler()
-    except CompilerError:
-        return False
-    return True
 
 
 def _refuse_others(context: typer.Context, flag: str) -> None:

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from functools import partial
 from typing import TypeVar
@@ -54,8 +54,6 @@ def run_jobs(
         yield position, record
     if len(here) == len(jobs):
         return
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
     waiting = {position: job for position, job in enumerate(jobs) if position not in here}
     deaths = 0
     with ExitStack() as stack:
@@ -68,7 +66,7 @@ def run_jobs(
                     del waiting[position]
                     deaths = 0
                     yield position, record
-            except TerminatedWorkerError as error:
+            except WorkerError as error:
                 deaths += 1
                 if deaths == DEATHS_WITHOUT_PROGRESS:
                     raise WorkerError(
@@ -78,22 +76,33 @@ def run_jobs(
 
 
 def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator[tuple[int, T]]:
-    """Number and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are."""
+    """Number and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are.
+
+    Raises:
+        WorkerError: a worker process died, or none begins.
+    """
     from joblib import Parallel, delayed  # costs 0.1 s to import
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     # Dask's workers belong to its scheduler.
     begin = {} if workers < 0 else {"initializer": end_with, "initargs": (os.getpid(),)}
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
-    with children_ignore_interrupts():
-        folder = os.getcwd() if workers > 0 else None  # another machine has other folders
-        results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
+    results: Generator[tuple[int, T], None, None] | None = None
     try:
+        with children_ignore_interrupts():
+            folder = os.getcwd() if workers > 0 else None  # another machine has other folders
+            results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
         for result in results:  # noqa: UP028  `yield from` would close them before what is below
             yield result
+    except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
+        raise WorkerError(
+            "a worker process died, out of memory perhaps; what is finished is kept: call again"
+        ) from error
     finally:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # joblib tells of the calls that end with whoever stops asking
-            results.close()
+            if results is not None:
+                results.close()
 
 
 def end_with(parent: int) -> None:

@@ -357,14 +357,15 @@ class GaitProblem:
         return found
 
     def _parameter(self, name: str) -> Parameter:
-        for parameter in self.parameters:
-            if isinstance(name, str) and parameter.name == name:
-                return parameter
-        if name in self.options:
-            raise UnknownNameError(
-                f"{name!r} is an option of {self.name}, no parameter: another value makes another problem; "
-                f"build it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
-            )
+        if isinstance(name, str):
+            for parameter in self.parameters:
+                if parameter.name == name:
+                    return parameter
+            if name in self.options:
+                raise UnknownNameError(
+                    f"{name!r} is an option of {self.name}, no parameter: another value makes another problem; "
+                    f"build it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
     def _check_pairs(self) -> None:

@@ -39,6 +39,9 @@ def real_numbers(what: str, values: object) -> Array:
         array = np.asarray(values)
         if array.dtype.kind == "O" and all(isinstance(v, Real) and not isinstance(v, bool) for v in array.flat):
             return array.astype(np.float64)
+        if array.dtype.kind in "iuf" and not isinstance(values, np.ndarray):  # true among numbers would become 1
+            if any(isinstance(v, (bool, np.bool_)) for v in np.asarray(values, dtype=object).flat):
+                raise InputError(f"{what} must be numbers, got true or false among them")
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what} must be numbers, got {type(values).__name__}: {error}") from error
     if array.dtype.kind not in "iuf":

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
 from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown, warn_once
-from nlp_gait.files import refusing
+from nlp_gait.files import check_path, refusing
 from nlp_gait.robots.fields import check_name
 from nlp_gait.robots.inertia import check_inertias, shifted_to_com
 from nlp_gait.robots.mjcf import mjcf_points, mjcf_record
@@ -106,6 +106,7 @@ def load_robot(name_or_path: str) -> Robot:
     """
     if not isinstance(name_or_path, str):
         raise UnknownNameError(f"the name of a robot must be a text, got {shown(name_or_path)}")
+    check_path(name_or_path, f"robot {name_or_path!r}", RobotDataError)
     return _made_from(name_or_path) if is_robot_file(name_or_path) else _loaded(name_or_path)
 
 

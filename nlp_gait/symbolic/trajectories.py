@@ -41,6 +41,24 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
     )
 
 
+def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, phase: SX) -> Motion:
+    """Cubic polynomial over unit time through given ends; the same as ``cubic``, in other coefficients.
+
+    Args:
+        start: position at phase 0 [u].
+        end: position at phase 1 [u].
+        half_sum: half of the sum of the velocities at both ends in unit time (velocities times the duration) [u].
+        half_difference: half of that at phase 0 less that at phase 1 [u].
+        phase: time / duration.
+    """
+    rise, bow = end - start, phase * (1 - phase)
+    return Motion(
+        start + phase**2 * (3 - 2 * phase) * rise + bow * ((1 - 2 * phase) * half_sum + half_difference),
+        6 * bow * rise + (1 - 6 * bow) * half_sum + (1 - 2 * phase) * half_difference,
+        (6 - 12 * phase) * rise + (12 * phase - 6) * half_sum - 2 * half_difference,
+    )
+
+
 def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX) -> Motion:
     """Height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
 

@@ -14,9 +14,10 @@ import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
-from nlp_gait.robots.robot import Joint
+from nlp_gait.robots.robot import Joint, Link
 from nlp_gait.robots.tree import Body
 from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.inverse_kinematics import knee_cosine
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, through
 
@@ -162,6 +163,85 @@ def world_frame_dynamics(
             torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
     moments = (ca.cross(c - references[0], f) + s for c, f, s in zip(centres, forces, spins, strict=True))
     return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
+
+
+class PartedWrench(NamedTuple):
+    """Wrench that a moving body asks for: what gravity asks for, and what its motion in unit time does.
+
+    In a time T, the second part counts 1 / T^2 as much. Both are about one point.
+    """
+
+    gravity: Wrench
+    inertia: Wrench
+
+    def plus(self, other: PartedWrench) -> PartedWrench:
+        """Sum of two about one point."""
+        return PartedWrench(*(Wrench(a.force + b.force, a.moment + b.moment) for a, b in zip(self, other, strict=True)))
+
+    def times(self, share: SX) -> PartedWrench:
+        """A share of it."""
+        return PartedWrench(*(Wrench(share * part.force, share * part.moment) for part in self))
+
+    def about(self, arm: SX) -> PartedWrench:
+        """The same about another point, from which ``arm`` (3,) leads to its own [m]."""
+        return PartedWrench(*(Wrench(part.force, part.moment + ca.cross(arm, part.force)) for part in self))
+
+    def in_time(self, rate_squared: SX) -> Wrench:
+        """The whole wrench, of a motion 1 / sqrt(rate_squared) as long as unit time."""
+        return Wrench(*(g + rate_squared * i for g, i in zip(*self, strict=True)))
+
+
+def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> PartedWrench:
+    """Wrench that a link asks for, about the origin of its frame.
+
+    Args:
+        link: its mass and inertia.
+        axes: (3, 3) motion of its axes in unit time.
+        acceleration: (3,) of the frame's origin in unit time [m].
+        gravity: magnitude, acting along -z [m/s^2].
+
+    Source:
+        Sum over the link's matter, by its second moments about the frame's origin.
+    """
+    mass, com, inertia = link.mass_kg, np.array(link.com_m), link.inertia_matrix
+    second = np.trace(inertia) / 2 * np.eye(3) - inertia + mass * np.outer(com, com)
+    arm, bent = axes.position @ DM(mass * com), axes.acceleration @ DM(second)
+    force = mass * acceleration + axes.acceleration @ DM(mass * com)
+    moment = sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), ca.cross(arm, acceleration))
+    weight = Wrench(SX(DM([0, 0, mass * gravity])), ca.vertcat(gravity * arm[1], -gravity * arm[0], 0))
+    return PartedWrench(weight, Wrench(force, moment))
+
+
+class LegRates(NamedTuple):
+    """Rates of a leg's joints from the hip downwards, and the squared distance of hip and ankle [m^2]."""
+
+    joints: tuple[SX, SX, SX, SX, SX]
+    distance_squared: SX
+
+
+def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> LegRates:
+    """Rates of roll, pitch, knee, ankle pitch and ankle roll, without their angles.
+
+    Args:
+        hip_to_ankle: (3,) motion of the ankle seen from the hip joint [m].
+        thigh: hip to knee [m].
+        tibia: knee to ankle [m].
+        largest_cosine: of the knee's angle (see ``leg_frames``).
+
+    Source:
+        Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``inverse_kinematics.leg_angles``.
+    """
+    (x, y, z), (xd, yd, zd), _ = (ca.vertsplit(part) for part in hip_to_ankle)
+    length_squared = y * y + z * z
+    length = ca.sqrt(length_squared)
+    lengthd = (y * yd + z * zd) / length
+    distance_squared = x * x + length_squared
+    bent = ca.fmin(distance_squared, thigh**2 + tibia**2 + 2 * thigh * tibia * largest_cosine)
+    cosine = knee_cosine(bent, thigh, tibia)
+    knee = -(x * xd + y * yd + z * zd) / (thigh * tibia) / ca.sqrt(1 - cosine * cosine)
+    roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
+    pitch = (x * lengthd - length * xd) * inverse - (0.5 + (tibia**2 - thigh**2) / 2 * inverse) * knee
+    return LegRates((roll, pitch, knee, -(pitch + knee), -roll), distance_squared)
 
 
 def _carried(tree: Sequence[Body]) -> list[list[int]]:

@@ -15,6 +15,7 @@ from nlp_gait.problems.walk12.playback import rigid_bodies  # noqa: E402
 from nlp_gait.problems.walk12.robot import point_mass_biped  # noqa: E402
 
 
+@pytest.mark.slow
 def test_random_gaits_are_feasible_and_seeded():
     problem = nlp_gait.load("nao-dsp")
     found = gaits.random_gaits(problem, 3, seed=3)

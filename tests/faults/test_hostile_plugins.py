@@ -130,6 +130,7 @@ def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
     assert [record.success for record in records] == [False, True, True] and "by status 7" in records[0].status
 
 
+@pytest.mark.slow
 def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient: None, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(
         "def stubborn(f, lower, upper, evaluations, seed):\n"

@@ -12,6 +12,7 @@ import pytest
 from compare.cli.command import PLAIN, run_app
 from nlp_gait import load, solve, solver
 from nlp_gait.backends.kernel.compiler import _find, find_compiler
+from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
 
@@ -64,6 +65,15 @@ def test_help_that_cannot_be_written_is_said(asked: str) -> None:
 
 
 @pytest.mark.slow
+def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
+    pipe = "import errno, sys; from compare.cli.command import run_app\ndef fails(): raise BrokenPipeError(errno.EPIPE, '')\n"
+    program = f'{sys.executable} -c "{pipe}run_app(fails)"'
+    done = shell(program)
+    assert (done.returncode, done.stderr) == (1, "nlp-gait: a process that this one began has ended before its time\n")
+    assert shell(f"{{ sleep 0.2; {program}; echo $? >&2; }} | true").stderr == "1\n"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -79,6 +89,16 @@ def test_a_name_that_is_no_text_is_refused_before_the_work(arguments: str, tmp_p
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
     assert "its name is no valid UTF-8; choose another name" in done.stderr
     assert list(tmp_path.iterdir()) == [] and done.stdout == ""
+
+
+def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"f\xff")
+    folder.mkdir()
+    (folder / "mine.json").write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
+    (folder / "own.py").write_text("from nlp_gait import load\nwalk = load('walk12')\n")
+    for problem, options in (("nao-dsp", {"robot": f"{folder}/mine.json"}), (f"{folder}/own.py:walk", {})):
+        with pytest.raises(GaitError, match="no valid UTF-8; choose another name"):
+            load(problem, **options)
 
 
 @pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])

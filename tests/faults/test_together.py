@@ -52,6 +52,7 @@ def test_a_difference_would_be_found() -> None:
         assert together.different(pool, 2, lambda k: serial[k]._replace(objective=1.5), serial) == 4
 
 
+@pytest.mark.slow
 def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
     problem = nlp_gait.load("walk12")
     points = [problem.start_point(np.random.default_rng(k)) for k in range(8)]
@@ -170,12 +171,15 @@ def same(first: GaitProblem, second: GaitProblem) -> bool:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: nlp_gait.load("walk12").with_values(**{"lambda": 0.15}),
-        lambda: nlp_gait.load("nao-ssp", robot="nao-v5@mass=1.05", intervals=10).fix(swing_height_m=0.024),
-        lambda: nlp_gait.load("nao-dsp").dense(2),
-        lambda: nlp_gait.load(f"{EXAMPLE}:two_link", intervals=10),
+        pytest.param(lambda: nlp_gait.load("walk12").with_values(**{"lambda": 0.15}), id="values"),
+        pytest.param(
+            lambda: nlp_gait.load("nao-ssp", robot="nao-v5@mass=1.05", intervals=10).fix(swing_height_m=0.024),
+            id="options",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(lambda: nlp_gait.load("nao-dsp").dense(2), id="dense", marks=pytest.mark.slow),
+        pytest.param(lambda: nlp_gait.load(f"{EXAMPLE}:two_link", intervals=10), id="own code"),
     ],
-    ids=["values", "options", "dense", "own code"],
 )
 def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[], GaitProblem]) -> None:
     problem = make()

@@ -47,7 +47,12 @@ def test_equal_seeds_give_identical_runs_within_budget_and_bounds(name: str) -> 
 
 @pytest.mark.parametrize(
     ("name", "evaluations", "within"),
-    [("scipy:SLSQP", 120, 1e-6), ("scipy:COBYQA", 300, 1e-6), ("cma-al", 600, 1e-4), ("bayes", 40, 0.02)],
+    [
+        ("scipy:SLSQP", 120, 1e-6),
+        ("scipy:COBYQA", 300, 1e-6),
+        ("cma-al", 600, 1e-4),
+        pytest.param("bayes", 40, 0.02, marks=pytest.mark.slow),
+    ],
 )
 def test_an_optimum_on_a_constraint_is_found_from_inside(name: str, evaluations: int, within: float) -> None:
     result = minimize(Disc(), algorithm(name), evaluations=evaluations, seed=0)

@@ -66,6 +66,7 @@ def test_a_robot_file_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint(name="leg", value=f"{EXAMPLE}:two_link", group=references.GROUPS["problem"])
     monkeypatch.setattr(references, "entry_points", lambda group: EntryPoints([point]).select(group=group))
+    monkeypatch.setattr(references, "_entry_points", references._entry_points.__wrapped__)
     assert load("leg").name == "two-link" and ProblemSpec(name="leg").title == "leg"
     with pytest.raises(UnknownNameError, match="did you mean 'leg'"):
         load("lag")

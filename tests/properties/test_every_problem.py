@@ -174,7 +174,14 @@ def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     assert_derivative(slope, bend, at, (values, np.random.default_rng(3).normal(size=g.shape[0])))
 
 
-@pytest.mark.parametrize("name", [name for name in SMOOTH if not name.startswith("nao-")])  # those: test_nlp.py
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in ("humanoid-dsp", "humanoid-cycle") else [])
+        for name in SMOOTH
+        if not name.startswith("nao-")  # those: test_nlp.py
+    ],
+)
 def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
     model, at, values = inside(name)
     x, p, f, g = (model.nlp[key] for key in "xpfg")

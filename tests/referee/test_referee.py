@@ -101,6 +101,7 @@ def in_order(X: Array) -> Array:
     return np.all(np.diff(X[:, 6:9], axis=1) > 0.05, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "ratio", "agreement"), [(0.508, 0.70, AGREEMENT), (0.5588, 0.60, 1e-8)])
 def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: float) -> None:
     """Energy, jerk and all rows on a stair of Table IV, and on a flatter one, which stretches its cycloid.
@@ -117,6 +118,7 @@ def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: floa
     assert worst(found)[0] < agreement, worst(found)
 
 
+@pytest.mark.slow
 def test_the_ideal_step_on_stairs() -> None:
     """Effort and all 1,560 variables' rows: continuity, feet, clearance, and the ground's forces of every interval."""
     problem = nlp_gait.load("stairs-ideal")
@@ -129,6 +131,7 @@ def test_the_ideal_step_on_stairs() -> None:
     assert worst(found)[0] < AGREEMENT, worst(found)
 
 
+@pytest.mark.slow
 def test_reach_is_judged_alike_out_of_reach() -> None:
     """Also where the legs do not reach, and at knots out of order, what the papers still define is the same."""
     ssp, robot = nlp_gait.load("nao-ssp"), nao.robot()

@@ -70,21 +70,14 @@ def faults(text: str) -> Iterator[str]:
                 yield f"line {node.lineno}: allow_pickle"
         if called.startswith("subprocess.") and node.args and isinstance(node.args[0], (ast.Constant, ast.JoinedStr)):
             yield f"line {node.lineno}: a command as one text"
+        if called == "np.load" and not any(keyword.arg == "allow_pickle" for keyword in node.keywords):
+            yield f"line {node.lineno}: an archive that may hold objects"
 
 
-def loads_arrays(text: str) -> Iterator[int]:
-    """Lines that read NumPy archives without saying that they hold no objects."""
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Call) and dotted(node.func) == "np.load":
-            if not any(keyword.arg == "allow_pickle" for keyword in node.keywords):
-                yield node.lineno
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_no_code_is_made_from_data(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert not list(faults(text))
-    assert not list(loads_arrays(text))
+def test_no_code_is_made_from_data() -> None:
+    assert len(SOURCES) > 400
+    found = {path.relative_to(ROOT).as_posix(): list(faults(path.read_text(encoding="utf-8"))) for path in SOURCES}
+    assert not {name: lines for name, lines in found.items() if lines}
 
 
 @pytest.mark.parametrize(
@@ -99,6 +92,7 @@ def test_no_code_is_made_from_data(path: Path) -> None:
         "subprocess.run(command, shell=True)",
         "subprocess.run(command, shell=chosen)",
         "subprocess.run('c++ source.cpp')",
+        "np.load(path)",
         "np.load(path, allow_pickle=True)",
     ],
 )
@@ -109,4 +103,4 @@ def test_the_scan_finds(text: str) -> None:
 
 def test_the_scan_knows_what_is_allowed() -> None:
     assert not list(faults("subprocess.run([compiler, name], shell=False)\nmodel.eval(1)\nre.compile('a')"))
-    assert list(loads_arrays("np.load(path)")) and not list(loads_arrays("np.load(path, allow_pickle=False)"))
+    assert not list(faults("np.load(path, allow_pickle=False)"))

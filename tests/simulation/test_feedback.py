@@ -74,6 +74,7 @@ def test_the_same_seed_gives_the_same_walk_and_noise_and_delay_act(plan: Plan) -
         assert np.abs(played(plan, other).q[: len(first.q)] - first.q).max() > 1e-5
 
 
+@pytest.mark.slow
 def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
     """In single support one foot has it all; in between, the point that divides the way between them is nearest to the ZMP."""
     single, double, period = 0.4, 0.56565, 0.96565

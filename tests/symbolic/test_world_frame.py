@@ -11,9 +11,10 @@ from benchmarks.guarantees.bounds import errors
 from nlp_gait.problems.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion
-from nlp_gait.symbolic.world_frame import world_frame_dynamics
+from nlp_gait.symbolic.world_frame import leg_rates, world_frame_dynamics
 
 SEED = 11
 GRAVITY = 9.8
@@ -51,6 +52,20 @@ def test_torques_and_wrench_are_the_recursions(robot: str, share: float) -> None
         swung = [rng.normal(0.0, 1.0, 1) for _ in range(3 * len(arms))]
         a, b = function(*paths[0], np.array([0.03, 0.05, 0.045]), *paths[1], *swung)
         np.testing.assert_allclose(np.array(a.full()), np.array(b.full()), atol=50 * ROUNDING)
+
+
+def test_rates_of_a_leg_are_those_of_its_angles() -> None:
+    thigh, tibia = 0.1, 0.1029
+    apart = moving("apart", 3)
+    angles = leg_angles(apart, thigh, tibia, SX(0.01), Exact())
+    rates = leg_rates(apart, thigh, tibia, 0.99)
+    both = ca.Function("both", [*apart], [angles.joints.velocity, ca.vertcat(*rates.joints), rates.distance_squared])
+    rng = np.random.default_rng(SEED)
+    for _ in range(20):
+        place = np.array([0.02, 0.01, -0.17]) + rng.normal(0.0, 0.01, 3)
+        expected, found, squared = both(place, rng.normal(0.0, 0.1, 3), np.zeros(3))
+        np.testing.assert_allclose(found.full(), expected.full(), atol=10 * ROUNDING)
+        assert float(squared) == pytest.approx(place @ place)
 
 
 def test_over_a_box_bounds_of_torques_are_a_tenth_as_wide() -> None:

@@ -25,7 +25,7 @@ def certainty(
     ] = 1_000_000,
     tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
     time_limit: Annotated[
-        float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables; 0 for none.")
+        float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
     ] = 600.0,
     seed: Seed = 0,
     problem: AnyProblem,

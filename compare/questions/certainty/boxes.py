@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ class BoxBounds:
 
     Attributes:
         function: of x and p to cost and rows; the last n rows are the variables themselves.
+        whole: (1, n, 2) box of all variables' bounds.
     """
 
     def __init__(self, problem: GaitProblem) -> None:
@@ -64,17 +66,15 @@ class BoxBounds:
         self._symbols = np.concatenate([np.arange(n), np.full(len(problem.p), -1)])
         self._scale = problem.scale
         self.function = AffineFunction(kernel.function)
+        self.whole = np.stack([problem.lower, problem.upper], axis=-1)[None]
 
     def assess(self, boxes: Array, target: float) -> Assessed:
         """What is left of boxes (P, n, 2) when no cost of the target or more is of interest; in threads, box by box alike."""
-        parts = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
-        if len(parts) == 1:
-            return self._assess(boxes, target)
-        with ThreadPoolExecutor(len(parts)) as threads:
-            found = list(threads.map(lambda part: self._assess(boxes[part], target), parts))
-        whole = [np.concatenate(columns) for columns in zip(*found, strict=True)]
-        whole[3] = np.concatenate([part[f.origin] for part, f in zip(parts, found, strict=True)])
-        return Assessed(*whole)
+        return in_threads(lambda part: self._assess(part, target), boxes)
+
+    def place(self, x: Array) -> Array:
+        """The points themselves."""
+        return x
 
     def _assess(self, boxes: Array, target: float) -> Assessed:
         origin, done = np.arange(len(boxes)), list[Assessed]()
@@ -141,6 +141,18 @@ class BoxBounds:
         relative = width / np.maximum(width.max(axis=-1, keepdims=True), 1e-300)
         score = (share.max(axis=1) + WIDTH_WEIGHT) * relative
         return np.asarray(score.argmax(axis=-1))
+
+
+def in_threads(assess: Callable[[Array], Assessed], boxes: Array) -> Assessed:
+    """Boxes assessed in parts, box by box alike."""
+    parts = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
+    if len(parts) == 1:
+        return assess(boxes)
+    with ThreadPoolExecutor(len(parts)) as threads:
+        found = list(threads.map(lambda part: assess(boxes[part]), parts))
+    whole = [np.concatenate(columns) for columns in zip(*found, strict=True)]
+    whole[3] = np.concatenate([part[f.origin] for part, f in zip(parts, found, strict=True)])
+    return Assessed(*whole)
 
 
 def halves(boxes: Array, cut: Numbers) -> Array:

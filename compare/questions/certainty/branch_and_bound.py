@@ -1,6 +1,6 @@
 """Branch and bound with rigorous bounds: how good any feasible x can be.
 
-A box is dropped when affine bounds of its rows show that no point in it is feasible, or of its cost that none betters the
+A box is dropped when bounds of its rows show that no point in it is feasible, or of its cost that none betters the
 incumbent by more than the tolerance; the slabs of it in which that is so are cut off. The rest is halved, the box with the best
 bound first. What happens to a box depends on the box alone, so that any path from the whole to a dropped box can be followed
 again (``certificate.py``).
@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.questions.certainty.boxes import BoxBounds, Numbers, halves
+from compare.questions.certainty.bounds import Bounds, bounds_of
+from compare.questions.certainty.boxes import Numbers, halves
 from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
 from nlp_gait.backends.exact import exact_model
@@ -29,7 +30,8 @@ from nlp_gait.files import new_file
 from nlp_gait.problem import Array, GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
-BATCH = 1024
+# Boxes that are halved together: so many, or this share of all that are open, so that keeping order costs little.
+BATCH, SHARE = 1024, 8
 CHECKPOINT_S = 30.0
 
 
@@ -125,9 +127,11 @@ def certify(
     if not at.violation <= FEASIBILITY_TOLERANCE:
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
-    bounds, target = BoxBounds(problem), target_of(at.cost, tolerance)
-    identity = sha256_of({**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance})
-    tree = _read(checkpoint, identity) or _root(bounds, problem, target)
+    bounds, target = bounds_of(problem), target_of(at.cost, tolerance)
+    identity = sha256_of(
+        {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "whole": bounds.whole.tolist()}
+    )
+    tree = _read(checkpoint, identity) or _root(bounds, target)
     before = tree.time_s, tree.cpu_s
     saved = started
 
@@ -162,20 +166,16 @@ def target_of(cost: float, tolerance: float) -> float:
     return cost - tolerance * abs(cost)
 
 
-def whole(problem: GaitProblem) -> Array:
-    """(1, n, 2) box of all variables' bounds."""
-    return np.stack([problem.lower, problem.upper], axis=-1)[None]
-
-
-def _root(bounds: BoxBounds, problem: GaitProblem, target: float) -> _Tree:
-    boxes, lowest, cut, origin = bounds.assess(whole(problem), target)
+def _root(bounds: Bounds, target: float) -> _Tree:
+    boxes, lowest, cut, origin = bounds.assess(bounds.whole, target)
     return _Tree(boxes=boxes, lowest=lowest, cut=cut, depth=np.zeros(len(origin)))
 
 
-def _advance(tree: _Tree, bounds: BoxBounds, target: float) -> None:
+def _advance(tree: _Tree, bounds: Bounds, target: float) -> None:
     """Halve the boxes with the best bounds."""
     order = np.argsort(tree.lowest, kind="stable")
-    chosen, rest = order[:BATCH], order[BATCH:]
+    batch = max(BATCH, len(order) // SHARE)
+    chosen, rest = order[:batch], order[batch:]
     new = halves(tree.boxes[chosen], tree.cut[chosen])
     tree.enclosed += len(new)
     found = bounds.assess(new, target)

@@ -11,12 +11,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from compare.questions.certainty import boxes, branch_and_bound
-from compare.questions.certainty.boxes import BoxBounds, halves
-from compare.questions.certainty.branch_and_bound import Certificate, target_of, whole
+from compare.questions.certainty import boxes, branch_and_bound, power_bounds, power_form, power_instants
+from compare.questions.certainty.bounds import bounds_of
+from compare.questions.certainty.boxes import halves
+from compare.questions.certainty.branch_and_bound import Certificate, target_of
 from compare.study.definition import problem_part, sha256_of
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.kernel import affine
+from nlp_gait.backends.kernel import affine, quadratic
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing
@@ -24,6 +25,7 @@ from nlp_gait.problem import GaitProblem, load
 from nlp_gait.problem.result import StoredProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.references import named_as
+from nlp_gait.symbolic import world_frame
 
 SCHEMA = 1
 PATHS = 200
@@ -112,8 +114,8 @@ def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
     target = target_of(at.cost, proof.tolerance)
     if not problem.objective.sign * proof.bound <= target + SAME_VALUE * abs(target):
         raise InputError(f"the certificate's bound {proof.bound} says more than its tolerance {proof.tolerance}")
-    bounds, rng = BoxBounds(problem), np.random.default_rng(seed)
-    open_, _, cut, origin = bounds.assess(np.repeat(whole(problem), paths, axis=0), target)
+    bounds, rng = bounds_of(problem), np.random.default_rng(seed)
+    open_, _, cut, origin = bounds.assess(np.repeat(bounds.whole, paths, axis=0), target)
     path, weight, sizes, dropped = origin, np.ones(len(origin)), np.ones(paths), paths - len(origin)
     for depth in range(DEEPEST_PATH):
         if not len(path):
@@ -147,6 +149,9 @@ def _problem(description: Mapping[str, Any]) -> GaitProblem:
 def _code() -> str:
     """Hash of all that decides what happens to a box."""
     native = files("nlp_gait.backends.kernel") / "native"
-    texts = [inspect.getsource(module) for module in (affine, boxes, branch_and_bound)]
-    texts += [(native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp")]
+    modules = (affine, quadratic, world_frame, boxes, branch_and_bound, power_bounds, power_form, power_instants)
+    texts = [inspect.getsource(module) for module in modules]
+    texts += [
+        (native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp", *quadratic.SOURCES)
+    ]
     return sha256_of(texts)

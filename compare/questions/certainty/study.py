@@ -12,7 +12,7 @@ import numpy as np
 
 import metaheuristics
 from compare.analysis.units import with_unit
-from compare.questions.certainty import boxes, branch_and_bound
+from compare.questions.certainty import bounds, boxes, branch_and_bound, power_bounds, power_form, power_instants
 from compare.questions.certainty.branch_and_bound import Certificate, certify
 from compare.questions.certainty.certificate import certificate_file
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
@@ -28,7 +28,8 @@ from nlp_gait.files import without_nan
 from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
-# Branch and bound is for this many variables at most: its work grows exponentially with them.
+# Branch and bound is for this many variables at most, for its work grows exponentially with them; NAO's phases have bounds of
+# their own, narrow enough for nine.
 MOST_CERTIFIED = 4
 
 
@@ -74,7 +75,7 @@ class Certainty:
         """What is proven, in one sentence."""
         c = self.certificate
         if c is None:
-            return "nothing: branch and bound is for smooth problems of at most four variables"
+            return "nothing: branch and bound is for problems of at most four variables and for NAO's phases"
         if not math.isfinite(c.bound):
             return f"nothing: the time limit came before a finite bound, after {c.boxes:,} boxes"
         unit = self.problem.objective.unit
@@ -83,7 +84,7 @@ class Certainty:
         return (
             f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
             + ("the tolerance was reached" if c.closed else "the time limit came before the tolerance")
-            + "; affine arithmetic rounded outward, libm's functions taken to be within four units in the last place"
+            + "; bounds rounded outward, libm's functions taken to be within four units in the last place"
         )
 
     @property
@@ -165,7 +166,9 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, progress, code=[boxes, branch_and_bound], anew=anew)
+    steps = Steps(
+        out, progress, code=[bounds, boxes, branch_and_bound, power_bounds, power_form, power_instants], anew=anew
+    )
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -187,7 +190,7 @@ def certainty(
     if evaluations:
         inputs = {**identity, "evaluations": evaluations, "seed": seed}
         search = decoded(LongSearch, steps("cma", inputs, searched))
-    if time_limit_s and len(problem.names) <= MOST_CERTIFIED:
+    if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or power_form.has_power_form(problem)):
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
         certificate = decoded(Certificate, steps("certificate", inputs, proven))
     return Certainty(

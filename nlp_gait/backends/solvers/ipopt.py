@@ -51,13 +51,14 @@ class IpoptSettings(Solver):
 
     Attributes:
         tolerance: IPOPT's ``tol``.
-        iterations: limit of iterations for each stage, and in the first for each set of rows, see ``working_set``.
+        iterations: limit of iterations for each stage, and in the first for each set of rows.
         time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
         hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
         compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
             is a compiler.
         linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is refused: IPOPT
             never takes another one in its place.
+        few_rows: begin with the rows that matter, see ``working_set``; False for all of them from the start.
     """
 
     name: ClassVar[str] = "ipopt"
@@ -68,6 +69,7 @@ class IpoptSettings(Solver):
     hessian: str | None = None
     compiled: bool | None = None
     linear_solver: str | None = None
+    few_rows: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what IPOPT would refuse late."""
@@ -158,8 +160,8 @@ class Ipopt(StagedSolver):
             "ipopt.warm_start_mult_bound_push": 1e-6,
         }
         self.warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
-        rows = nlp["g"].shape[0]
-        self.cold = self._of_ipopt if rows < LEAST_ROWS else self._on_few_rows(problem, general)
+        few = settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS
+        self.cold = self._on_few_rows(problem, general) if few else self._of_ipopt
         self.create_s = time.perf_counter() - started
 
     def _on_few_rows(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:

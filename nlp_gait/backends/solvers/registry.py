@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from nlp_gait.backends.solvers.condensed import CondensedSettings
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
 from nlp_gait.backends.solvers.slsqp import Slsqp
@@ -16,9 +15,7 @@ from nlp_gait.errors import InputError, check_name, unknown
 from nlp_gait.files import refusing
 
 # A solver joins by a line here.
-SOLVERS: Mapping[str, type[Solver]] = {
-    solver.name: solver for solver in (IpoptSettings, CondensedSettings, Slsqp, Fatrop, Sqpmethod, Uno)
-}
+SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
 
 
 def solver(name: str, /, **settings: Any) -> Solver:

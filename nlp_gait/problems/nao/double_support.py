@@ -120,15 +120,19 @@ def double_support_duration(at: InstantPoint) -> SX:
 
 
 def double_support_hip(at: InstantPoint, more: Mapping[str, Motion], soles: Mapping[str, Point2], phase: SX) -> Motion:
-    """Motion of the torso's origin (3,) between standing feet [m] (Table 5, rows 1 to 3), and what each curve adds.
+    """Motion of the torso's origin (3,) between standing feet [m] (Table 5, rows 1 to 3), and what each curve adds."""
+    return hip_on_spline(at, more, *hip_ends(soles), double_support_duration(at), phase)
+
+
+def hip_ends(soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
+    """Where the torso's origin is at both ends in x and in y [m].
 
     The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, rounded to a micrometre so
     that the paper's numbers come out exactly, and from halfway to the left foot to halfway to the right one.
     """
     (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
     sixth = (front_x - rear_x) / 6
-    hip_x, hip_y = (round(rear_x + sixth, 6), round(front_x - sixth, 6)), (left_y / 2, right_y / 2)
-    return hip_on_spline(at, more, hip_x, hip_y, double_support_duration(at), phase)
+    return (round(rear_x + sixth, 6), round(front_x - sixth, 6)), (left_y / 2, right_y / 2)
 
 
 def _planner(robot: Robot, soles: Mapping[str, Point2], splines: Splines) -> Planner:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -142,6 +142,15 @@ def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
     return np.hstack(s), np.hstack(passing)
 
 
+@cache
+def _dynamics() -> ca.Function:
+    """What ``loads`` finds, of (q, qd, qdd, force on the rear toe); alike in every interpretation."""
+    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
+    toe = SX.sym("toe", 2)
+    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    return ca.Function("loads", [q, qd, qdd, toe], list(found))
+
+
 def sample_function(ops: Nonsmooth) -> ca.Function:
     """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``PlanSamples``.
 
@@ -150,11 +159,7 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
     inputs, plan, stair, step = _planned(ops)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
-    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
-    toe = SX.sym("toe", 2)
-    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
-    dynamics = ca.Function("loads", [q, qd, qdd, toe], list(found))
-
+    dynamics = _dynamics()
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))

@@ -240,8 +240,9 @@ def test_the_tracked_step_is_the_same_on_every_lane_count(lanes: int) -> None:
         np.full((1, 9), "2026-01-01", dtype="datetime64[D]"),
         np.full((1, 9), None),
         np.full((1, 9), "0.1", dtype=object),
+        [[0.1] * 8 + [True]],
     ],
-    ids=["complex", "masked", "text", "true", "date", "none", "text object"],
+    ids=["complex", "masked", "text", "true", "date", "none", "text object", "true among numbers"],
 )
 def test_what_numpy_would_make_numbers_of_in_silence_is_refused(given: Any) -> None:
     problem, objective = problem_named("nao-ssp"), objective_of("nao-ssp")

@@ -122,7 +122,9 @@ def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
     assert found.holds and found.sampled == ("wave",) and "on samples alone" in str(found)
 
 
-@pytest.mark.parametrize(("name", "instance"), [("nao-ssp", "ssp-v5"), ("walk12", "walk12-w015")])
+@pytest.mark.parametrize(
+    ("name", "instance"), [pytest.param("nao-ssp", "ssp-v5", marks=pytest.mark.slow), ("walk12", "walk12-w015")]
+)
 def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str, instance: str) -> None:
     problem, x = nlp_gait.load(name), best(instance)
     assert guarantee(problem, x).holds

@@ -47,7 +47,9 @@ def test_rows_that_are_violated_join_until_none_is() -> None:
     few, whole, _, arguments = polygon()
     found = few(**arguments)
     assert same(found, whole(**arguments))
-    assert few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]  # one round after the other
+    assert (
+        few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]
+    )  # one round after the other
     first = few.stats()["iter_count"]
     few.learn(**arguments)
     assert same(few(**arguments), whole(**arguments)) and few.stats()["iter_count"] < first  # all in one round

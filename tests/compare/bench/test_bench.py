@@ -61,6 +61,7 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
         baseline_records("ssp-v4", tmp_path)
 
 
+@pytest.mark.slow
 def test_everything_of_the_small_suite_is_shipped() -> None:
     """Twelve solvers, fifteen runs each with the seeds of the rules, the same budget; all of it below 20 MB."""
     assert set(gaitbench.names("small")) <= set(shipped())
@@ -138,6 +139,7 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     assert all(duel.worse == len(ids) and duel.mean_a12 == 0.0 for duel in board.duels("nothing"))
 
 
+@pytest.mark.slow
 def test_the_page_says_it(tmp_path: Path) -> None:
     ids = ("walk12-w015", "ssp-v5")
     twin = [replace(r, algorithm="twin") for id in ids for r in baseline_records(id) if r.algorithm == "pso"]

@@ -65,8 +65,8 @@ def test_solve_search_and_compare(tmp_path):
     assert (out / "report.md").read_text().count("| pso | 2 |") == 1
     assert "<svg" in (out / "report.html").read_text()
     assert (out / "nao-ssp-convergence.png").stat().st_size > 10_000
-    # One start each of IPOPT and the condensed method, and two runs each of pso, ga and aco.
-    assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 8
+    # One start of IPOPT, and two runs each of pso, ga and aco.
+    assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 7
 
 
 def test_fixed_variable_and_parameter():

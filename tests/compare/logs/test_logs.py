@@ -37,7 +37,8 @@ def loaded(folder: Path) -> Any:
     return manager, manager.load(monotonic=True, include_columns=["algorithm_name", "function_id"])
 
 
-@pytest.mark.parametrize("form", [pytest.param("ioh", marks=pytest.mark.slow), "coco"])
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["ioh", "coco"])
 @pytest.mark.filterwarnings("ignore")  # iohinspector and what it imports warn of their own
 def test_iohinspector_finds_our_numbers(comparisons: list[Comparison], form: str, tmp_path: Path) -> None:
     """Expected running times exactly; the distribution as finely as targets are taken."""

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
-from compare.questions.certainty import branch_and_bound, certificate
+from compare.questions.certainty import branch_and_bound, certificate, power_form
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
 from nlp_gait.backends.exact import exact_model
@@ -31,9 +32,74 @@ def walk() -> tuple[GaitProblem, np.ndarray]:
     return nlp_gait.load("walk12"), np.array(known()["walk12-w015"].best_x)
 
 
-def test_no_box_loses_a_feasible_point_that_is_better_than_the_target() -> None:
-    problem, best = walk()
-    assert lost(problem, best, 200, np.random.default_rng(SEED)) == 0
+GAITS = {"walk12": "walk12-w015", "nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
+PHASES = ("nao-dsp", "nao-ssp")
+
+
+def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
+    """A phase with bounds this part of the ranges around the best known gait, and that gait."""
+    problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
+    half = part * (problem.upper - problem.lower) / 2
+    return within(problem, np.maximum(problem.lower, best - half), np.minimum(problem.upper, best + half)), best
+
+
+def within(problem: GaitProblem, lower: np.ndarray, upper: np.ndarray) -> GaitProblem:
+    """A problem with other bounds of its variables."""
+    named = (("lower", lower), ("upper", upper))
+    return problem.with_values(
+        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
+    )
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
+    best = np.array(known()[GAITS[name]].best_x)
+    assert lost(nlp_gait.load(name), best, 200, np.random.default_rng(SEED)) == 0
+
+
+@pytest.mark.parametrize("name", PHASES)
+def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: str) -> None:
+    problem, best = around(name, 0.07)
+    proof = certify(problem, best, tolerance=0.01, time_limit_s=120.0)
+    assert proof.closed and proof.gap == pytest.approx(0.01) and proof.boxes > 10
+    if name == "nao-dsp":
+        assert check(certificate_file(problem, proof), paths=5).paths == 5
+
+
+def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
+    problem, best = nlp_gait.load("nao-dsp"), np.array(known()[GAITS["nao-dsp"]].best_x)
+    gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
+    costs = [exact_model(problem).at(x, problem.p).cost for x in gaits]
+    wrong = gaits[int(np.argmin(np.abs(np.array(costs) / costs[0] - 1.03)))]
+    cost = exact_model(problem).at(wrong, problem.p).cost
+    assert 1.02 * costs[0] < cost < 1.04 * costs[0]
+    half = 2.0**-7 * (problem.upper - problem.lower)
+    ends = (
+        np.maximum(problem.lower, np.minimum(best, wrong) - half),
+        np.minimum(problem.upper, np.maximum(best, wrong) + half),
+    )
+    narrow = within(problem, *ends)
+    assert certify(narrow, best, tolerance=0.01, time_limit_s=120.0).closed
+    proof = certify(narrow, wrong, tolerance=0.01, time_limit_s=0.5)
+    assert not proof.closed and proof.bound <= costs[0]
+
+
+def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
+    problem, best = around("nao-dsp", 2.0**-4)
+    cheat = best.copy()
+    cheat[5] *= 0.9  # less sway: too small a margin
+    at = exact_model(problem).at(cheat, problem.p)
+    assert at.violation > 1e-5
+    with pytest.raises(InputError, match="infeasible"):
+        certify(problem, cheat)
+
+
+def test_formulas_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compare.questions.certainty.power_instants.GRAVITY", 9.80001)
+    with pytest.raises(InputError, match="where the exact functions have"):
+        power_form.power_form(nlp_gait.load("nao-dsp", intervals=2))
+    with pytest.raises(InputError, match="has no form"):
+        power_form.power_form(nlp_gait.load("nao-dsp", trajectory="quintic"))
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
     return compare_problems(changed)[0]
 
 
+@pytest.mark.slow
 def test_best_gait_of_each_solver_is_drawn() -> None:
     part = gaits_part(comparison("nao-dsp", DSP_X, "pso", "ga"))
     assert isinstance(part, Figure) and part.name == "dsp-gaits"

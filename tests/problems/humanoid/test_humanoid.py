@@ -52,6 +52,7 @@ def reachable(problem: GaitProblem, count: int) -> Array:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
     playback = problem.playback
     assert playback is not None
@@ -116,10 +117,8 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
     assert other.value("torque_change_limit_Nm") > 1.2 * biped_scale
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["humanoid-ssp", *(pytest.param(name, marks=pytest.mark.slow) for name in ("humanoid-dsp", "humanoid-cycle"))],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
 def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str, name: str) -> None:
     problem = load(name, robot=path)
     x = (problem.lower + problem.upper) / 2

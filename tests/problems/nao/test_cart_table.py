@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, finely_sampled
@@ -32,8 +33,10 @@ def test_preview_control_is_the_least_squares_optimum() -> None:
     course = controller.follow(reference)
     step = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
     push, output = np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -0.26 / GRAVITY])
-    response = np.array([output @ np.linalg.matrix_power(step, k) @ push for k in range(count)])
-    zmp = np.array([[response[i - j - 1] if i > j else 0.0 for j in range(count)] for i in range(count)])
+    response, state = np.zeros(count), push
+    for k in range(1, count):
+        response[k], state = output @ state, step @ state
+    zmp = toeplitz(response, np.zeros(count))
     changes = np.eye(count) - np.eye(count, k=-1)
     jerks = np.linalg.lstsq(
         np.vstack([zmp, np.sqrt(JERK_WEIGHT) * changes]),

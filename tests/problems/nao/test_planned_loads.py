@@ -137,6 +137,7 @@ def test_polynomials_are_scipys_and_ramps_end_smoothly() -> None:
     np.testing.assert_allclose(mine[::-1, 7], mine[:, 6], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_sole_bears_what_forces_at_its_corners_can_give() -> None:
     """Random wrenches: the rows hold if and only if four corner forces, each within its pyramid, add up to it."""
     along, across, mu = (-0.04, 0.09), (-0.03, 0.05), 0.5

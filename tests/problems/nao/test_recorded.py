@@ -83,6 +83,7 @@ def angles_of(path: Path) -> JointAngles:
     return read_gait(path, ROBOT)
 
 
+@pytest.mark.slow
 def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-ssp"))
     columns = [angles.joints.index(partner(name)) for name in angles.joints]
