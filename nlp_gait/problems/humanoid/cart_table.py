@@ -7,7 +7,7 @@ from casadi import SX
 from nlp_gait.problem import Array, Result
 from nlp_gait.problems.biped.cart_table.walker import Body, Footsteps
 from nlp_gait.problems.humanoid.body import GRAVITY, LETTERS, humanoid
-from nlp_gait.problems.humanoid.recorded import RecordedCycles
+from nlp_gait.problems.humanoid.recorded import recorded_cycles
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
 from nlp_gait.symbolic.trajectories import constant
 
@@ -24,7 +24,7 @@ def humanoid_on_a_table(robot: str = "nao-v5", intervals: int = 10, drive_limits
         GaitError: as ``humanoid``.
     """
     body, upright = humanoid(robot), (constant(0.0), constant(0.0))
-    cycles = RecordedCycles(body=body, robot=robot, intervals=intervals, drive_limits=drive_limits)
+    cycles = recorded_cycles(body, robot=robot, intervals=intervals, drive_limits=drive_limits)
 
     def judged(footsteps: Footsteps, t: Array, q: Array) -> Result:
         return cycles.judged(t, q, footsteps.single_s)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import casadi as ca
-import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem import Array, GaitProblem, Grid, Result
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problems.biped.goals import Goal
-from nlp_gait.problems.biped.recorded.cycle import Half, Judge, on_grids
-from nlp_gait.problems.biped.recorded.motion import Motion
+from nlp_gait.problems.biped.recorded.cycle import Cycles, Half, Judge
 from nlp_gait.problems.biped.recorded.stance import Stance
 from nlp_gait.problems.biped.single_support import loads_on_left
 from nlp_gait.problems.humanoid.body import GRAVITY, Humanoid
@@ -29,63 +26,38 @@ from nlp_gait.robots.leg import LEG_JOINT_COUNT
 from nlp_gait.symbolic.general_leg import reach_of
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedCycles:
-    """Judges cycles of one humanoid, whose torso is upright.
+def recorded_cycles(body: Humanoid, *, robot: str, intervals: int, drive_limits: bool) -> Cycles:
+    """Judge of cycles whose torso is upright; their joints are those of the left leg, then of the right one.
 
-    Attributes:
+    Args:
         body: the humanoid.
         robot: its name or file.
         intervals: of each phase, as in the planned problem.
         drive_limits: whether torques and speeds must be within what the robot's file says.
     """
+    model = body.biped.model
+    stance = Stance(
+        robot=model,
+        joints=body.biped.joints,
+        images=body.images,
+        support=(0.0, body.foot_y("left"), body.ankle_height("left")),
+        hip_m=tuple(body.middle_m.tolist()),
+    )
 
-    body: Humanoid
-    robot: str
-    intervals: int
-    drive_limits: bool
+    def dressed(problem: GaitProblem, repeats: bool) -> GaitProblem:
+        return with_body(problem, body, model.armatures_kgm2, repeats=repeats)
 
-    def judged(self, t: Array, q: Array, touch_down_s: float) -> Result:
-        """A cycle that begins where the right foot leaves the ground.
+    return Cycles(
+        judge=_judge(body, drive_limits),
+        stance=stance,
+        intervals=intervals,
+        options={"robot": robot, "intervals": intervals, "drive_limits": drive_limits},
+        dressed=dressed,
+    )
 
-        Args:
-            t: (T,) from zero [s].
-            q: (T, 12) angles of the left leg, then of the right one [rad].
-            touch_down_s: when the right foot lands.
 
-        Raises:
-            InputError: a phase has too few samples.
-        """
-        motion = Motion(stance=self._stance, t=t, q=q)
-        parts = {name: motion.part(*span) for name, span in motion.phases(touch_down_s).items()}
-        armatures = self.body.biped.model.armatures_kgm2
-
-        def built(grid: Grid) -> GaitProblem:
-            return with_body(self._judge.problem(parts, grid), self.body, armatures, repeats=motion.repeats)
-
-        options: dict[str, str | int | float | bool] = {
-            "robot": self.robot,
-            "intervals": self.intervals,
-            "drive_limits": self.drive_limits,
-        }
-        step_m = float(motion.right_foot(t[-1:])[0, 0])
-        x = np.array([*(part.duration_s for part in parts.values()), step_m])
-        return Result(problem=on_grids(built, self.intervals, options), x=x)
-
-    @cached_property
-    def _stance(self) -> Stance:
-        body = self.body
-        return Stance(
-            robot=body.biped.model,
-            joints=body.biped.joints,
-            images=body.images,
-            support=(0.0, body.foot_y("left"), body.ankle_height("left")),
-            hip_m=tuple(body.middle_m.tolist()),
-        )
-
-    @cached_property
-    def _judge(self) -> Judge:
-        return _judge(self.body, self.drive_limits)
+def _judge(self) -> Judge:
+    return _judge(self.body, self.drive_limits)
 
 
 def _judge(body: Humanoid, drive_limits: bool) -> Judge:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 from casadi import MX
 
-from nlp_gait.problem import GaitProblem, Grid, Variable
+from nlp_gait.problem import Array, GaitProblem, Grid, Result, Variable
 from nlp_gait.problems.biped.cycle import WalkingCycle, cycle_problem
 from nlp_gait.problems.biped.cycle_motion import LIFT, STEP, SWITCHES, TIMES
 from nlp_gait.problems.biped.goals import Goal
@@ -17,6 +18,7 @@ from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.recorded.limits import HipLimits, StandingLimits, SwingLimits
 from nlp_gait.problems.biped.recorded.motion import Motion
 from nlp_gait.problems.biped.recorded.phase import RecordedPhase
+from nlp_gait.problems.biped.recorded.stance import Stance
 from nlp_gait.robots import Robot
 
 
@@ -112,3 +114,43 @@ def on_grids(
         return replace(build(grid), options=dict(options), refine=lambda by: built(factor * by))
 
     return built(1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cycles:
+    """Judges one robot's cycles that begin where the right foot leaves the ground.
+
+    Attributes:
+        judge: planned cycle.
+        stance: the robot.
+        intervals: of each phase, as in the planned problem.
+        options: of the problem that judges.
+        dressed: that problem with what drawing and playing need; whether another step can follow.
+    """
+
+    judge: Judge
+    stance: Stance
+    intervals: int
+    options: Mapping[str, str | int | float | bool]
+    dressed: Callable[[GaitProblem, bool], GaitProblem]
+
+    def judged(self, t: Array, q: Array, touch_down_s: float) -> Result:
+        """A cycle with its own times and step.
+
+        Args:
+            t: (T,) from zero [s].
+            q: (T, J) angles of the stance's joints [rad].
+            touch_down_s: when the right foot lands.
+
+        Raises:
+            InputError: a phase has too few samples.
+        """
+        motion = Motion(stance=self.stance, t=t, q=q)
+        parts = {name: motion.part(*span) for name, span in motion.phases(touch_down_s).items()}
+
+        def built(grid: Grid) -> GaitProblem:
+            return self.dressed(self.judge.problem(parts, grid), motion.repeats)
+
+        step_m = float(motion.right_foot(t[-1:])[0, 0])
+        x = np.array([*(part.duration_s for part in parts.values()), step_m])
+        return Result(problem=on_grids(built, self.intervals, self.options), x=x)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 from casadi import SX
 
-from nlp_gait.problem import Array, Result
+from nlp_gait.problem import Array, GaitProblem, Result
 from nlp_gait.problems.biped.cart_table.walker import Body, Footsteps
+from nlp_gait.problems.biped.recorded.cycle import Cycles
 from nlp_gait.problems.nao.body import GRAVITY, JOINTS, nao, upright_plan
 from nlp_gait.problems.nao.legs import leg_geometry
-from nlp_gait.problems.nao.recorded.motion import LEFT_OUT, JointAngles
-from nlp_gait.problems.nao.recorded.problem import recorded
+from nlp_gait.problems.nao.problem import with_robot
+from nlp_gait.problems.nao.recorded.motion import LEFT_OUT, JointAngles, of_all_joints, stance_of
+from nlp_gait.problems.nao.recorded.problem import cycle_judge
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
 
 LEGS = tuple(name for name in JOINTS if name not in LEFT_OUT)
@@ -29,10 +30,20 @@ def nao_on_a_table(robot: str = "nao-v5", intervals: int = 10) -> Body:
     model = nao(robot, rotational_inertia=True)
     legs = {side: leg_geometry(model, side) for side in "LR"}
 
+    def dressed(problem: GaitProblem, repeats: bool) -> GaitProblem:
+        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
+
+    cycles = Cycles(
+        judge=cycle_judge(model),
+        stance=stance_of(model),
+        intervals=intervals,
+        options={"robot": robot, "intervals": intervals},
+        dressed=dressed,
+    )
+
     def judged(footsteps: Footsteps, t: Array, q: Array) -> Result:
-        walk = JointAngles(owner="the cart-table walk", joints=LEGS, t=t, q=q)
-        gait = recorded(walk, robot=robot, intervals=intervals, gait="nao-cycle", touch_down_s=footsteps.single_s)
-        return Result(problem=gait.problem, x=np.array(gait.x))
+        angles = JointAngles(owner="the cart-table walk", joints=LEGS, t=t, q=q)
+        return cycles.judged(t, of_all_joints(angles), footsteps.single_s)
 
     return Body(
         feet=model.feet,

@@ -36,6 +36,23 @@ class JointAngles:
     q: Array
 
 
+def of_all_joints(angles: JointAngles) -> Array:
+    """(T, 22) columns as ``JOINTS``; joints of the arms that are missing are held [rad]."""
+    columns = dict(zip(angles.joints, angles.q.T, strict=True))
+    return np.column_stack([columns.get(name, np.full(len(angles.t), LEFT_OUT.get(name, 0.0))) for name in JOINTS])
+
+
+def stance_of(robot: Robot) -> Stance:
+    """NAO, as ``problems.nao.body.nao`` makes it, on its left foot below its own hip joint."""
+    geometry = leg_geometry(robot, "L")
+    return Stance(
+        robot=robot,
+        joints=JOINTS,
+        images=tuple(map(partner, JOINTS)),
+        support=(0.0, geometry.hip_m[1], geometry.ankle_height_m),
+    )
+
+
 def motion_of(angles: JointAngles, robot: Robot) -> Motion:
     """Motion of a robot on its left foot; mirrored if the right one is that which stands.
 
@@ -58,14 +75,6 @@ def motion_of(angles: JointAngles, robot: Robot) -> Motion:
     for name in JOINTS:
         if name in columns and not np.isfinite(columns[name]).all():
             raise InputError(f"{angles.owner}: an angle of {name} is missing")
-    q = np.column_stack([columns.get(name, np.full(len(angles.t), LEFT_OUT.get(name, 0.0))) for name in JOINTS])
-    geometry = leg_geometry(robot, "L")
-    stance = Stance(
-        robot=robot,
-        joints=JOINTS,
-        images=tuple(map(partner, JOINTS)),
-        support=(0.0, geometry.hip_m[1], geometry.ankle_height_m),
-    )
-    motion = Motion(stance=stance, t=angles.t - angles.t[0], q=q, held=tuple(missing))
+    motion = Motion(stance=stance_of(robot), t=angles.t - angles.t[0], q=of_all_joints(angles), held=tuple(missing))
     heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion

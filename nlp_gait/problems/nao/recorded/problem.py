@@ -112,7 +112,7 @@ def recorded(
     parts = {name: motion.part(*span) if len(phases) > 1 else motion for name, span in phases.items()}
 
     def built(grid: Grid) -> GaitProblem:
-        problem = _cycle(model).problem(parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
+        problem = cycle_judge(model).problem(parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
         return with_robot(problem, robot, model.armatures_kgm2, repeats=len(parts) > 1 and motion.repeats)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
@@ -189,7 +189,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
     )
 
 
-def _cycle(model: Robot) -> Judge:
+def cycle_judge(model: Robot) -> Judge:
     """The planned cycle as the judge."""
     means = mean_margins(model)
     single = paper_parts(model, single_margins(model), means["ssp"])
