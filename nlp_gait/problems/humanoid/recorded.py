@@ -56,10 +56,6 @@ def recorded_cycles(body: Humanoid, *, robot: str, intervals: int, drive_limits:
     )
 
 
-def _judge(self) -> Judge:
-    return _judge(self.body, self.drive_limits)
-
-
 def _judge(body: Humanoid, drive_limits: bool) -> Judge:
     """The planned cycle as the judge."""
     model, margins = body.biped.model, cycle_margins(body)
