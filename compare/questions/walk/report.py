@@ -27,7 +27,6 @@ from nlp_gait.simulation.walking import Walk
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
-LEGEND_LETTERS = 60  # of a row of a legend
 # Value on the axis, walk, and its measurements.
 Played = tuple[float, Walk, Measurements]
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -243,9 +242,9 @@ def cycle_figure(result: Result) -> Drawing:
             for k, switch in enumerate(switches):
                 axes.axvline(switch, color="#a0a0a0", lw=0.8, ls="-" if k % 2 == 0 else "--")
         for axes in (side, above, place, angles):
-            names = [str(text) for text in axes.get_legend_handles_labels()[1]]
+            columns = 5 if len(axes.get_legend_handles_labels()[1]) <= 5 else 3
             axes.legend(
-                ncols=5 if sum(map(len, names)) < LEGEND_LETTERS else 3,
+                ncols=columns,
                 loc="lower right",
                 bbox_to_anchor=(1.0, 1.0),
                 borderaxespad=0.1,
