@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 from xml.etree import ElementTree as Xml
 
+import numpy as np
+
 from nlp_gait.problem.motion.playback import Tread
 from nlp_gait.robots import Robot
+from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.looks import FLOOR, add_light, add_world, paint
@@ -21,6 +24,8 @@ TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
+LEAST_MOMENT = 1e-12  # of inertia, that MuJoCo takes [kg m^2]
+BALL_RADIUS = 1e-3  # [m]
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 Shapes = Mapping[str, Sequence[Shape]]
@@ -136,12 +141,22 @@ def add_bodies(
         elif root != "fixed":
             add_root_joints(element, planar=root == "planar")
         link = body.link
-        tensor = _numbers(*link.inertia_com_kgm2)  # the same order in MJCF: xx, yy, zz, xy, xz, yz
-        mass = _numbers(link.mass_kg)
+        tensor, mass = _numbers(*_positive_tensor(link)), _numbers(link.mass_kg)
         Xml.SubElement(element, "inertial", pos=_numbers(*body.com_offset_m), mass=mass, fullinertia=tensor)
         for i, shape in enumerate(shapes.get(link.name, ())):
             _add_geometry(element, shape, f"{link.name} {i}")
     return {body.link.name: element for body, element in zip(tree, elements, strict=True)}
+
+
+def _positive_tensor(link: Link) -> tuple[float, ...]:
+    """Inertia tensor in MJCF's order: xx, yy, zz, xy, xz, yz [kg m^2].
+
+    MuJoCo takes no points and no thin rods: they become as thick as a small ball of their mass.
+    """
+    moments, products = link.inertia_com_kgm2[:3], link.inertia_com_kgm2[3:]
+    thin = np.linalg.eigvalsh(link.inertia_matrix)[0] < LEAST_MOMENT
+    ball = 0.4 * link.mass_kg * BALL_RADIUS**2 if thin else 0.0
+    return (*(moment + ball for moment in moments), *products)
 
 
 def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:

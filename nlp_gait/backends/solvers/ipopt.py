@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
-from nlp_gait.backends.interrupts import never
+from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.derivatives import derivatives_of, pays
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
@@ -175,9 +175,12 @@ class Ipopt(StagedSolver):
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
         cold = WorkingSet(model.nlp, self.functions(), options, self._of_ipopt, self.watch, always)
-        self.watch.begin(never, time.perf_counter() + self.time_limit_s)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
-        cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
+        with deferred_interrupts() as asked:
+            self.watch.begin(asked, time.perf_counter() + self.time_limit_s)
+            cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
+        if asked():
+            raise KeyboardInterrupt
         return cold
 
     def functions(self) -> dict[str, ca.Function]:

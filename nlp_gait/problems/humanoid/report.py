@@ -29,7 +29,7 @@ def understood_of(body: Humanoid) -> list[tuple[str, str]]:
         ("leg length", f"{biped.leg_length_m:.4f} m, {biped.length_scale:.3f} times NAO's (lambda)"),
         (
             "straight knee",
-            f"at {left.straight_rad:+.4f} rad, bends to {'larger' if left.bend > 0 else 'smaller'} angles",
+            f"at {left.straight_rad:z.4f} rad, bends to {'larger' if left.bend > 0 else 'smaller'} angles",
         ),
         ("inverse kinematics", exact),
         ("held joints", f"{len(biped.posture_rad)}, at zero" + (" but " + _angles(held) if held else "")),
