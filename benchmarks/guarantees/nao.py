@@ -1,7 +1,8 @@
 """Proofs of NAO's phases: a certificate for each, or the bound that was reached.
 
-``python -m benchmarks.guarantees.nao OUT nao-dsp 0.01 [HOURS]`` writes it; one that is there already is kept, and what was killed
-goes on. Without the time to close, the open part stays in OUT and its bound is printed.
+``python -m benchmarks.guarantees.nao OUT nao-dsp 0.01 [HOURS [PART]]`` writes it; one that is there already is kept, and what was
+killed goes on. Without the time to close, the open part stays in OUT and its bound is printed. With PART the bounds of the
+variables are this part of their ranges around the best known gait.
 """
 
 from __future__ import annotations
@@ -17,9 +18,20 @@ from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file
 from nlp_gait.files import write_json
 from nlp_gait.gaitbench.known import known
+from nlp_gait.problem import Array, GaitProblem
 
 INSTANCES = {"nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
 REPORT_S = 30.0
+
+
+def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
+    """A problem with bounds that are this part of the ranges around a point, and nowhere wider."""
+    half = part * (problem.upper - problem.lower) / 2
+    lower, upper = np.maximum(problem.lower, x - half), np.minimum(problem.upper, x + half)
+    named = (("lower", lower), ("upper", upper))
+    return problem.with_values(
+        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
+    )
 
 
 def main() -> None:
@@ -27,7 +39,8 @@ def main() -> None:
     out, name, tolerance = Path(sys.argv[1]), sys.argv[2], float(sys.argv[3])
     limit_s = 3600.0 * float(sys.argv[4]) if len(sys.argv) > 4 else 24 * 3600.0
     out.mkdir(parents=True, exist_ok=True)
-    stem = f"{name}-{100 * tolerance:g}-percent"
+    part = float(sys.argv[5]) if len(sys.argv) > 5 else None
+    stem = f"{name}-{100 * tolerance:g}-percent" + (f"-around-{part:.3g}" if part else "")
     if (out / f"{stem}.json").exists():
         print(f"{stem} is there")
         return
@@ -40,6 +53,7 @@ def main() -> None:
             print(note, flush=True)
 
     x = np.array(known()[INSTANCES[name]].best_x)
+    problem = problem if part is None else around(problem, x, part)
     kept = out / f".{stem}.open.npz"
     found = certify(problem, x, tolerance=tolerance, time_limit_s=limit_s, progress=progress, checkpoint=kept)
     if found.closed:

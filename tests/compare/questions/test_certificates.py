@@ -12,6 +12,7 @@ import pytest
 import nlp_gait
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
+from benchmarks.guarantees.nao import around as box_around
 from compare.questions.certainty import branch_and_bound, certificate, power_form
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
@@ -39,8 +40,7 @@ PHASES = ("nao-dsp", "nao-ssp")
 def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
     """A phase with bounds this part of the ranges around the best known gait, and that gait."""
     problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
-    half = part * (problem.upper - problem.lower) / 2
-    return within(problem, np.maximum(problem.lower, best - half), np.minimum(problem.upper, best + half)), best
+    return box_around(problem, best, part), best
 
 
 def within(problem: GaitProblem, lower: np.ndarray, upper: np.ndarray) -> GaitProblem:
@@ -57,6 +57,7 @@ def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str)
     assert lost(nlp_gait.load(name), best, 200, np.random.default_rng(SEED)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PHASES)
 def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: str) -> None:
     problem, best = around(name, 0.07)
@@ -66,6 +67,7 @@ def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: st
         assert check(certificate_file(problem, proof), paths=5).paths == 5
 
 
+@pytest.mark.slow
 def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
     problem, best = nlp_gait.load("nao-dsp"), np.array(known()[GAITS["nao-dsp"]].best_x)
     gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
