@@ -1,6 +1,6 @@
 """Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [cart-table] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -236,6 +236,57 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         )
 
 
+def cart_table(files: dict[str, str]) -> Iterator[str]:
+    """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda, and that cycle."""
+    from compare.questions.sweep.study import parse_axis
+    from compare.questions.walk.planners import CART_TABLE, rivals
+    from compare.questions.walk.study import optimal_gaits, played
+    from compare.study.task import ProblemSpec
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.feedback import FEEDBACKS
+
+    yield header(
+        "robot", "speed m/s", "step m", "times s", "textbook W, optimum W, saved", "engine", "textbook's notes"
+    )
+    for name, file in files.items():
+        spec = ProblemSpec(name="humanoid-cycle", options={"robot": file, "objective": "power"})
+        problem = spec.load()
+        (least,) = optimal_gaits(spec, parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1, seed=0)
+        if not least.found.feasible:
+            yield cells(name, f"{least.at:.4f}", "-", "-", least.found.status, "-", "-")
+            continue
+        engine = []
+        for feedback, words in ((None, "open loop"), (FEEDBACKS["torso-spring"], "torso-spring")):
+            drive = Drive(feedback=feedback)
+            best = played(spec, least, STEPS, drive)
+            (cart,) = rivals(spec, [least], [CART_TABLE], starts=1, seed=0, steps=STEPS, drive=drive)
+            if cart.walk is None or best.walk is None:
+                break  # no height of the hip reaches
+            fell = [walk.measurements.fell_at_s for walk in (cart.walk, best.walk)]
+            energies = [walk.engine_J_per_planned_m or np.nan for walk in (cart.walk, best.walk)]
+            if fell == [None, None]:
+                engine.append(f"{words}: {watts(*(energy * least.at for energy in energies))}")
+                break
+            said = [
+                f"{who} falls at {at_s:.1f} s" for who, at_s in zip(("textbook", "optimum"), fell, strict=True) if at_s
+            ]
+            engine.append(f"{words}: {', '.join(said)}")
+        yield cells(
+            name,
+            f"{least.at:.4f}",
+            f"{least.indexes['step_length_m']:.3f}",
+            " + ".join(f"{least.found.x[key]:.3f}" for key in problem.durations),
+            watts(cart.indexes.get("power_W", np.nan), least.indexes["power_W"]),
+            "; ".join(engine),
+            "; ".join((cart.note, *cart.broken)),
+        )
+
+
+def watts(textbook: float, optimum: float) -> str:
+    """Mean powers [W], and what the optimum saves."""
+    return f"{textbook:.3f}, {optimum:.3f}, {100.0 * (1.0 - optimum / textbook):.1f} %"
+
+
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
     assert problem.robot is not None
@@ -249,6 +300,7 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "searches": searches,
     "steps": steps,
     "cycles": cycles,
+    "cart-table": cart_table,
 }
 
 

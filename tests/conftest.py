@@ -1,6 +1,5 @@
 """Settings of every test."""
 
-import gc
 import signal
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
@@ -36,11 +35,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if any(folder in item.path.parents for folder in SLOW_FOLDERS):
             item.add_marker(pytest.mark.slow)
-
-
-def pytest_collection_finish() -> None:
-    """What is there from now on stays: to search it for garbage over and over takes a twentieth of the fast tests' time."""
-    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

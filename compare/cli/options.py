@@ -106,6 +106,15 @@ class CycleOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class AnyCycle(CycleOptions):
+    """A walking cycle that is NAO's unless another is named."""
+
+    name: Annotated[
+        str, typer.Argument(metavar="[PROBLEM]", help="nao-cycle, or humanoid-cycle with --robot FILE.")
+    ] = "nao-cycle"
+
+
+@dataclass(frozen=True, kw_only=True)
 class ProblemOptions(CycleOptions):
     """How any problem is built, and its values."""
 

@@ -185,6 +185,11 @@ def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[
     return ca.vertcat(*(cos for cos, _ in turns)), ca.vertcat(*(sin for _, sin in turns))
 
 
+def reach_of(leg: Leg, q: SX) -> SX:
+    """Cosine of the knee's angle from straight, as in ``LegMotion``, for angles (6,) that are given [rad]."""
+    return _knee_cosine(leg, ca.sumsqr(_chain(leg, ca.cos(q), ca.sin(q)).hip - _ankle(leg)))
+
+
 def _ankle(leg: Leg) -> SX:
     return SX(DM(leg.ankle_m - leg.foot_m))
 

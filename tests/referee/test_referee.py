@@ -69,7 +69,7 @@ def worst(found: Mapping[str, float]) -> tuple[float, str]:
     return max((error, name) for name, error in found.items())
 
 
-@pytest.mark.parametrize("phase", ["single_support", "double_support"])
+@pytest.mark.parametrize("phase", ["single_support", pytest.param("double_support", marks=pytest.mark.slow)])
 def test_nao_phases_by_momentum_alone(phase: str) -> None:
     """All rows, and power, against links whose momenta are Taylor series in time; no recursion of forces, no symbols."""
     problem = nlp_gait.load({"single_support": "nao-ssp", "double_support": "nao-dsp"}[phase])

@@ -10,8 +10,9 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import CycleOptions, DriveOptions, Seed
+from compare.cli.options import AnyCycle, DriveOptions, Seed
 from compare.cli.questions.answers import Output
+from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
     from compare.questions.walk.planners import Rival
@@ -21,9 +22,13 @@ if TYPE_CHECKING:
 def walk(
     *,
     over: Annotated[
-        str,
-        typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Speeds, or another parameter or variable; NAME=V1,V2,..."),
-    ] = "speed_m_s=0.01:0.1:10",
+        str | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH:COUNT",
+            help="Speeds (default: ten from 0.01 to 0.1 m/s, of humanoids by the root of their legs' length), or another "
+            "parameter or variable; NAME=V1,V2,...",
+        ),
+    ] = None,
     engine: Annotated[
         bool, typer.Option("--engine", help="Play ten steps of each gait in MuJoCo (extra sim): is the model right?")
     ] = False,
@@ -37,23 +42,24 @@ def walk(
     starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
     seed: Seed = 0,
     servos: DriveOptions,
-    problem: CycleOptions,
+    problem: AnyCycle,
     output: Output,
 ) -> None:
     """Cheapest walking cycle at each speed: cost of transport, and how each gait walks in a physics engine.
 
-    The problem is nao-cycle with the power as its objective; each point starts from its neighbours. Played is in open loop unless
-    a feedback is named. Called again after a kill or Ctrl-C, it continues where it stopped.
+    The problem is nao-cycle, or humanoid-cycle, with the power as its objective; each point starts from its neighbours. Played is
+    in open loop unless a feedback is named. Called again after a kill or Ctrl-C, it continues where it stopped.
 
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
     `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
+    `nlp-gait walk humanoid-cycle --robot my.urdf --over speed_m_s=0.05 --baseline cart-table`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
     from compare.questions.kept import Finished
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.walk.planners import checked_planners, rivals
     from compare.questions.walk.report import walk_answer
-    from compare.questions.walk.study import CYCLE, optimal_gaits, played
+    from compare.questions.walk.study import CYCLES, default_speeds, optimal_gaits, played
     from compare.study.engine import STEPS
     from nlp_gait.simulation.engine import mujoco
 
@@ -61,8 +67,11 @@ def walk(
     steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
         mujoco()  # if it is missing, say so before the work
-    axis, planners = parse_axis(over), checked_planners(baseline or ())
-    spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(CYCLE)
+    if problem.name not in CYCLES:
+        raise InputError(f"walk takes a walking cycle, {' or '.join(CYCLES)}; got {problem.name!r}")
+    spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(problem.name)
+    own = spec.load()
+    axis, planners = parse_axis(default_speeds(own) if over is None else over), checked_planners(baseline or (), own)
     finished = Finished(output.out, say)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(

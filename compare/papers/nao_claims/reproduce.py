@@ -17,6 +17,7 @@ from compare.study.progress import Progress
 from compare.study.steps import Steps
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
+from nlp_gait.problems.biped.cart_table import walker
 from nlp_gait.problems.nao.cycle import cart_table
 from nlp_gait.simulation import playback
 from nlp_gait.simulation.engine import mujoco
@@ -40,7 +41,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     """
     mujoco()  # if it is missing, say so before the work
     folder = writable_folder(out)
-    steps = Steps(folder, progress, code=(claim_runs, published, cart_table, playback))
+    steps = Steps(folder, progress, code=(claim_runs, published, walker, cart_table, playback))
     todo = gaits_first(effort)
     first = dict(zip((step.name for step in todo), steps.side_by_side(todo), strict=True))
     speeds = {heat: first[f"speeds-{heat.split()[-1]}"] for heat in SPECS}

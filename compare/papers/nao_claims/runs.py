@@ -20,7 +20,8 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, finely_sampled
-from nlp_gait.problems.nao.cycle.cart_table import Footsteps, cart_table_walk
+from nlp_gait.problems.biped.cart_table.walker import Footsteps, cart_table_walk
+from nlp_gait.problems.nao.cycle.cart_table import nao_on_a_table
 from nlp_gait.problems.nao.motors import SHARED
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.conditions import Conditions, Push
@@ -208,8 +209,7 @@ def on_servos(drive: Drive, steps: int, lengths: Sequence[float], disturbed: boo
 @cache
 def own_walk(footsteps: Footsteps) -> Result:
     """The robot's own walk: preview control of a cart on a table over footsteps."""
-    walk = cart_table_walk(footsteps)
-    return Result(problem=walk.problem, x=np.array(walk.x))
+    return cart_table_walk(nao_on_a_table(), footsteps)
 
 
 def knee_deg(result: Result) -> float:

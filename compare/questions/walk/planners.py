@@ -2,30 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from compare.questions.kept import Finished
-from compare.questions.walk.study import Gait, result_of, walked
+from compare.questions.walk.study import CYCLE, Gait, result_of, walked
 from compare.study.definition import fingerprint
 from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Result
-from nlp_gait.problems.nao.cycle.cart_table import Footsteps, cart_table_walk
-from nlp_gait.problems.nao.single_support import LIFT
+from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.problem.registry import problem_maker
+from nlp_gait.problems.biped.cart_table.walker import Body, Footsteps, cart_table_walk
+from nlp_gait.problems.biped.cycle_motion import LIFT
+from nlp_gait.problems.humanoid.cart_table import humanoid_on_a_table
+from nlp_gait.problems.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.robots.biped import biped_of
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.walking import Walk
 
 CART_TABLE, LEAST_TORQUE, LEAST_POWER = "cart-table", "least-torque", "least-power"
 PLANNERS = (CART_TABLE, LEAST_TORQUE)
 HEIGHT = "hip_z_lift_off_m"  # variable whose bounds are those of the hip's height
-HEIGHT_STEP_M = 0.005  # between the hip's heights that are tried
+HEIGHT_STEP_M = 0.005  # between the hip's heights that are tried, of NAO
+# Makers of what the textbook walks, judged by the limits of each cycle.
+ON_A_TABLE: dict[str, Callable[..., Body]] = {"nao-cycle": nao_on_a_table, "humanoid-cycle": humanoid_on_a_table}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,16 +60,27 @@ class Rival:
         return asdict(self)
 
 
-def checked_planners(names: Sequence[str]) -> tuple[str, ...]:
+def checked_planners(names: Sequence[str], problem: GaitProblem) -> tuple[str, ...]:
     """Planners by name.
 
     Raises:
-        InputError: one is not known.
+        InputError: one is not known, or does not know an option of the problem.
     """
     for name in names:
         if name not in PLANNERS:
             raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
+    if CART_TABLE in names:
+        usual = problem_maker(problem.name)().options
+        for name, value in problem.options.items():
+            if name not in ("objective", *_shared(problem)) and value != usual.get(name):
+                raise InputError(f"the {CART_TABLE} walk is not judged with {name}={value}; leave that option out")
     return tuple(dict.fromkeys(names))
+
+
+def _shared(problem: GaitProblem) -> dict[str, Any]:
+    """Options of a cycle that its textbook walk has too."""
+    known = inspect.signature(ON_A_TABLE[problem.name]).parameters
+    return {name: value for name, value in problem.options.items() if name in known}
 
 
 def rivals(
@@ -106,6 +124,7 @@ def rivals(
 def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | None, str]:
     """The textbook's walk at the cheapest height of its hip: from the highest that reaches, lower as long as it pays."""
     problem = own.problem
+    body = ON_A_TABLE[problem.name](**_shared(problem))
     single, double = (gait.found.x[name] for name in problem.durations)
 
     def at(height_m: float) -> Result:
@@ -116,16 +135,15 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
             hip_height_m=height_m,
             lift_m=gait.found.x[LIFT],
         )
-        options = problem.options
-        walk = cart_table_walk(footsteps, robot=str(options["robot"]), intervals=int(options["intervals"]))
+        walk = cart_table_walk(body, footsteps)
         known = {parameter.name for parameter in walk.problem.parameters}
         shared = {name: value for name, value in problem.values.items() if name in known}
-        return Result(problem=walk.problem.with_values(**shared), x=np.array(walk.x))
+        return replace(walk, problem=walk.problem.with_values(**shared))
 
     def cheapest() -> float | None:
         best: tuple[float, float | None] = (np.inf, None)
         low, high = (problem.value(f"{HEIGHT}.{end}") for end in ("lower", "upper"))
-        for height in np.arange(high, low - 1e-9, -HEIGHT_STEP_M):
+        for height in np.arange(high, low - 1e-9, -height_step_m(problem)):
             try:
                 walk = at(float(height))
             except InputError:  # a foot is out of reach
@@ -140,6 +158,14 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
     if height is None:
         return None, "no height of the hip reaches"
     return at(height), f"hip {1000.0 * height:.0f} mm high"
+
+
+def height_step_m(problem: GaitProblem) -> float:
+    """Between the hip's heights that are tried: NAO's, of other robots in proportion to their legs [m]."""
+    if problem.name == CYCLE:
+        return HEIGHT_STEP_M
+    assert problem.robot is not None  # a cycle is some robot's; for the type checker
+    return HEIGHT_STEP_M * biped_of(problem.robot).length_scale
 
 
 def least_torque(

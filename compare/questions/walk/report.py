@@ -29,8 +29,7 @@ LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"
 STEPS_SHOWN = 2
 # Value on the axis, walk, and its measurements.
 Played = tuple[float, Walk, Measurements]
-LEG = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
-LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Indexes of the table of numbers.
 INDEXES = (
     "power_W energy_J_per_m cost_of_transport speed_m_s step_length_m ssp_power_W dsp_power_W ssp_dbm_x_min_m "
@@ -209,7 +208,9 @@ def cycle_figure(result: Result) -> Drawing:
     """Two steps of a cycle: paths of hip and feet from the side and from above, and the angles of the left leg."""
     problem = result.problem
     assert problem.playback is not None  # a cycle can be played; for the type checker
-    signals = walk(finely_sampled(result), problem.playback.robot, STEPS_SHOWN)
+    robot = problem.playback.robot
+    signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
+    leg = [joint.name for joint in reversed(robot.path_to_root(robot.feet["left"].link))]
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
     durations = [float(result.x[problem.variable_index(name)]) for name in problem.durations]
     switches = np.cumsum([0.0] + durations * STEPS_SHOWN)
@@ -232,14 +233,21 @@ def cycle_figure(result: Result) -> Drawing:
         for k, axis in enumerate("xyz"):
             place.plot(t, hip[:, k] - hip[0, k], color=LEG_COLOURS[k], label=f"hip {axis} less its start")
         place.set_ylabel("[mm]")
-        for name, colour in zip(LEG, LEG_COLOURS, strict=True):
-            column = signals.joints.index(f"L{name}")
-            angles.plot(t, arrays["q"][:, column], color=colour, label=f"L{name}")
+        turning = [name for name in leg if np.ptp(arrays["q"][:, signals.joints.index(name)]) > 0.0]
+        for name, colour in zip(turning, LEG_COLOURS, strict=False):
+            angles.plot(t, arrays["q"][:, signals.joints.index(name)], color=colour, label=name)
         angles.set(ylabel="angle [rad]", xlabel="time [s]; solid: lift-off, dashed: touch-down")
         for axes in (place, angles):
             axes.set_xlim(0.0, t[-1])
             for k, switch in enumerate(switches):
                 axes.axvline(switch, color="#a0a0a0", lw=0.8, ls="-" if k % 2 == 0 else "--")
         for axes in (side, above, place, angles):
-            axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=1.0)
+            columns = 5 if len(axes.get_legend_handles_labels()[1]) <= 5 else 3
+            axes.legend(
+                ncols=columns,
+                loc="lower right",
+                bbox_to_anchor=(1.0, 1.0),
+                borderaxespad=0.1,
+                columnspacing=1.0,
+            )
     return figure

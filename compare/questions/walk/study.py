@@ -15,13 +15,24 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
-from nlp_gait.problem import Result
+from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.problems.biped.cycle import SPEED
+from nlp_gait.problems.humanoid.cycle import SPEED_M_S
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
 from nlp_gait.simulation.walking import Walk, measure_walk
 
 CYCLE = "nao-cycle"
+CYCLES = (CYCLE, "humanoid-cycle")
+SPEEDS_M_S = (0.01, 0.1)  # of NAO
+
+
+def default_speeds(problem: GaitProblem) -> str:
+    """Ten speeds as an axis in text: NAO's, of other robots at the same Froude numbers."""
+    (speed,) = (parameter.default for parameter in problem.parameters if parameter.name == SPEED)
+    low, high = (speed * limit / SPEED_M_S for limit in SPEEDS_M_S)
+    return f"{SPEED}={low:.3g}:{high:.3g}:10"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,6 +57,11 @@ class Humanoid:
         return float(self.biped.legs[side].foot_m[1])
 
     @property
+    def images(self) -> tuple[str, ...]:
+        """Of every joint of the legs on the other side."""
+        return tuple(self.biped.images[joint] for joint in self.biped.joints)
+
+    @property
     def feet_y(self) -> tuple[float, float]:
         """Of the left and the right foot [m]."""
         return self.foot_y("left"), self.foot_y("right")

@@ -29,7 +29,6 @@ from nlp_gait.problems.biped.double_support import (
     support_box,
 )
 from nlp_gait.problems.biped.instant import PlannedInstant, Planner
-from nlp_gait.problems.biped.motors import Motors
 from nlp_gait.problems.biped.parts import REACH_MARGIN, Margins
 from nlp_gait.problems.biped.phase import Phase
 from nlp_gait.problems.biped.problem import goal_of
@@ -38,6 +37,7 @@ from nlp_gait.problems.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL
 from nlp_gait.problems.humanoid.double_support import Share, standing
 from nlp_gait.problems.humanoid.problem import humanoid_motors, parts_of, with_body, within_reach
 from nlp_gait.problems.humanoid.single_support import sole_margins
+from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant, stack
 
@@ -70,13 +70,13 @@ def humanoid_cycle(
     grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     real, at_given_speed = humanoid_motors(motors, body), objective != "energy-per-metre"
     sharing = standing(body, real.model).sharing(torso_share, load_degree)
-    *motion, step = _variables(body)
+    *motion, step = humanoid_cycle_variables(body)
     variables = (*motion, *sharing.variables, step)
-    means = _mean_margins(body)
+    margins = cycle_margins(body)
     goal = goal_of("torque" if objective == "torque" else "power", real, body.heat)
     halves = {
-        "ssp": (_single_planner(body), loads_on_left(real.model, GRAVITY, body.upright_feet), _single(body), ()),
-        "dsp": (sharing.planned(_double_planner(body)), sharing.loads, _double_margins(body), sharing.parts),
+        "ssp": (single_support_planner(body), loads_on_left(real.model, GRAVITY, body.upright_feet), ()),
+        "dsp": (sharing.planned(double_support_planner(body)), sharing.loads, sharing.parts),
     }
     phases = {
         name: Phase(
@@ -88,21 +88,27 @@ def humanoid_cycle(
             plan=plan,
             loads=loads,
             grid=grid,
-            parts=(*parts_of(body, margins, means[name], drive_limits=drive_limits), *real.parts, *more),
+            parts=(*parts_of(body, *margins[name], drive_limits=drive_limits), *real.parts, *more),
             goal=goal,
         )
-        for name, (plan, loads, margins, more) in halves.items()
+        for name, (plan, loads, more) in halves.items()
     }
-    cycle = _cycle(body, real, variables, phases, at_given_speed)
+    cycle = humanoid_cycle_of(body, real.model, variables, phases, at_given_speed=at_given_speed)
     return _problem(body, cycle, sharing, at_given_speed)
 
 
-def _cycle(
-    body: Humanoid, motors: Motors, variables: tuple[Variable, ...], phases: Mapping[str, Phase], at_given_speed: bool
+def humanoid_cycle_of(
+    body: Humanoid,
+    model: Robot,
+    variables: tuple[Variable, ...],
+    phases: Mapping[str, Phase],
+    *,
+    at_given_speed: bool,
 ) -> WalkingCycle:
+    """A humanoid's cycle from both phases; ``model``: its body, perhaps with the inertia of its rotors."""
     return WalkingCycle(
-        robot=motors.model,
-        images=tuple(body.biped.images[joint] for joint in body.biped.joints),
+        robot=model,
+        images=body.images,
         gravity=GRAVITY,
         torque_size=body.biped.torque_scale,
         speed_m_s=body.velocity(SPEED_M_S),
@@ -144,7 +150,8 @@ def _coordinates(body: Humanoid) -> tuple[Coordinate, ...]:
     )
 
 
-def _variables(body: Humanoid) -> tuple[Variable, ...]:
+def humanoid_cycle_variables(body: Humanoid) -> tuple[Variable, ...]:
+    """Variables of a cycle; the step length is the last one."""
     leg_m, point = body.biped.leg_length_m, "middle of both hips"
     rows = (
         (LIFT, "m", body.length(0.015), body.length(0.03), "highest point of the swing foot"),
@@ -160,7 +167,7 @@ def _standing_foot(body: Humanoid, side: str) -> Motion:
     return stack(*map(constant, (0.0, body.foot_y(side), body.ankle_height(side))))
 
 
-def _single_planner(body: Humanoid) -> Planner:
+def single_support_planner(body: Humanoid) -> Planner:
     """From lift-off to touch-down over the left foot."""
     coordinates, left = _coordinates(body), _standing_foot(body, "left")
     right_y, right_z = body.foot_y("right"), body.ankle_height("right")
@@ -174,7 +181,7 @@ def _single_planner(body: Humanoid) -> Planner:
     return plan
 
 
-def _double_planner(body: Humanoid) -> Planner:
+def double_support_planner(body: Humanoid) -> Planner:
     """From touch-down to the mirror image of lift-off over both feet."""
     coordinates = _coordinates(body)
     left, right = _standing_foot(body, "left"), _standing_foot(body, "right")
@@ -188,8 +195,15 @@ def _double_planner(body: Humanoid) -> Planner:
     return plan
 
 
-def _single(body: Humanoid) -> Margins:
-    return sole_margins((0.0, body.foot_y("left")), body.biped.model.feet["left"])
+def cycle_margins(body: Humanoid) -> dict[str, tuple[Margins, tuple[float, float]]]:
+    """Balance margins of each phase, and the default of the least mean ones in x and y [m]."""
+    model = body.biped.model
+    box = support_box(model, {"L": (0.0, body.foot_y("left")), "R": (body.step_length(0.0), body.foot_y("right"))})
+    on_left = sole_margins((0.0, body.foot_y("left")), model.feet["left"])
+    return {
+        "ssp": (on_left, single_support_mean_margins(model.feet["left"])),
+        "dsp": (_double_margins(body), double_support_mean_margins(box)),
+    }
 
 
 def _double_margins(body: Humanoid) -> Margins:
@@ -204,13 +218,3 @@ def _double_margins(body: Humanoid) -> Margins:
         return margins_in(Box(back=back, front=front, right=fixed.right, left=fixed.left), zmp, ops)
 
     return margins
-
-
-def _mean_margins(body: Humanoid) -> dict[str, tuple[float, float]]:
-    """Default of the least mean margins of each phase in x and y [m]."""
-    model = body.biped.model
-    box = support_box(model, {"L": (0.0, body.foot_y("left")), "R": (body.step_length(0.0), body.foot_y("right"))})
-    return {
-        "ssp": single_support_mean_margins(model.feet["left"]),
-        "dsp": double_support_mean_margins(box),
-    }

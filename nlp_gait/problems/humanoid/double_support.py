@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Literal
 
 from casadi import SX, fmax
@@ -91,14 +91,20 @@ def humanoid_dsp(
     )
 
 
-def standing(body: Humanoid, model: Robot) -> Standing:
-    """A humanoid on both feet; ``model``: its body, perhaps with the inertia of its rotors."""
+def standing(body: Humanoid, model: Robot, upright: Collection[str] | None = None) -> Standing:
+    """A humanoid on both feet.
+
+    Args:
+        body: the humanoid.
+        model: its body, perhaps with the inertia of its rotors.
+        upright: links that never turn; None for flat soles.
+    """
     return Standing(
         robot=model,
         halves={LETTERS[side]: leg.joints for side, leg in body.biped.legs.items()},
         feet_y=body.feet_y,
         gravity=GRAVITY,
-        upright=body.upright_feet,
+        upright=body.upright_feet if upright is None else upright,
     )
 
 

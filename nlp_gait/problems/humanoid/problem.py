@@ -38,14 +38,22 @@ LARGEST_LEAN = {"torso_roll": LARGEST_ROLL, "torso_pitch": LARGEST_PITCH}
 
 
 def parts_of(
-    body: Humanoid, margins: Margins, mean_limits_m: tuple[float, float], *, drive_limits: bool
+    body: Humanoid, margins: Margins, mean_limits_m: tuple[float, float], *, drive_limits: bool, solved: bool = True
 ) -> tuple[Part, ...]:
-    """Limits of a phase: those of the paper, legs that end at their feet, and what the joints can give."""
+    """Limits of a phase: those of the paper, legs that end at their feet, and what the joints can give.
+
+    Args:
+        body: whose phase it is.
+        margins: of balance.
+        mean_limits_m: default of the least mean ones in x and y [m].
+        drive_limits: whether torques and speeds are limited.
+        solved: the legs' angles follow from their feet; False where the angles are given.
+    """
     model, size = body.biped.model, body.biped.torque_scale
     return (
         JointLimits(model, body.biped.joints),
         Reach(),
-        Closure(("left leg", "right leg")),
+        *((Closure(("left leg", "right leg")),) if solved else ()),
         TorqueChange(size),
         *((DriveLimits(model, size),) if drive_limits else ()),
         BalanceMargins(margins, mean_limits_m),

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -30,13 +29,13 @@ from nlp_gait.problems.biped.parts import (
     rows,
 )
 from nlp_gait.problems.biped.phase import Phase
+from nlp_gait.problems.biped.recorded.stance import FreeParts, free_parts
 from nlp_gait.problems.biped.samples import Samples
 from nlp_gait.problems.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.problems.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.economy import economical, tabulated
-from nlp_gait.symbolic.kinematics import forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.splines import fitted
 from nlp_gait.symbolic.trajectories import Motion, constant, cubic, plus
@@ -46,22 +45,6 @@ YAW_PITCHES = tuple(f"{side}{YAW_PITCH}" for side in "LR")
 CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING)
 MOVING = (*YAW_PITCHES, *CURVES[1:])
 KNEES = ("LKneePitch", "RKneePitch")
-
-
-class FreeParts(NamedTuple):
-    """Where the free parts are.
-
-    Attributes:
-        torso: (3,) origin of the torso [m].
-        ankle: (3,) of the right foot [m].
-        corners: (3, 4) of the right sole [m].
-        upright: cosine of the torso's lean.
-    """
-
-    torso: SX
-    ankle: SX
-    corners: SX
-    upright: SX
 
 
 OTHERS = (YAW_PITCHES[0], *ARM_SWING)
@@ -132,37 +115,6 @@ class FreeMotion:
     @cached_property
     def _tree(self) -> tuple[Body, ...]:
         return tree_from(self.robot, self.robot.feet["left"].link)
-
-
-def free_parts(
-    robot: Robot, tree: Sequence[Body], q: Mapping[str, SX], support: tuple[float, float, float]
-) -> FreeParts:
-    """Where torso and right foot are.
-
-    Args:
-        robot: with links welded that never move.
-        tree: of the robot from its left foot.
-        q: angles by joint name [rad].
-        support: (3,) the left ankle, which stands [m].
-    """
-    found = forward_kinematics(tree, q, SX(DM(support)))
-    poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
-    torso = poses[robot.root]
-    entry = next(body.joint for body in tree if body.link.name == robot.root)
-    assert entry is not None  # the torso is not the fixed link; for the type checker
-    foot = robot.feet["right"]
-    ankle = poses[foot.link]
-    corners = [
-        (along, across, -foot.ankle_height_m)
-        for along in (-foot.back_m, foot.front_m)
-        for across in (-foot.right_m, foot.left_m)
-    ]
-    return FreeParts(
-        torso.position - torso.rotation @ DM(entry.origin_m),
-        ankle.position,
-        ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
-        torso.rotation[2, 2],
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

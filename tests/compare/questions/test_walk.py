@@ -12,14 +12,15 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.cli.options import DriveOptions
-from compare.questions.sweep.study import parse_axis
+from compare.questions.sweep.study import SweepPoint, parse_axis
 from compare.questions.walk.planners import PLANNERS, rivals
-from compare.questions.walk.report import walk_answer
-from compare.questions.walk.study import Gait, optimal_gaits
+from compare.questions.walk.report import INDEXES, walk_answer
+from compare.questions.walk.study import Gait, default_speeds, optimal_gaits
 from compare.report.document import Figure
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.problem import load_result
+from tests.robots.crooked import crooked
 
 # Fewer samples than those of ten intervals: what is tested here is what is done with the gaits.
 SPEC = ProblemSpec(name="nao-cycle", options={"objective": "power", "intervals": 2})
@@ -76,6 +77,56 @@ def test_other_planners_take_the_same_footsteps(gaits: list[Gait]) -> None:
     saved = 100 * (1 - gaits[1].indexes["energy_J_per_m"] / cart.indexes["energy_J_per_m"])
     assert f"Less energy by least-power than by cart-table: {saved:.1f} to {saved:.1f} % in the model." in said
     assert any(sentence.startswith("Published: 9.16 to 13.35 %") for sentence in said)
+
+
+@pytest.mark.slow
+def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command with a gait that no solver found: footsteps are all that is taken of it."""
+    pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+    from compare.questions.walk import planners, study
+
+    robot = crooked(tmp_path)
+    spec = ProblemSpec(name="humanoid-cycle", options={"robot": robot, "objective": "power", "intervals": 2})
+    problem = spec.load()
+    assert default_speeds(problem) == "speed_m_s=0.0141:0.141:10"  # NAO's times the root of 0.40452 m / 0.2029 m
+    x = (problem.lower + problem.upper) / 2
+    x[[problem.variable_index(name) for name in problem.durations]] = 0.8, 0.6
+    found = SweepPoint(
+        at={"speed_m_s": 0.07},
+        feasible=True,
+        status="",
+        objective=1.0,
+        x=problem.by_name(x),
+        violation=0.0,
+        evaluations=1,
+        time_s=0.0,
+    )
+    gait = Gait(found=found, indexes={**dict.fromkeys(INDEXES, 1.0), "step_length_m": 0.07 * 1.4})
+    monkeypatch.setattr(study, "optimal_gaits", lambda *_, **__: [gait])
+    monkeypatch.setattr(planners, "HEIGHT_STEP_M", 0.1)  # one height
+    arguments = ["walk", "humanoid-cycle", "--robot", robot, "--intervals", "2", "--baseline", "cart-table"]
+    arguments += ["--set", "hip_z_lift_off_m.upper=0.39"]
+    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    (cart,) = json.loads((tmp_path / "humanoid-cycle-walk.json").read_text())["planners"]
+    assert cart["indexes"]["step_length_m"] == pytest.approx(0.07 * 1.4) and cart["indexes"]["power_W"] > 0.0
+    assert cart["note"] == "hip 390 mm high" and any(limit.startswith("dsp_dbm_y_mean by") for limit in cart["broken"])
+    assert (tmp_path / "humanoid-cycle.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nao-ssp"], "walk takes a walking cycle, nao-cycle or humanoid-cycle; got 'nao-ssp'"),
+        (
+            ["--baseline", "cart-table", "--option", "torso_share=free"],
+            "the cart-table walk is not judged with torso_share=free; leave that option out",
+        ),
+    ],
+)
+def test_what_has_no_textbook_walk_is_refused(arguments: list[str], sentence: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["walk", *arguments, "--out", str(tmp_path)])
+    assert done.exit_code == 1 and sentence in done.stderr
 
 
 def test_an_unknown_planner_is_named(tmp_path: Path) -> None:

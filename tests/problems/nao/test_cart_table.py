@@ -8,21 +8,25 @@ from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
 from nlp_gait.problem import Array, Result, finely_sampled
+from nlp_gait.problems.biped.cart_table.preview_control import JERK_WEIGHT, PreviewController
+from nlp_gait.problems.biped.cart_table.walker import Footsteps, Walker, cart_table_walk
 from nlp_gait.problems.nao.body import GRAVITY, nao
-from nlp_gait.problems.nao.cycle.cart_table import Footsteps, Walker, cart_table_walk
-from nlp_gait.problems.nao.cycle.preview_control import JERK_WEIGHT, PreviewController
-from nlp_gait.problems.nao.recorded.problem import Recorded
+from nlp_gait.problems.nao.cycle.cart_table import nao_on_a_table
 
-STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3)
+STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3, lift_m=0.015)
 
 
-def histories(gait: Recorded) -> dict[str, Array]:
-    return dict(finely_sampled(Result(problem=gait.problem, x=np.array(gait.x))).arrays)
+def histories(gait: Result) -> dict[str, Array]:
+    return dict(finely_sampled(gait).arrays)
+
+
+def walker() -> Walker:
+    return Walker(body=nao_on_a_table(), footsteps=STEPS)
 
 
 def test_preview_control_is_the_least_squares_optimum() -> None:
     """The gains come from a Riccati equation; the same cost over a long horizon is a linear least squares problem."""
-    controller = PreviewController(sample_s=0.02, height_m=0.26)
+    controller = PreviewController(sample_s=0.02, height_m=0.26, gravity=GRAVITY)
     count, t = 300, 0.02
     reference = np.zeros(count + controller.preview)
     reference[100:], reference[160:] = 0.05, 0.12
@@ -44,7 +48,7 @@ def test_preview_control_is_the_least_squares_optimum() -> None:
 
 
 def test_a_course_is_exact_between_its_samples() -> None:
-    controller = PreviewController(sample_s=0.02, height_m=0.26)
+    controller = PreviewController(sample_s=0.02, height_m=0.26, gravity=GRAVITY)
     course = controller.follow(np.linspace(0.0, 0.1, 50 + controller.preview))
     assert course.states[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
     assert course.at(np.arange(50) * 0.02) == pytest.approx(course.states[:, 0], abs=1e-15)
@@ -52,25 +56,25 @@ def test_a_course_is_exact_between_its_samples() -> None:
 
 
 def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_image() -> None:
-    walker = Walker(robot=nao("nao-v5", rotational_inertia=True), footsteps=STEPS)
-    first, last = walker.planned_zmp(np.array([0.0, STEPS.period_s])).T
+    first, last = walker().planned_zmp(np.array([0.0, STEPS.period_s])).T
     assert last == pytest.approx(first * (1, -1) + (STEPS.step_m, 0), abs=1e-12)
-    foot, ankle = walker.robot.feet["left"], walker.robot.joint("LHipYawPitch").origin_m[1]
+    robot = nao("nao-v5", rotational_inertia=True)
+    foot, ankle = robot.feet["left"], robot.joint("LHipYawPitch").origin_m[1]
     assert -foot.back_m < first[0] < foot.front_m
     assert first[1] - ankle == pytest.approx(foot.left_m - (first[1] - ankle) - foot.right_m, abs=1e-12)
     # Every 5 ms, and at the switch.
-    assert len(walker.times) == 201 and walker.times[120] == STEPS.single_s
+    assert len(walker().times) == 201 and walker().times[120] == STEPS.single_s
 
 
 @pytest.fixture(scope="module")
-def walks() -> dict[int, Recorded]:
+def walks() -> dict[int, Result]:
     """The same footsteps with the cart alone, and with the whole body's ZMP."""
-    return {passes: cart_table_walk(STEPS, passes=passes) for passes in (1, 2)}
+    return {passes: cart_table_walk(nao_on_a_table(), STEPS, passes=passes) for passes in (1, 2)}
 
 
 @pytest.mark.slow
-def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: dict[int, Recorded]) -> None:
-    planned = Walker(robot=nao("nao-v5", rotational_inertia=True), footsteps=STEPS).planned_zmp
+def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: dict[int, Result]) -> None:
+    planned = walker().planned_zmp
     errors = {}
     for passes, gait in walks.items():
         played = histories(gait)
@@ -79,10 +83,10 @@ def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: di
 
 
 @pytest.mark.slow
-def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Recorded]) -> None:
+def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Result]) -> None:
     gait = walks[2]
     hip = histories(gait)["hip"]
-    assert gait.gait == "nao-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)
+    assert gait.problem.name == "recorded-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)
     assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.05, 0, 0), abs=1e-9)
     assert hip[:, 2] == pytest.approx(0.3, abs=1e-6)
     assert gait.problem.playback is not None and gait.problem.playback.repeats
@@ -90,7 +94,7 @@ def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Recorded]) 
 
 @pytest.mark.slow
 def test_another_robot_walks_on_its_own_legs() -> None:
-    gait = cart_table_walk(STEPS, robot="nao-v6", passes=1, intervals=2)
+    gait = cart_table_walk(nao_on_a_table("nao-v6", 2), STEPS, passes=1)
     assert gait.problem.options["robot"] == "nao-v6" and gait.problem.robot is not None
     assert gait.problem.robot.name == nao("nao-v6", rotational_inertia=True).name
 
@@ -109,4 +113,4 @@ def test_another_robot_walks_on_its_own_legs() -> None:
 )
 def test_footsteps_that_are_no_walk_are_refused(change: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        cart_table_walk(Footsteps(**{**vars(STEPS), **change}))
+        cart_table_walk(nao_on_a_table(), Footsteps(**{**vars(STEPS), **change}))

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
+import casadi as ca
 import numpy as np
+from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, Variable, load
-from nlp_gait.problems.biped.cycle import cycle_problem
-from nlp_gait.problems.biped.cycle_motion import STEP, TIMES
+from nlp_gait.problem import Assembly, GaitProblem, Grid, Point, load
 from nlp_gait.problems.biped.double_support import double_support_margins, double_support_mean_margins, support_box
-from nlp_gait.problems.biped.instant import Loader
+from nlp_gait.problems.biped.goals import Goal
 from nlp_gait.problems.biped.parts import Part
+from nlp_gait.problems.biped.recorded.cycle import Half, Judge, on_grids
+from nlp_gait.problems.biped.recorded.limits import HipLimits, StandingLimits, SwingLimits, mean_place
+from nlp_gait.problems.biped.recorded.motion import Motion
+from nlp_gait.problems.biped.recorded.phase import RecordedPhase
 from nlp_gait.problems.biped.single_support import single_support_mean_margins
 from nlp_gait.problems.nao.body import JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.problems.nao.cycle.motion import double_support_planner, nao_cycle_variables, single_support_planner
 from nlp_gait.problems.nao.cycle.problem import nao_cycle_of
 from nlp_gait.problems.nao.cycle.rows import double_margins, mean_margins, single_margins
 from nlp_gait.problems.nao.double_support import DURATION, standing
+from nlp_gait.problems.nao.free_joints import KNEES
 from nlp_gait.problems.nao.legs import hip_variables
 from nlp_gait.problems.nao.problem import paper_parts, with_robot
-from nlp_gait.problems.nao.recorded.motion import JointAngles, Motion, motion_of
-from nlp_gait.problems.nao.recorded.phase import HipLimits, RecordedPhase, StandingLimits, SwingLimits, mean_place
+from nlp_gait.problems.nao.recorded.motion import JointAngles, motion_of
 from nlp_gait.problems.nao.single_support import OWN_VARIABLES, single_support_loads, single_support_margins
 from nlp_gait.robots import Robot
 
@@ -106,13 +111,9 @@ def recorded(
         )
     parts = {name: motion.part(*span) if len(phases) > 1 else motion for name, span in phases.items()}
 
-    def built(factor: int) -> GaitProblem:
-        grid = Grid(intervals=intervals, samples_per_interval=factor, refined_by="samples_per_interval")
-        problem = _cycle(model, parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
-        options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
-        problem = replace(problem, options=options, refine=lambda by: built(factor * by))
-        repeats = len(parts) > 1 and motion.repeats
-        return with_robot(problem, robot, model.armatures_kgm2, repeats=repeats)
+    def built(grid: Grid) -> GaitProblem:
+        problem = cycle_judge(model).problem(parts, grid) if len(parts) > 1 else _phase(model, parts, grid)
+        return with_robot(problem, robot, model.armatures_kgm2, repeats=len(parts) > 1 and motion.repeats)
 
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     times: tuple[float, ...]
@@ -120,10 +121,10 @@ def recorded(
         step, times = float(foot[1, 0] - foot[0, 0]) / 2, (motion.duration_s,)
     else:
         step, times = float(foot[1, 0]), tuple(part.duration_s for part in parts.values())
-    cosine = float(motion.places(motion.q[0])[3])
+    cosine = float(motion.stance.places(motion.q[0])[4])
     return Recorded(
         gait=found,
-        problem=built(1),
+        problem=on_grids(built, intervals, {"robot": robot, "intervals": intervals}),
         x=(*times, step) if found == "nao-cycle" else times,
         motion=motion,
         step_m=step,
@@ -143,20 +144,34 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         duration, loads = single, single_support_loads(model, upright=())
         foot = model.feet["left"]
         own = (
-            *paper_parts(model, single_support_margins(motion.support[:2], foot), single_support_mean_margins(foot)),
+            *paper_parts(
+                model, single_support_margins(motion.stance.support[:2], foot), single_support_mean_margins(foot)
+            ),
             hip,
             SwingLimits(motion, lift),
         )
     else:
         duration, loads = DURATION, standing(model, upright=()).loads("printed")
         right = mean_place(motion)
-        box = support_box(model, {"L": motion.support[:2], "R": (float(right[0]), float(right[1]))})
+        box = support_box(model, {"L": motion.stance.support[:2], "R": (float(right[0]), float(right[1]))})
         own = (
             *paper_parts(model, double_support_margins(box), double_support_mean_margins(box)),
             hip,
             StandingLimits(),
         )
-    phase = _recorded_phase(model, motion, (duration,), duration.name, loads, grid, own)
+    phase = RecordedPhase(
+        robot=model,
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        variables=(duration,),
+        duration=duration.name,
+        plan=single_support_planner(model) if name == "ssp" else double_support_planner(model),
+        loads=loads,
+        grid=grid,
+        parts=own,
+        recorded=motion,
+        cosines=_cosines,
+    )
 
     def assemble(at: Point, ops: object) -> Assembly:
         return phase.assemble(at, phase.samples(at, ops), ops)  # type: ignore[arg-type]
@@ -174,59 +189,30 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
     )
 
 
-def _cycle(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem:
-    """Problem of a cycle: both phases, and the rows that join them."""
-    known = {variable.name: variable for variable in nao_cycle_variables(model)}
-    variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
+def cycle_judge(model: Robot) -> Judge:
+    """The planned cycle as the judge."""
     means = mean_margins(model)
-
-    def hip(switch: str) -> dict[str, Variable]:
-        places = {axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"}
-        return places | {f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"}
-
-    switches = ("lift_off", "touch_down")
-    at_ends = HipLimits([hip(switch) for switch in switches], switches)
-    own: dict[str, tuple[Part, ...]] = {
-        "ssp": (at_ends, SwingLimits(parts["ssp"], OWN_VARIABLES[0])),
-        "dsp": (StandingLimits(),),
-    }
-    loads = {"ssp": single_support_loads(model, upright=()), "dsp": standing(model, upright=()).loads("lever")}
-    margins = {"ssp": single_margins(model), "dsp": double_margins(model)}
-    phases = {
-        name: _recorded_phase(
-            model,
-            motion,
-            variables,
-            TIMES[name],
-            loads[name],
-            grid,
-            (*paper_parts(model, margins[name], means[name]), *own[name]),
-        )
-        for name, motion in parts.items()
-    }
-    cycle = nao_cycle_of(model, variables, phases, at_given_speed=False)
-    problem = cycle_problem("recorded-cycle", "NAO", cycle)
-    return replace(problem, title="A recorded gait of NAO, a walking cycle")
-
-
-def _recorded_phase(
-    model: Robot,
-    motion: Motion,
-    variables: tuple[Variable, ...],
-    duration: str,
-    loads: Loader,
-    grid: Grid,
-    parts: tuple[Part, ...],
-) -> RecordedPhase:
-    return RecordedPhase(
+    single = paper_parts(model, single_margins(model), means["ssp"])
+    double = paper_parts(model, double_margins(model), means["dsp"])
+    standing_loads = standing(model, upright=()).loads("lever")
+    return Judge(
+        owner="NAO",
         robot=model,
         joints=JOINTS,
         planned=PLANNED_JOINTS,
-        variables=variables,
-        duration=duration,
-        plan=single_support_planner(model) if "single" in duration else double_support_planner(model),
-        loads=loads,
-        grid=grid,
-        parts=parts,
-        recorded=motion,
+        variables=nao_cycle_variables(model),
+        halves={
+            "ssp": Half(
+                plan=single_support_planner(model), loads=single_support_loads(model, upright=()), parts=single
+            ),
+            "dsp": Half(plan=double_support_planner(model), loads=standing_loads, parts=double),
+        },
+        goal=Goal(),
+        cosines=_cosines,
+        joined=partial(nao_cycle_of, model, at_given_speed=False),
     )
+
+
+def _cosines(q: MX) -> MX:
+    """Of both knees, from all angles."""
+    return ca.cos(q[[JOINTS.index(knee) for knee in KNEES], :])

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from nlp_gait.problem import Array
-from nlp_gait.problems.nao.body import GRAVITY
 
 PREVIEW_S = 1.6
 ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
@@ -50,10 +49,12 @@ class PreviewController:
     Attributes:
         sample_s: T [s].
         height_m: of the cart [m].
+        gravity: [m/s^2].
     """
 
     sample_s: float
     height_m: float
+    gravity: float
 
     def follow(self, reference: Array) -> Course:
         """Motion of the cart from rest above the first reference.
@@ -83,7 +84,7 @@ class PreviewController:
         """Its motion under a constant jerk, and its ZMP (eq. 6)."""
         t = self.sample_s
         a = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
-        return a, np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -self.height_m / GRAVITY])
+        return a, np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -self.height_m / self.gravity])
 
     def _gains(self) -> tuple[float, Array, Array]:
         """On the summed error, on the state (3,), and on the coming references (preview,)."""
