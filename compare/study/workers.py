@@ -7,7 +7,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from typing import TypeVar
 
@@ -99,10 +99,26 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
             "a worker process died, out of memory perhaps; what is finished is kept: call again"
         ) from error
     finally:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _manager_unheard():
             warnings.simplefilter("ignore")  # joblib tells of the calls that end with whoever stops asking
             if results is not None:
                 results.close()
+
+
+@contextmanager
+def _manager_unheard() -> Iterator[None]:
+    """Without the traceback of joblib's manager thread where calls are cancelled just as it hands one of them out."""
+    before = threading.excepthook
+
+    def hook(raised: threading.ExceptHookArgs) -> None:
+        if not (raised.exc_type is KeyError and raised.thread and "ExecutorManager" in raised.thread.name):
+            before(raised)
+
+    threading.excepthook = hook
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 def end_with(parent: int) -> None:
