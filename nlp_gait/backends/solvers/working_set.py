@@ -102,7 +102,7 @@ class WorkingSet:
     def _violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
         g = np.asarray(self._functions["nlp_g"](x, arguments["p"])).ravel()
         excess: Array = np.maximum(arguments["lbg"] - g, g - arguments["ubg"])
-        return excess > VIOLATED
+        return ~(excess <= VIOLATED)  # also what is not a number
 
     def _count(self, stats: Mapping[str, Any]) -> None:
         """Add the calls and iterations of a run to those before it; the status is that of the last."""
