@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from benchmarks.guarantees.enclosures import OPERATIONS, lost
+from benchmarks.guarantees.enclosures import OPERATIONS, QUADRATIC, lost
 from nlp_gait.backends.kernel.affine import AffineFunction
 from nlp_gait.backends.kernel.kernel_source import kernel_of
 from nlp_gait.errors import CompilerError, InputError
@@ -20,9 +20,12 @@ POINTS = 500
 ROUNDING = 1e-9
 
 
-@pytest.mark.parametrize("name", OPERATIONS)
-def test_every_operation_holds_exact_values_at_random_points(name: str) -> None:
-    assert lost(name, EACH, np.random.default_rng(SEED)) == []
+@pytest.mark.parametrize(
+    ("name", "quadratic"), [*((name, False) for name in OPERATIONS), *((name, True) for name in QUADRATIC)]
+)
+def test_every_operation_holds_exact_values_at_random_points(name: str, quadratic: bool) -> None:
+    """Affine forms, and forms of degree two."""
+    assert lost(name, EACH, np.random.default_rng(SEED), quadratic=quadratic) == []
 
 
 @pytest.mark.parametrize("name", ["walk12", "nao-dsp"])
