@@ -68,7 +68,9 @@ class CycleOptions:
 
     robot: Annotated[
         str | None,
-        typer.Option(help="Of NAO problems: nao-v5 (default), nao-v6, nao-v4, or a robot file (.json, .urdf)."),
+        typer.Option(
+            help="Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, or a robot file (.json, .urdf)."
+        ),
     ] = None
     intervals: Annotated[
         int | None,
