@@ -240,8 +240,10 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     cosine = knee_cosine(bent, thigh, tibia)
     knee = -(x * xd + y * yd + z * zd) / (thigh * tibia) / ca.sqrt(1 - cosine * cosine)
     roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
-    pitch = (x * lengthd - length * xd) * inverse - (0.5 + (tibia**2 - thigh**2) / 2 * inverse) * knee
-    return LegRates((roll, pitch, knee, -(pitch + knee), -roll), distance_squared)
+    turn, excess = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
+    return LegRates(
+        (roll, turn - (0.5 - excess) * knee, knee, -turn - (0.5 + excess) * knee, -roll), distance_squared
+    )
 
 
 def _carried(tree: Sequence[Body]) -> list[list[int]]:

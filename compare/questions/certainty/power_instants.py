@@ -7,10 +7,11 @@ summed link by link in the world. Equal to the recursion's torques up to roundin
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.problems.biped.double_support import Division, Point2, support_box, torso_shares
@@ -191,8 +192,8 @@ class LegParts(NamedTuple):
     """A leg's links by what they ask for, and where its joints are.
 
     Attributes:
-        links: wrenches of pelvis about the hip's yaw-pitch joint, hip link and thigh about the hip, tibia about the knee, link
-            above the sole and sole about the ankle.
+        links: wrenches of pelvis about the hip's yaw-pitch joint, hip link and thigh about the hip, tibia, link above the sole
+            and sole about the ankle: no wrench needs the knee, which is known worst, where the leg is almost straight.
         joints: (3,) hip, knee and ankle [m].
         yaw: (3,) the hip's yaw-pitch joint [m].
         across: (3,) axis of the pitching joints.
@@ -216,12 +217,15 @@ def _leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, fou
     sole = next(foot.link for foot in robot.feet.values() if foot.link == robot.joint(f"{side}AnkleRoll").child)
     names = (yaw.child, *(robot.joint(f"{side}{name}").child for name in LEG_JOINTS[:4]), sole)
     turned = (upright(hip), *frames, upright(ankle))
-    links = (
+    wrenches = [
         link_wrench(robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
         for name, frame in zip(names, turned, strict=True)
-    )
+    ]
+    tibia, down = robot.links[names[3]], np.array([0.0, 0.0, geometry.tibia_m])
+    from_ankle = replace(tibia, com_m=tuple(np.array(tibia.com_m) + down))
+    wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
     joints = (at_hip.position, frames.tibia.origin.position, ankle.position)
-    return LegParts(tuple(links), joints, hip.position + DM(yaw.origin_m), frames.hip.axes.position[:, 1])
+    return LegParts(tuple(wrenches), joints, hip.position + DM(yaw.origin_m), frames.hip.axes.position[:, 1])
 
 
 def _stance(
@@ -237,9 +241,9 @@ def _stance(
     found.torque(f"{side}HipRoll", FORWARD, carried, -1)
     carried = carried.plus(hip_link)
     found.torque(f"{side}HipPitch", leg.across, carried, -1)
-    carried = carried.plus(thigh).about(at_hip - at_knee)
-    found.torque(f"{side}KneePitch", leg.across, carried, -1)
-    carried = carried.plus(tibia).about(at_knee - at_ankle)
+    carried = carried.plus(thigh)
+    found.torque(f"{side}KneePitch", leg.across, carried.about(at_hip - at_knee), -1)
+    carried = carried.about(at_hip - at_ankle).plus(tibia)
     found.torque(f"{side}AnklePitch", leg.across, carried, -1)
     carried = carried.plus(above)
     found.torque(f"{side}AnkleRoll", FORWARD, carried, -1)
@@ -254,9 +258,9 @@ def _swing(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, f
     found.torque(f"{side}AnkleRoll", FORWARD, carried, 1)
     carried = carried.plus(above)
     found.torque(f"{side}AnklePitch", leg.across, carried, 1)
-    carried = carried.about(at_ankle - at_knee).plus(tibia)
-    found.torque(f"{side}KneePitch", leg.across, carried, 1)
-    carried = carried.about(at_knee - at_hip).plus(thigh)
+    carried = carried.plus(tibia)
+    found.torque(f"{side}KneePitch", leg.across, carried.about(at_ankle - at_knee), 1)
+    carried = carried.about(at_ankle - at_hip).plus(thigh)
     found.torque(f"{side}HipPitch", leg.across, carried, 1)
     carried = carried.plus(hip_link)
     found.torque(f"{side}HipRoll", FORWARD, carried, 1)
