@@ -65,9 +65,10 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
         length_squared = y * y + z * z
         length = ca.sqrt(length_squared)
         forward, left, upward = SX(DM([1, 0, 0])), ca.vertcat(0, -z, y) / length, ca.vertcat(0, -y, -z) / length
-        inverse = 1 / ca.fmin(x * x + length_squared, farthest)
+        near = ca.fmin(x * x + length_squared, farthest)
+        inverse, cosine = 1 / near, knee_cosine(near, thigh, tibia)
         along = 0.5 + (thigh**2 - tibia**2) / 2 * inverse
-        across = ca.sqrt(thigh**2 * inverse - along**2)
+        across = thigh * tibia * ca.sqrt(1 - cosine * cosine) * inverse
         out, down = along * x + across * length, along * length - across * x  # of the knee from the hip
         upper = _pitched(-out / thigh, down / thigh, forward, left, upward)
         lower = _pitched((out - x) / tibia, (length - down) / tibia, forward, left, upward)
