@@ -11,7 +11,7 @@
 #include <vector>
 
 static const double SLACK = 0x1p-40;
-static const int SWEEPS = 3, PIVOTS = 80, ROUNDS = 3, CONTRACTIONS = 4;
+static const int SWEEPS = 3, PIVOTS = 32, ROUNDS = 3, CONTRACTIONS = 4;
 static const double LEAST_SHRINKAGE = 0.1, WIDTH_SHARE = 0.25;
 
 struct Gait {
@@ -447,16 +447,17 @@ class Relaxation {
     for (int k = 0; k < G.terms; ++k) {
       const double *P = form(G.power[k]), *tau = form(G.torque[k]), *rate = form(G.rate[k]), w = G.weight[k];
       if (P[at.d] < INFINITY && (P[at.lo] >= 0.0 || P[at.hi] <= 0.0)) {
-        const double sense = P[at.lo] >= 0.0 ? w : -w;
-        if ((sense > 0.0 ? P[0] : -P[0]) - P[at.G] - P[at.H] - P[at.d] < 0.0) {  // its form may be worse than nothing
+        const double sense = P[at.lo] >= 0.0 ? w : -w, at_least = P[at.lo] >= 0.0 ? P[at.lo] : -P[at.hi];
+        surely += w * at_least;
+        greatest += w * (P[at.lo] >= 0.0 ? P[at.hi] : -P[at.lo]);
+        if (P[at.d] > 0.25 * (P[at.hi] - P[at.lo])) {
+          C.c += w * at_least, C.mag += w * at_least;
           Quadratic q;
           q.add(n, at, sense * slowest, P);
+          q.c -= w * slowest * at_least, q.mag += w * slowest * at_least;
           add_column(q, 1.0);
-          continue;
-        }
-        C.add(n, at, sense, P);
-        surely += w * (P[at.lo] >= 0.0 ? P[at.lo] : -P[at.hi]);
-        greatest += w * (P[at.lo] >= 0.0 ? P[at.hi] : -P[at.lo]);
+        } else
+          C.add(n, at, sense, P);
         continue;
       }
       const double turning = most(0.0, most(rate[at.lo], -rate[at.hi])), pulling = most(0.0, most(tau[at.lo], -tau[at.hi]));
