@@ -12,7 +12,7 @@
 
 static const double SLACK = 0x1p-40;
 static const int SWEEPS = 3, PIVOTS = 32, ROUNDS = 3, CONTRACTIONS = 4;
-static const double LEAST_SHRINKAGE = 0.1, WIDTH_SHARE = 0.25;
+static const double LEAST_SHRINKAGE = 0.1, WIDTH_SHARE = 0.125;
 
 struct Gait {
   int n, outputs, rows, terms, heats, time;
@@ -458,6 +458,8 @@ class Relaxation {
           add_column(q, 1.0);
         } else
           C.add(n, at, sense, P);
+        for (int j = 0; j < n; ++j)
+          score[j] += w * slowest * P[at.d] * 0.7 * (e.high[j] - e.low[j]) * (size_of(rate[1 + j]) / (rate[at.G] + TINY) + size_of(tau[1 + j]) / (tau[at.G] + TINY));
         continue;
       }
       const double turning = most(0.0, most(rate[at.lo], -rate[at.hi])), pulling = most(0.0, most(tau[at.lo], -tau[at.hi]));
