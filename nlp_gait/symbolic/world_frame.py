@@ -242,9 +242,7 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     knee = -(x * xd + y * yd + z * zd) / (thigh * tibia) / ca.sqrt(1 - cosine * cosine)
     roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
     turn, excess = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
-    return LegRates(
-        (roll, turn - (0.5 - excess) * knee, knee, -turn - (0.5 + excess) * knee, -roll), distance_squared
-    )
+    return LegRates((roll, turn - (0.5 - excess) * knee, knee, -turn - (0.5 + excess) * knee, -roll), distance_squared)
 
 
 def _carried(tree: Sequence[Body]) -> list[list[int]]:

@@ -180,8 +180,9 @@ def _advance(tree: _Tree, bounds: Bounds, target: float) -> None:
     tree.enclosed += len(new)
     found = bounds.assess(new, target)
     depth = np.tile(tree.depth[chosen] + 1, 2)[found.origin]
+    inherited = np.tile(tree.lowest[chosen], 2)[found.origin]  # a half has no less than the whole
     tree.boxes = np.concatenate([tree.boxes[rest], found.boxes])
-    tree.lowest = np.concatenate([tree.lowest[rest], found.lowest])
+    tree.lowest = np.concatenate([tree.lowest[rest], np.maximum(found.lowest, inherited)])
     tree.cut = np.concatenate([tree.cut[rest], found.cut])
     tree.depth = np.concatenate([tree.depth[rest], depth])
 

@@ -17,7 +17,7 @@ from compare.questions.certainty.boxes import halves
 from compare.questions.certainty.branch_and_bound import Certificate, target_of
 from compare.study.definition import problem_part, sha256_of
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.kernel import affine, quadratic
+from nlp_gait.backends.kernel import affine, quadratic, quadratic_tape
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing
@@ -149,7 +149,17 @@ def _problem(description: Mapping[str, Any]) -> GaitProblem:
 def _code() -> str:
     """Hash of all that decides what happens to a box."""
     native = files("nlp_gait.backends.kernel") / "native"
-    modules = (affine, quadratic, world_frame, boxes, branch_and_bound, power_bounds, power_form, power_instants)
+    modules = (
+        affine,
+        quadratic,
+        quadratic_tape,
+        world_frame,
+        boxes,
+        branch_and_bound,
+        power_bounds,
+        power_form,
+        power_instants,
+    )
     texts = [inspect.getsource(module) for module in modules]
     texts += [
         (native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp", *quadratic.SOURCES)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.problems.biped.double_support import Division, Point2, support_box, torso_shares
@@ -221,8 +220,9 @@ def _leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, fou
         link_wrench(robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
         for name, frame in zip(names, turned, strict=True)
     ]
-    tibia, down = robot.links[names[3]], np.array([0.0, 0.0, geometry.tibia_m])
-    from_ankle = replace(tibia, com_m=tuple(np.array(tibia.com_m) + down))
+    tibia = robot.links[names[3]]
+    x, y, z = tibia.com_m
+    from_ankle = replace(tibia, com_m=(x, y, z + geometry.tibia_m))
     wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
     joints = (at_hip.position, frames.tibia.origin.position, ankle.position)
     return LegParts(tuple(wrenches), joints, hip.position + DM(yaw.origin_m), frames.hip.axes.position[:, 1])

@@ -313,3 +313,34 @@ static void run_tape(const Layout& at, const Step* steps, const double* values, 
     places[now.out] = z;
   }
 }
+
+struct Tape {
+  const Step* steps;
+  const double* values;
+  long long count;
+  int slots;
+};
+
+// A tape with its memory; forms of LANES boxes at a time.
+struct Runner {
+  const Tape& tape;
+  const Layout at;
+  V* vectors;
+  V** places;
+  double* forms;
+
+  Runner(const Tape& tape_, int n, double* memory) : tape(tape_), at(padded(n)) {
+    vectors = (V*)(((unsigned long long)memory + sizeof(V) - 1) / sizeof(V) * sizeof(V));
+    places = (V**)(vectors + tape_vectors(at, tape.slots));
+    forms = (double*)(places + tape.slots + 1);
+  }
+  void run(int n, int outputs, const double* boxes, long long first, long long many) {
+    const double* box[LANES];
+    double* out[LANES];
+    for (int l = 0; l < LANES; ++l) {
+      box[l] = boxes + (first + l < many ? first + l : many - 1) * n * 2;
+      out[l] = forms + (long long)l * outputs * at.size;
+    }
+    run_tape(at, tape.steps, tape.values, tape.count, tape.slots, box, out, vectors, places);
+  }
+};
