@@ -1,13 +1,14 @@
-"""Proofs of NAO's phases: a certificate for each, or the bound that was reached.
+"""Proofs of NAO's phases: a certificate for an instance of GaitBench, or the bound that was reached.
 
-``python -m benchmarks.guarantees.nao OUT nao-dsp 0.01 [HOURS [PART]]`` writes it; one that is there already is kept, and what was
-killed goes on. Without the time to close, the open part stays in OUT and its bound is printed. With PART the bounds of the
-variables are this part of their ranges around the best known gait.
+``python -m benchmarks.guarantees.nao OUT TOLERANCE [--instance ID ...] [--hours HOURS] [--part PART]`` writes them, of all
+instances that have bounds of their power unless some are named; one that is there already is kept, and what was killed goes on.
+Without the time to close, the open part stays in OUT and its bound is printed. With a part the bounds of the variables are this
+part of their ranges around the best known gait.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from pathlib import Path
 
@@ -16,11 +17,12 @@ import numpy as np
 import nlp_gait
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file
+from compare.questions.certainty.power_form import has_power_form
 from nlp_gait.files import write_json
+from nlp_gait.gaitbench.definitions import definition_of, names
 from nlp_gait.gaitbench.known import known
 from nlp_gait.problem import Array, GaitProblem
 
-INSTANCES = {"nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
 REPORT_S = 30.0
 
 
@@ -34,17 +36,23 @@ def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
     )
 
 
-def main() -> None:
-    """Prove one of them."""
-    out, name, tolerance = Path(sys.argv[1]), sys.argv[2], float(sys.argv[3])
-    limit_s = 3600.0 * float(sys.argv[4]) if len(sys.argv) > 4 else 24 * 3600.0
-    out.mkdir(parents=True, exist_ok=True)
-    part = float(sys.argv[5]) if len(sys.argv) > 5 else None
-    stem = f"{name}-{100 * tolerance:g}-percent" + (f"-around-{part:.3g}" if part else "")
+def instance_problem(id: str) -> tuple[GaitProblem, Array]:
+    """The problem from which an instance is made, what it holds constant in bounds that are equal, and its best known x."""
+    definition = definition_of(id)
+    problem = nlp_gait.load(definition.problem, **definition.options).with_values(**definition.values)
+    free = iter(known()[id].best_x)
+    x = np.array([definition.held[name] if name in definition.held else next(free) for name in problem.names])
+    return problem.fix(**definition.held), x
+
+
+def prove(out: Path, id: str, tolerance: float, hours: float, part: float | None) -> None:
+    """Write the certificate of an instance, or print how far it came."""
+    stem = f"{id}-{100 * tolerance:g}-percent" + (f"-around-{part:.3g}" if part else "")
     if (out / f"{stem}.json").exists():
         print(f"{stem} is there")
         return
-    problem, told = nlp_gait.load(name), time.perf_counter()
+    problem, x = instance_problem(id)
+    problem, told = problem if part is None else around(problem, x, part), time.perf_counter()
 
     def progress(note: str) -> None:
         nonlocal told
@@ -52,10 +60,8 @@ def main() -> None:
             told = time.perf_counter()
             print(note, flush=True)
 
-    x = np.array(known()[INSTANCES[name]].best_x)
-    problem = problem if part is None else around(problem, x, part)
     kept = out / f".{stem}.open.npz"
-    found = certify(problem, x, tolerance=tolerance, time_limit_s=limit_s, progress=progress, checkpoint=kept)
+    found = certify(problem, x, tolerance=tolerance, time_limit_s=3600.0 * hours, progress=progress, checkpoint=kept)
     if found.closed:
         write_json(out / f"{stem}.json", certificate_file(problem, found).to_json())
         kept.unlink()
@@ -64,6 +70,20 @@ def main() -> None:
         f"{found.cpu_s:.1f} s of CPU, {found.time_s:.1f} s",
         flush=True,
     )
+
+
+def main() -> None:
+    """Prove one after the other."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.guarantees.nao", description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("tolerance", type=float)
+    parser.add_argument("--instance", action="append", help="only this one; repeatable")
+    parser.add_argument("--hours", type=float, default=24.0, help="for each")
+    parser.add_argument("--part", type=float, help="of every range, around the best known gait")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for id in arguments.instance or [id for id in names() if has_power_form(instance_problem(id)[0])]:
+        prove(arguments.out, id, arguments.tolerance, arguments.hours, arguments.part)
 
 
 if __name__ == "__main__":

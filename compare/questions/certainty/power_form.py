@@ -112,6 +112,7 @@ def power_form(problem: GaitProblem) -> PowerForm:
     power, torque, rate, weight = (np.array(column) for column in zip(*out.terms, strict=True))
     heat, loss = (np.array(column) for column in zip(*out.heats, strict=True))
     root = root_box(problem)
+    widths = np.diff(root)[:, 0]
     rows = PowerRows(
         row=row.astype(np.int32),
         lower=lower,
@@ -123,7 +124,7 @@ def power_form(problem: GaitProblem) -> PowerForm:
         heat=heat.astype(np.int32),
         loss=loss,
         duration=len(problem.names) - 1,
-        ranges=np.diff(root)[:, 0],
+        ranges=np.where(widths > 0.0, widths, 1.0),  # a variable with equal bounds is never cut
     )
     early = QuadraticFunction(
         ca.Function("poses", [out.z], [ca.cse(ca.vertcat(*(out.expressions[out.rows[k][0]] for k in out.early)))])
