@@ -2,7 +2,8 @@
 
 Searched for with IPOPT from random starts, with CMA-ES, and from the best points that the baseline's solvers have found.
 Finished instances are kept in ``nlp_gait/gaitbench/known.json``; a call goes on with those that are missing. A better point
-than the one there may replace it, with ``--again``; probe values never change once they are published.
+than the one there may replace it, with ``--again``; probe values never change once they are published. What the shipped
+certificates prove is always taken over.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,9 @@ import numpy as np
 import metaheuristics
 import nlp_gait
 from compare.bench.baseline import baseline_records, shipped
+from compare.questions.certainty import certificate
 from compare.questions.certainty.branch_and_bound import certify
+from compare.questions.certainty.certificate import read_certificate
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.decoding import decoded
@@ -31,6 +34,7 @@ from nlp_gait.gaitbench.known import Evidence, Known, Probe
 from nlp_gait.problem import Array
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
+CERTIFICATES = Path(certificate.__file__).with_name("certificates")
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
 
 
@@ -77,12 +81,16 @@ def main() -> None:
     arguments = parser.parse_args()
     for id in arguments.instance or gaitbench.names(arguments.subset):
         kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-        if id in kept and not arguments.again:
-            continue
+        published = decoded(Known, kept[id], id) if id in kept else None
         started = time.perf_counter()
         try:
-            published = decoded(Known, kept[id], id) if id in kept else None
-            found = known_of(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
+            if published is None or arguments.again:
+                found = known_of(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
+            else:
+                gap = certified(id, published.best_known)
+                if gap in (None, published.evidence.proven_gap):
+                    continue
+                found = replace(published, evidence=replace(published.evidence, proven_gap=gap))
         except NothingFound as error:
             print(f"{id}: {error}", flush=True)
             continue
@@ -114,7 +122,9 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
                     best, best_known = x, float(f[0])
     if published is not None and published.best_known < best_known:
         best, best_known = np.array(published.best_x), published.best_known
-    proven = proof(instance, best, prove_s)
+    proven = certified(id, best_known)
+    if proven is None:
+        proven = proof(instance, best, prove_s)
     if proven is None and published is not None:
         proven = published.evidence.proven_gap
     agreeing = sum(relative(outcome.cost, best_known) <= SAME for outcome in ends)
@@ -173,12 +183,19 @@ def best_of_baseline(id: str) -> list[tuple[float, Array]]:
     return [(record.verdict.objective, np.array(list(record.x.values()))) for record in runs[:BASELINE_POINTS]]
 
 
+def certified(id: str, best_known: float) -> float | None:
+    """How much better than the best known a feasible point may be at most, by the shipped certificates; None without one."""
+    files = CERTIFICATES.glob(f"{id}-[0-9]*-percent.json")
+    bounds = [read_certificate(path).certificate.bound for path in files]
+    return (best_known - max(bounds)) / abs(best_known) if bounds else None
+
+
 def proof(instance: Instance, best: Array, limit_s: float) -> float | None:
     """How much better than the best known a feasible point may be at most, by branch and bound; None without a bound."""
     if len(instance.names) > 4 or not limit_s:
         return None
-    certificate = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
-    return certificate.gap if math.isfinite(certificate.bound) else None
+    found = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
+    return found.gap if math.isfinite(found.bound) else None
 
 
 def strictly_feasible(instance: Instance, x: Array) -> Array:

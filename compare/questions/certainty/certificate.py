@@ -32,6 +32,18 @@ PATHS = 200
 DEEPEST_PATH = 150
 # Of an objective that is computed again on another machine, relative.
 SAME_VALUE = 1e-9
+# All that decides what happens to a box; with the native sources of the forms.
+CODE = (
+    affine,
+    quadratic,
+    quadratic_tape,
+    world_frame,
+    boxes,
+    branch_and_bound,
+    power_bounds,
+    power_form,
+    power_instants,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,20 +159,8 @@ def _problem(description: Mapping[str, Any]) -> GaitProblem:
 
 
 def _code() -> str:
-    """Hash of all that decides what happens to a box."""
     native = files("nlp_gait.backends.kernel") / "native"
-    modules = (
-        affine,
-        quadratic,
-        quadratic_tape,
-        world_frame,
-        boxes,
-        branch_and_bound,
-        power_bounds,
-        power_form,
-        power_instants,
-    )
-    texts = [inspect.getsource(module) for module in modules]
+    texts = [inspect.getsource(module) for module in CODE]
     texts += [
         (native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp", *quadratic.SOURCES)
     ]

@@ -12,11 +12,12 @@ import numpy as np
 
 import metaheuristics
 from compare.analysis.units import with_unit
-from compare.questions.certainty import bounds, boxes, branch_and_bound, power_bounds, power_form, power_instants
+from compare.questions.certainty import bounds
 from compare.questions.certainty.branch_and_bound import Certificate, certify
-from compare.questions.certainty.certificate import certificate_file
+from compare.questions.certainty.certificate import CODE, certificate_file
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
+from compare.questions.certainty.power_form import has_power_form
 from compare.study.definition import fingerprint, sha256_of
 from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
@@ -166,9 +167,7 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(
-        out, progress, code=[bounds, boxes, branch_and_bound, power_bounds, power_form, power_instants], anew=anew
-    )
+    steps = Steps(out, progress, code=[bounds, *CODE], anew=anew)
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -190,7 +189,7 @@ def certainty(
     if evaluations:
         inputs = {**identity, "evaluations": evaluations, "seed": seed}
         search = decoded(LongSearch, steps("cma", inputs, searched))
-    if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or power_form.has_power_form(problem)):
+    if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or has_power_form(problem)):
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
         certificate = decoded(Certificate, steps("certificate", inputs, proven))
     return Certainty(
