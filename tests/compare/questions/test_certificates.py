@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from benchmarks.gaitbench.known import certified
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
 from benchmarks.guarantees.nao import around as box_around
@@ -114,6 +115,18 @@ def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
     found = check(read_certificate(path), paths=40)
     assert found.paths == 40 and found.same_code
     assert 0.2 * proof.boxes < found.boxes < 5 * proof.boxes  # an estimate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dsp-v5-1-percent", "ssp-v5-1-percent", "walk12-lambda-1-0.1-percent"])
+def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
+    assert check(read_certificate(SHIPPED / f"{name}.json"), paths=3).paths == 3
+
+
+def test_evidence_is_what_certificates_prove() -> None:
+    for id, entry in known().items():
+        gap = certified(id, entry.best_known)
+        assert gap is None or gap == entry.evidence.proven_gap
 
 
 def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
