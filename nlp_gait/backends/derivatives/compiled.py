@@ -24,6 +24,8 @@ from nlp_gait.problem import Array
 # -O1: more optimisation takes the compiler half as long again and gains nothing that can be measured.
 FLAGS = ("-std=c++17", "-O1", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 VALUES, DERIVATIVES = ("nlp_f", "nlp_g"), {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
+# For IPOPT with functions of our own: it shall ask for no other ones, such as derivatives by the parameters.
+NO_OTHERS: Mapping[str, bool] = {"no_nlp_grad": True, "calc_lam_p": False}
 # Detects a wrong library, not rounding: derivatives are compared with differences over this step.
 STEP, CHECK_TOLERANCE, CHECK_POINTS = 1e-6, 1e-3, 5
 # Near a singular pose differences are all rounding: there they change with the step, and another point is drawn.
@@ -62,7 +64,7 @@ class CompiledNlp:
         x, symbols = nlp["x"], nlp["p"]
         self.nlp = {"x": x, "p": symbols, **{key: self.functions[f"nlp_{key}"](x, symbols) for key in ("f", "g")}}
         derivatives = {key: self.functions[name] for key, name in DERIVATIVES.items() if name in self.functions}
-        self.options: dict[str, Any] = {"no_nlp_grad": True, "calc_lam_p": False, **derivatives}
+        self.options: dict[str, Any] = {**NO_OTHERS, **derivatives}
 
     def _check(self, nlp: Mapping[str, MX], p: Array, library: str) -> None:
         """Compare values with the virtual machine's, and derivatives with differences, at some points: most must agree.

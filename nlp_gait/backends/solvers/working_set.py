@@ -16,7 +16,7 @@ import numpy as np
 from casadi import MX
 from numpy.typing import NDArray
 
-from nlp_gait.backends.derivatives.compiled import DERIVATIVES
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NO_OTHERS
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from nlp_gait.problem import Array
 
@@ -135,5 +135,5 @@ class WorkingSet:
             hessian = functions["nlp_hess_l"](x, p, weight, of_all)
             derivatives["hess_lag"] = ca.Function(DERIVATIVES["hess_lag"], [x, p, weight, weights], [hessian])
         watch = IterationWatch(nlp, beside=self._watch)
-        own: dict[str, Any] = {"no_nlp_grad": True, "calc_lam_p": False, "iteration_callback": watch}
-        return ca.nlpsol("some_rows", "ipopt", nlp, {**self._options, **own, **derivatives}), watch
+        options = {**self._options, **NO_OTHERS, **derivatives, "iteration_callback": watch}
+        return ca.nlpsol("some_rows", "ipopt", nlp, options), watch
