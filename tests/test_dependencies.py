@@ -116,7 +116,9 @@ def test_no_folder_is_crowded() -> None:
     for package in ("nlp_gait", "metaheuristics", "compare"):
         for folder in [ROOT / package, *(path for path in (ROOT / package).rglob("*") if path.is_dir())]:
             entries = [p.name for p in folder.iterdir() if not p.name.startswith(("__", "."))]
-            if all(name.endswith((".json", ".json.gz")) for name in entries):  # records and proofs, one file an instance
+            if all(
+                name.endswith((".json", ".json.gz")) for name in entries
+            ):  # records and proofs, one file an instance
                 continue
             assert len(entries) <= MOST_ENTRIES, f"{folder.relative_to(ROOT)} shows {len(entries)}: {sorted(entries)}"
 

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+import compare
 import metaheuristics
 import nlp_gait
 from compare.bench.baseline import baseline_records, shipped
-from compare.questions.certainty import certificate
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import read_certificate
 from metaheuristics.adapters.cma import CmaEs
@@ -34,7 +34,7 @@ from nlp_gait.gaitbench.known import Evidence, Known, Probe
 from nlp_gait.problem import Array
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
-CERTIFICATES = Path(certificate.__file__).with_name("certificates")
+CERTIFICATES = Path(compare.__file__).with_name("certificates")
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
 
 

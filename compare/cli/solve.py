@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from compare.analysis.proven import proven_bound, proven_words
 from compare.analysis.units import with_unit
 from compare.cli.command import command
 from compare.cli.common import (
@@ -23,6 +24,8 @@ from compare.cli.common import (
 )
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, numbers_in
+from compare.study.definition import problem_part
+from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
 
 
@@ -73,7 +76,11 @@ def solve(
             )
         )
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
-    data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven)}
+    data = {
+        **solution.to_json(),
+        "guaranteed": None if proven is None else asdict(proven),
+        "proven_bound": proven_bound(problem_part(loaded)),
+    }
     try:  # before printing, so that a reader who has gone does not take the file with him
         if target is not None:
             write_json(target, without_nan(data))
@@ -84,6 +91,7 @@ def solve(
             _print(solution)
             if proven is not None:
                 stdout.print(f"Guaranteed: {proven}", soft_wrap=True)
+                _print_bound(loaded, solution)
             if target is not None and target.exists():
                 print_written(target)
     if stopped:
@@ -91,6 +99,13 @@ def solve(
         end_interrupted(f"{stopped}; the best point until then is {where}")
     if not solution.success:
         fail(solution.status)
+
+
+def _print_bound(problem: GaitProblem, solution: Solution) -> None:
+    """What no feasible point betters, where that is proven."""
+    words = proven_words(problem_part(problem), solution.objective, solution.objective_unit)
+    if words:
+        stdout.print(f"Optimum: {words}", soft_wrap=True)
 
 
 def _print(solution: Solution) -> None:

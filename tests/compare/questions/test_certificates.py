@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import compare
 import nlp_gait
 from benchmarks.gaitbench.known import certified
 from benchmarks.guarantees.between_samples import feasible_gaits
@@ -24,7 +25,7 @@ from nlp_gait.problem import GaitProblem
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 
-SHIPPED = Path(certificate.__file__).with_name("certificates")
+SHIPPED = Path(compare.__file__).with_name("certificates")
 SEED = 2
 PROBLEM = toy(two_valleys, limit=-9.0)
 BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line

@@ -1,0 +1,45 @@
+"""What shipped certificates prove of a problem's optimum, for the problem of a definition."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from compare.analysis.units import with_unit
+from compare.study.definition import HASH
+
+FOLDER = files("compare") / "certificates"
+
+
+@cache
+def _bounds() -> Mapping[str, float]:
+    """By the hash of a problem, the bound that is closest to its incumbent."""
+    found: dict[str, tuple[float, float]] = {}
+    for file in FOLDER.iterdir():
+        if file.name.endswith(".json"):
+            raw = json.loads(file.read_text(encoding="utf-8"))
+            proof, problem = raw["certificate"], raw["problem"][HASH]
+            gap = abs(proof["bound"] - proof["objective"])
+            found[problem] = min(found.get(problem, (gap, proof["bound"])), (gap, proof["bound"]))
+    return {problem: bound for problem, (_, bound) in found.items()}
+
+
+def proven_bound(problem: Mapping[str, Any]) -> float | None:
+    """Objective that no feasible point betters, proven by branch and bound; None without a shipped proof.
+
+    Args:
+        problem: as in a definition, with the hash of its mathematics and numbers.
+    """
+    return _bounds().get(str(problem.get(HASH, "")))
+
+
+def proven_words(problem: Mapping[str, Any], best: float, unit: str) -> str:
+    """For example ``no feasible point is better than 0.837410 W, 1 % from it``; empty without a proof."""
+    bound = proven_bound(problem)
+    if bound is None:
+        return ""
+    gap = 100 * abs(bound - best) / abs(best)
+    return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"
