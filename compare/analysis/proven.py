@@ -8,6 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from compare.analysis.comparison import Comparison
 from compare.analysis.units import with_unit
 from compare.study.definition import HASH
 
@@ -43,3 +44,11 @@ def proven_words(problem: Mapping[str, Any], best: float, unit: str) -> str:
         return ""
     gap = 100 * abs(bound - best) / abs(best)
     return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"
+
+
+def proven_of(comparison: Comparison) -> str:
+    """The same of the best that a comparison knows."""
+    holder = comparison.reference_holder
+    if holder is None:
+        return ""
+    return proven_words(holder.definition["problem"], comparison.reference, comparison.objective.unit)

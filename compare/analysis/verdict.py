@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.proven import proven_words
+from compare.analysis.proven import proven_of
 from compare.analysis.significance import compare_pairs
 from compare.analysis.table import count, percent
 from compare.analysis.units import listed, with_unit
@@ -36,12 +36,11 @@ def verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
 def _found(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
-    unit, holder = comparison.objective.unit, comparison.reference_holder
-    words = "" if holder is None else proven_words(holder.definition["problem"], comparison.reference, unit)
-    return (
-        f"on {comparison.problem} {comparison.objective.name} {with_unit(comparison.reference, unit)}, reached to 1e-6 by "
-        f"{listed(finders) or 'one run'}" + (f"; {words}" if words else "")
+    best, words = with_unit(comparison.reference, comparison.objective.unit), proven_of(comparison)
+    text = (
+        f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {listed(finders) or 'one run'}"
     )
+    return text + (f", and {words}" if words else "")
 
 
 def _distance(comparison: Comparison) -> str:

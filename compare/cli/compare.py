@@ -177,6 +177,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.failures import failures_of
+    from compare.analysis.proven import proven_of
     from compare.analysis.table import HEADER, cells, summarise
 
     for comparison in compare_problems(records):
@@ -191,6 +192,8 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
+        if words := proven_of(comparison):
+            stdout.print(f"{comparison.problem}: {words}", soft_wrap=True)
     stdout.print(HOW_TO_READ)
 
 
