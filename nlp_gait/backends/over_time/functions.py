@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,6 +14,57 @@ from nlp_gait.problem import Array, Constraint, GaitProblem, Stretch
 from nlp_gait.problem.locking import one_at_a_time
 from nlp_gait.symbolic.nonsmooth import Exact
 
+Integers = np.ndarray[Any, np.dtype[np.intp]]
+
+
+class Enclosed:
+    """Values as an enclosed function, and groups of them alone where that is far less work.
+
+    Attributes:
+        whole: all values.
+        groups: numbers of the values that belong together, one array a group.
+    """
+
+    def __init__(self, function: ca.Function, half_open: Collection[int], groups: Sequence[Sequence[int]]) -> None:
+        """Read the instructions of a function of SX expressions with one result.
+
+        Raises:
+            InputError: an operation that cannot be enclosed.
+            CompilerError: there is no compiler, or it fails.
+        """
+        self.whole = AffineFunction(function, half_open)
+        self.groups = [np.array(group) for group in groups]
+        self._function, self._half_open = function, half_open
+        self._alone: dict[int, EnclosedPart] = {}
+
+    @one_at_a_time
+    def alone(self, group: int) -> EnclosedPart:
+        """A group by its number, by itself if that takes less than half of the instructions of all; read when first asked for."""
+        if group not in self._alone:
+            rows, arguments = self.groups[group], self._function.sx_in()
+            (values,) = self._function.call(arguments)
+            part = ca.Function("part", arguments, [values[rows.tolist()]])
+            share = part.n_instructions() / self._function.n_instructions()
+            if share < 0.5:
+                self._alone[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
+            else:
+                self._alone[group] = EnclosedPart(self.whole, rows, 1.0)
+        return self._alone[group]
+
+
+class EnclosedPart(NamedTuple):
+    """Some values.
+
+    Attributes:
+        function: that gives them, and others perhaps.
+        columns: of its results, which they are.
+        work: of an evaluation, as a share of that of all values.
+    """
+
+    function: AffineFunction
+    columns: Integers
+    work: float
+
 
 class TimeRows(NamedTuple):
     """Functions of time of one kind: (x, p, phase) or (x, p, phase, phase an interval later) to values.
@@ -21,13 +72,13 @@ class TimeRows(NamedTuple):
     Attributes:
         names: of the values.
         units: likewise.
-        values: enclosed.
+        values: enclosed; rows of one name are a group.
         bounds: p to lower and upper bounds.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    values: AffineFunction | None
+    values: Enclosed | None
     bounds: ca.Function
 
     @one_at_a_time
@@ -121,4 +172,8 @@ def _rows(rows: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretc
     scalar = ca.Function("rows", arguments, ca.cse([ca.densify(v) for v in function.call(arguments)]))
     first = int(inputs[0].numel() + inputs[1].numel())
     half_open = range(first, first + len(inputs) - 2) if stretch.kinks else ()
-    return TimeRows(names, units, AffineFunction(scalar, half_open), bounds)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        if units[k]:  # an index has neither unit nor limits
+            groups.setdefault(name.partition("[")[0], []).append(k)
+    return TimeRows(names, units, Enclosed(scalar, half_open, list(groups.values())), bounds)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.backends.kernel.affine import AffineFunction, Forms
+from nlp_gait.backends.over_time.functions import Enclosed, Integers
 from nlp_gait.problem import Array
 from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
 
@@ -17,8 +18,9 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 GRAIN = 2.0**-40
 FIRST_PIECES = 64
 LEAST_PIECE = 2.0**-16
-# Pieces of a stretch after which what is open stays open.
-MOST_PIECES = 3000
+COARSE = 2.0**-10
+# Work on rows of one name, in pieces over which all rows are enclosed, after which what is open stays open.
+MOST_PIECES = 1000
 # A violated row's bounds are sharpened until they agree to this share.
 SHARPNESS = 0.02
 # Share of a mean's value within which its bounds are wanted, and pieces after which they are left as they are.
@@ -68,34 +70,44 @@ class Search:
         most: (m,) and at most this.
     """
 
-    def __init__(self, values: AffineFunction, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
+    def __init__(self, values: Enclosed, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
         self._values, self._given, self._shift = values, given, shift
         self._lower, self._upper = lower, upper
         self.count = 0
         self.least = np.full(len(lower), -np.inf)
         self.most = np.full(len(lower), -np.inf)
         self.first: dict[int, tuple[float, float]] = {}
-        self._settled: list[tuple[Array, Array]] = []
+        self._settled: tuple[Array, Array]
 
     def run(self, pieces: Array) -> None:
-        """Halve what is open until little is, or the pieces are too many or too small."""
-        m = len(self._lower)
-        while len(pieces):
-            forms = self._enclosed(pieces)
-            self.count += len(pieces)
-            low, high = forms.lower[:, :m], forms.upper[:, :m]
-            most, least = beyond(self._lower, self._upper, low, high)
-            self.least = np.fmax(self.least, least.max(axis=0, initial=-np.inf))
+        """Halve what is open, the rows of each name for themselves, until little is, or the pieces are too many or too small."""
+        forms = self._enclosed(self._values.whole, pieces)
+        self._settled = pieces, self._integrated(pieces, forms)
+        for number, rows in enumerate(self._values.groups):
+            if rows[-1] < len(self._lower):
+                self._halve(number, rows, pieces, forms.lower[:, rows], forms.upper[:, rows])
+
+    def _halve(self, number: int, rows: Integers, pieces: Array, low: Array, high: Array) -> None:
+        """Rows of one name, from their values between low and high over the first pieces."""
+        work = float(len(pieces))
+        while True:
+            most, least = beyond(self._lower[rows], self._upper[rows], low, high)
+            self.least[rows] = np.fmax(self.least[rows], least.max(axis=0, initial=-np.inf))
             holds = most <= FEASIBILITY_TOLERANCE
             broken = least > FEASIBILITY_TOLERANCE
-            sharp = most <= self.least + np.maximum(SHARPNESS * self.least, FEASIBILITY_TOLERANCE)
+            sharp = most <= self.least[rows] + np.maximum(SHARPNESS * self.least[rows], FEASIBILITY_TOLERANCE)
             width = pieces[:, 1] - pieces[:, 0]
-            large = (width > 2 * LEAST_PIECE) & (self.count + 2 * len(pieces) <= MOST_PIECES)
-            coarse = width > 4.0 / FIRST_PIECES**2  # where a row breaks, its beginning is wanted no finer
-            again = large & ((~holds & ~broken & ~(sharp & ~coarse[:, None])) | (~holds & ~sharp)).any(axis=1)
+            coarse = width > COARSE  # where a row breaks, its beginning is wanted no finer
+            again = ((~holds & ~broken & ~(sharp & ~coarse[:, None])) | (~holds & ~sharp)).any(axis=1)
+            again &= (width > 2 * LEAST_PIECE) & (work <= MOST_PIECES)
             stays = ~again
-            self._settle(pieces[stays], Forms(*(part[stays] for part in forms)), most[stays], holds[stays])
-            pieces = halves(pieces[again])
+            self._settle(rows, pieces[stays], most[stays], holds[stays])
+            if not again.any():
+                return
+            pieces, part = halves(pieces[again]), self._values.alone(number)
+            forms = self._enclosed(part.function, pieces)
+            low, high = forms.lower[:, part.columns], forms.upper[:, part.columns]
+            work += part.work * len(pieces)
 
     def open_rows(self) -> list[int]:
         """Numbers of the rows that are not shown to hold."""
@@ -103,8 +115,7 @@ class Search:
 
     def integrals(self) -> tuple[Array, Array]:
         """Bounds of the integrals over the phase of what follows the rows, (k,) each."""
-        parts = np.concatenate([parts for _, parts in self._settled])
-        low, high = parts.sum(axis=0).T
+        low, high = self._settled[1].sum(axis=0).T
         return low - ROUNDING * (1 + np.abs(low)), high + ROUNDING * (1 + np.abs(high))
 
     def sharpen_integrals(self, limits: Array) -> None:
@@ -113,8 +124,7 @@ class Search:
         Args:
             limits: (k, 2) of the integrals: while one may lie on either side of a limit, its bounds are not narrow.
         """
-        pieces = np.concatenate([pieces for pieces, _ in self._settled])
-        parts = np.concatenate([parts for _, parts in self._settled])
+        pieces, parts = self._settled
         while parts.shape[1]:
             spread = parts[..., 1] - parts[..., 0]  # infinite where nothing is known
             low, high = parts.sum(axis=0).T
@@ -125,10 +135,10 @@ class Search:
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break
             finer = halves(pieces[again])
-            self.count += len(finer)
+            forms = self._enclosed(self._values.whole, finer)
             pieces = np.concatenate([pieces[~again], finer])
-            parts = np.concatenate([parts[~again], self._integrated(finer, self._enclosed(finer))])
-        self._settled = [(pieces, parts)]
+            parts = np.concatenate([parts[~again], self._integrated(finer, forms)])
+        self._settled = pieces, parts
 
     def _integrated(self, pieces: Array, forms: Forms) -> Array:
         """(P, k, 2) bounds of the integrals over pieces, to which a form's slope adds nothing."""
@@ -140,16 +150,16 @@ class Search:
         both = np.stack([lower, upper], axis=-1)[:, len(self._lower) :]
         return np.asarray(both * (pieces[:, 1] - pieces[:, 0])[:, None, None])
 
-    def _settle(self, pieces: Array, forms: Forms, most: Array, holds: Flags) -> None:
-        self._settled.append((pieces, self._integrated(pieces, forms)))
-        self.most = np.fmax(self.most, most.max(axis=0, initial=-np.inf))
+    def _settle(self, rows: Integers, pieces: Array, most: Array, holds: Flags) -> None:
+        self.most[rows] = np.fmax(self.most[rows], most.max(axis=0, initial=-np.inf))
         for piece, k in zip(*np.nonzero(~holds), strict=True):
-            a, b = pieces[piece].tolist()
-            if k not in self.first or a < self.first[k][0]:
-                self.first[int(k)] = (a, b)
+            (a, b), row = pieces[piece].tolist(), int(rows[k])
+            if row not in self.first or a < self.first[row][0]:
+                self.first[row] = (a, b)
 
-    def _enclosed(self, pieces: Array) -> Forms:
-        inputs = self._values.inputs
+    def _enclosed(self, function: AffineFunction, pieces: Array) -> Forms:
+        self.count += len(pieces)
+        inputs = function.inputs
         boxes = np.empty((len(pieces), inputs, 2))
         boxes[:, : len(self._given)] = self._given[:, None]
         boxes[:, len(self._given)] = pieces
@@ -157,4 +167,4 @@ class Search:
             boxes[:, -1] = pieces + self._shift
         symbols = np.full(inputs, -1)
         symbols[len(self._given) :] = 0
-        return self._values(boxes, symbols)
+        return function(boxes, symbols)
