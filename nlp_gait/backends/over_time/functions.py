@@ -72,7 +72,7 @@ class TimeRows(NamedTuple):
     Attributes:
         names: of the values.
         units: likewise.
-        values: enclosed; rows of one name are a group.
+        values: enclosed; rows of every time and of one name are a group.
         bounds: p to lower and upper bounds.
     """
 
@@ -138,10 +138,10 @@ def time_functions(problem: GaitProblem, stretch: Stretch) -> TimeFunctions:
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
     return TimeFunctions(
         stretch=stretch,
-        instants=_rows([*instants, *means, *squares, *indexes], [point.x, point.p, now], stretch),
+        instants=_rows(instants, [*means, *squares, *indexes], [point.x, point.p, now], stretch),
         plain=len(instants),
         squares=frozenset(range(first, first + len(squares))),
-        changes=_rows(changes, [point.x, point.p, now, later], stretch),
+        changes=_rows(changes, [], [point.x, point.p, now, later], stretch),
         sampled=tuple(c.name for kind in (None, "samples") for c in by_kind.get(kind, [])),
     )
 
@@ -162,7 +162,11 @@ def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
     return [(name, *rest) for name, rest in found.items()]
 
 
-def _rows(rows: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretch) -> TimeRows:
+def _rows(
+    plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretch
+) -> TimeRows:
+    """Rows of every time, and others, whose means have the bounds."""
+    rows = [*plain, *others]
     names, units, values, lower, upper = zip(*rows, strict=True) if rows else ((),) * 5
     bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
     if not rows:
@@ -173,7 +177,6 @@ def _rows(rows: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretc
     first = int(inputs[0].numel() + inputs[1].numel())
     half_open = range(first, first + len(inputs) - 2) if stretch.kinks else ()
     groups: dict[str, list[int]] = {}
-    for k, name in enumerate(names):
-        if units[k]:  # an index has neither unit nor limits
-            groups.setdefault(name.partition("[")[0], []).append(k)
+    for k, (name, *_) in enumerate(plain):
+        groups.setdefault(name.partition("[")[0], []).append(k)
     return TimeRows(names, units, Enclosed(scalar, half_open, list(groups.values())), bounds)

@@ -84,8 +84,7 @@ class Search:
         forms = self._enclosed(self._values.whole, pieces)
         self._settled = pieces, self._integrated(pieces, forms)
         for number, rows in enumerate(self._values.groups):
-            if rows[-1] < len(self._lower):
-                self._halve(number, rows, pieces, forms.lower[:, rows], forms.upper[:, rows])
+            self._halve(number, rows, pieces, forms.lower[:, rows], forms.upper[:, rows])
 
     def _halve(self, number: int, rows: Integers, pieces: Array, low: Array, high: Array) -> None:
         """Rows of one name, from their values between low and high over the first pieces."""

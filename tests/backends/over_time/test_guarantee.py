@@ -14,6 +14,7 @@ import nlp_gait
 from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.backends.kernel import affine
+from nlp_gait.backends.over_time.functions import time_functions
 from nlp_gait.backends.over_time.guarantee import guarantee
 from nlp_gait.backends.over_time.search import beyond
 from nlp_gait.errors import CompilerError
@@ -115,6 +116,24 @@ def test_a_mean_is_that_over_time() -> None:
     (breach,) = found.breaches
     assert found.holds is False and (breach.from_s, breach.to_s) == (1.0, 3.0)
     assert 0.0 < breach.least <= 1e-3 <= breach.most
+
+
+def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
+    problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
+    rows = time_functions(problem, problem.stretches[0]).instants
+    assert rows.values is not None
+    groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.values.groups)}
+    assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
+    part = rows.values.alone(groups["reach"])
+    assert part.work < 0.1
+    given = np.concatenate([x, problem.p, [0.0]])
+    boxes = np.stack([given, given], axis=-1)[None]
+    boxes[:, -1] = 0.3, 0.31
+    symbols = np.where(np.arange(len(given)) == len(given) - 1, 0, -1)
+    alone, whole = (function(boxes, symbols) for function in (part.function, rows.values.whole))
+    columns = rows.values.groups[groups["reach"]]
+    for ends, all_ends in ((alone.lower, whole.lower), (alone.upper, whole.upper)):
+        np.testing.assert_allclose(ends[:, part.columns], all_ends[:, columns], rtol=1e-9)
 
 
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
