@@ -26,7 +26,7 @@ def certainty(
     tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
-    ] = 600.0,
+    ] = 1800.0,
     seed: Seed = 0,
     problem: AnyProblem,
     check: Annotated[

@@ -132,7 +132,7 @@ def certainty(
     starts: int,
     evaluations: int,
     tolerance: float = 0.01,
-    time_limit_s: float = 600.0,
+    time_limit_s: float = 1800.0,
     seed: int = 0,
     anew: Progress | None = None,
     progress: Progress = unwatched,
