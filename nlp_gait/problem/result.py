@@ -20,7 +20,8 @@ SCHEMA = 1  # of a result; one that does not say so is taken as the first
 # What `solve`, `evaluate` and `export --format json` write beside what is read here.
 BESIDE_RESULT = (
     *(part.name for part in fields(Solution)),
-    *("indexes", "constraints", "feasible", "dense", "dense_violations", "dense_intervals", "guaranteed", "signals"),
+    *("indexes", "constraints", "feasible", "dense", "dense_violations", "dense_intervals", "guaranteed"),
+    *("proven_bound", "signals"),
 )
 # The same for the fields of a study's record; tests compare them with ``compare.study.record.RunRecord``.
 BESIDE_RECORD = (
