@@ -11,7 +11,7 @@ import nlp_gait
 from compare.questions.certainty import power_form as power_form_module
 from compare.questions.certainty.power_form import power_form, to_z
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.kernel.quadratic import QuadraticForms, QuadraticFunction
+from nlp_gait.backends.kernel.quadratic import PowerRows, QuadraticForms, QuadraticFunction
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.known import known
 
@@ -83,6 +83,64 @@ def test_an_operation_without_a_form_is_refused() -> None:
         QuadraticFunction(ca.Function("f", [x], [ca.sin(x)]))
     with pytest.raises(InputError, match="boxes of 1 inputs expected"):
         QuadraticFunction(ca.Function("f", [x], [x * x]))(np.zeros((3, 2, 2)))
+
+
+def least_power(rng: np.random.Generator) -> tuple[ca.Function, PowerRows]:
+    """A made-up problem of four terms in three variables and a duration, with powers of known, vague and unknown signs."""
+    z = SX.sym("z", 4)
+    a = 1.0 + z[:3].T @ rng.uniform(-0.3, 0.3, 3)
+    nothing = (a * a * a) * (a * a * a) - (a * a) * (a * a) * (a * a)  # but its form has an error
+
+    def quantity() -> SX:
+        bent = z[:3].T @ rng.uniform(-1.0, 1.0, (3, 3)) @ z[:3]
+        plain = rng.uniform(-3, 3) + z[:3].T @ rng.uniform(-1, 1, 3)
+        return plain + 10.0 ** rng.uniform(-1, 0.5) * bent + 10.0 ** rng.uniform(-1, 1) * nothing
+
+    torques, rates = ([quantity() for _ in range(4)] for _ in range(2))
+    powers = [torque * rate for torque, rate in zip(torques, rates, strict=True)]
+    heats = [torque**2 for torque in torques[:2]]
+    limited = quantity()
+    outputs = ca.vertcat(*powers, *torques, *rates, *heats, limited)
+    first, second, third, fourth = (np.arange(4 * k, 4 * k + 4, dtype=np.int32) for k in range(4))
+    rows = PowerRows(
+        row=np.array([14], dtype=np.int32),
+        lower=np.array([-2.0]),
+        upper=np.array([2.0]),
+        power=first,
+        torque=second,
+        rate=third,
+        weight=10.0 ** rng.uniform(-1.0, 0.0, 4),
+        heat=fourth[:2],
+        loss=10.0 ** rng.uniform(-1.0, 1.0, 2),
+        duration=3,
+        ranges=np.ones(4),
+    )
+    return ca.Function("least_power", [z], [outputs]), rows
+
+
+@pytest.mark.slow
+def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() -> None:
+    rng, tight = np.random.default_rng(SEED), 0
+    for _ in range(250):
+        function, rows = least_power(rng)
+        centre, half = rng.uniform(-0.5, 0.5, 4) + [0, 0, 0, 2.0], 10.0 ** rng.uniform(-2.0, -0.2, 4)
+        box = np.stack([centre - half, centre + half], axis=-1)
+        corners = rng.choice([-1.0, 1.0], (100, 4))
+        Z = centre + half * np.concatenate([corners, rng.uniform(-1.0, 1.0, (400, 4))])
+        values = evaluated(function, Z)
+        cost = np.abs(values[:, rows.power]) @ rows.weight / Z[:, 3] + values[:, rows.heat] @ rows.loss
+        feasible = np.abs(values[:, 14]) <= 2.0
+        if not feasible.any():
+            continue
+        least = cost[feasible].min()
+        for target in (100.0, np.quantile(cost[feasible], 0.3)):
+            found = QuadraticFunction(function).assess(box[None], target, rows)
+            kept = Z[feasible & (cost < target * (1.0 - ROUNDING))]
+            if len(kept):
+                assert found.left[0] and found.lowest[0] <= least * (1.0 + ROUNDING)
+                assert ((found.boxes[0, :, 0] <= kept) & (kept <= found.boxes[0, :, 1])).all()
+        tight += bool(found.lowest[0] > 0.7 * least)
+    assert tight > 20  # bounds that are far off would hide an error
 
 
 def test_boxes_that_hold_the_best_gait_keep_it_and_have_bounds_that_end_in_its_cost() -> None:
