@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-import compare
 import metaheuristics
 import nlp_gait
+from compare.analysis.proven import CERTIFICATES
 from compare.bench.baseline import baseline_records, shipped
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import read_certificate
@@ -34,7 +34,6 @@ from nlp_gait.gaitbench.known import Evidence, Known, Probe
 from nlp_gait.problem import Array
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
-CERTIFICATES = Path(compare.__file__).with_name("certificates")
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
 
 

@@ -6,25 +6,25 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.units import with_unit
 from compare.study.definition import HASH
 
-FOLDER = files("compare") / "certificates"
+CERTIFICATES = Path(str(files("compare") / "certificates"))
 
 
 @cache
 def _bounds() -> Mapping[str, float]:
     """By the hash of a problem, the bound that is closest to its incumbent."""
     found: dict[str, tuple[float, float]] = {}
-    for file in FOLDER.iterdir():
-        if file.name.endswith(".json"):
-            raw = json.loads(file.read_text(encoding="utf-8"))
-            proof, problem = raw["certificate"], raw["problem"][HASH]
-            gap = abs(proof["bound"] - proof["objective"])
-            found[problem] = min(found.get(problem, (gap, proof["bound"])), (gap, proof["bound"]))
+    for path in CERTIFICATES.glob("*.json"):
+        raw = json.loads(path.read_text(encoding="utf-8"))
+        proof, problem = raw["certificate"], raw["problem"][HASH]
+        gap = abs(proof["bound"] - proof["objective"])
+        found[problem] = min(found.get(problem, (gap, proof["bound"])), (gap, proof["bound"]))
     return {problem: bound for problem, (_, bound) in found.items()}
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import compare
 import nlp_gait
 from benchmarks.gaitbench.known import certified
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
 from benchmarks.guarantees.nao import around as box_around
+from compare.analysis.proven import CERTIFICATES
 from compare.questions.certainty import branch_and_bound, certificate, power_form
 from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.certificate import certificate_file, check, read_certificate
@@ -25,7 +25,6 @@ from nlp_gait.problem import GaitProblem
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 
-SHIPPED = Path(compare.__file__).with_name("certificates")
 SEED = 2
 PROBLEM = toy(two_valleys, limit=-9.0)
 BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
@@ -121,7 +120,7 @@ def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dsp-v5-1-percent", "ssp-v5-1-percent", "walk12-lambda-1-0.1-percent"])
 def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
-    assert check(read_certificate(SHIPPED / f"{name}.json"), paths=3).paths == 3
+    assert check(read_certificate(CERTIFICATES / f"{name}.json"), paths=3).paths == 3
 
 
 def test_evidence_is_what_certificates_prove() -> None:
@@ -182,7 +181,7 @@ def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("raise SystemExit('it ran')\n")
-    raw = json.loads((SHIPPED / "walk12-lambda-1-1-percent.json").read_text())
+    raw = json.loads((CERTIFICATES / "walk12-lambda-1-1-percent.json").read_text())
     raw["problem"]["name"] = f"{tmp_path / 'own.py'}:problem"
     (tmp_path / "certificate.json").write_text(json.dumps(raw))
     with pytest.raises(OwnCodeError, match="certificate needs code of your own.*--code"):
@@ -200,7 +199,7 @@ def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     ids=["parameters", "options", "too short", "outside"],
 )
 def test_a_damaged_certificate_is_refused(change: dict[str, dict[str, object]], message: str, tmp_path: Path) -> None:
-    raw = json.loads((SHIPPED / "walk12-lambda-1-1-percent.json").read_text())
+    raw = json.loads((CERTIFICATES / "walk12-lambda-1-1-percent.json").read_text())
     for part, values in change.items():
         raw[part] |= values
     (tmp_path / "certificate.json").write_text(json.dumps(raw))
