@@ -26,14 +26,18 @@ from nlp_gait.problem import Array, GaitProblem
 REPORT_S = 30.0
 
 
-def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
-    """A problem with bounds that are this part of the ranges around a point, and nowhere wider."""
-    half = part * (problem.upper - problem.lower) / 2
-    lower, upper = np.maximum(problem.lower, x - half), np.minimum(problem.upper, x + half)
+def within(problem: GaitProblem, lower: Array, upper: Array) -> GaitProblem:
+    """A problem with other bounds of its variables."""
     named = (("lower", lower), ("upper", upper))
     return problem.with_values(
         **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
     )
+
+
+def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
+    """A problem with bounds that are this part of the ranges around a point, and nowhere wider."""
+    half = part * (problem.upper - problem.lower) / 2
+    return within(problem, np.maximum(problem.lower, x - half), np.minimum(problem.upper, x + half))
 
 
 def instance_problem(id: str) -> tuple[GaitProblem, Array]:

@@ -25,7 +25,6 @@ from compare.cli.common import (
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, numbers_in
 from compare.study.definition import problem_part
-from nlp_gait.problem import GaitProblem
 from nlp_gait.problem.solution import Solution
 
 
@@ -76,10 +75,11 @@ def solve(
             )
         )
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
+    definition = problem_part(loaded)
     data = {
         **solution.to_json(),
         "guaranteed": None if proven is None else asdict(proven),
-        "proven_bound": proven_bound(problem_part(loaded)),
+        "proven_bound": proven_bound(definition),
     }
     try:  # before printing, so that a reader who has gone does not take the file with him
         if target is not None:
@@ -91,7 +91,8 @@ def solve(
             _print(solution)
             if proven is not None:
                 stdout.print(f"Guaranteed: {proven}", soft_wrap=True)
-                _print_bound(loaded, solution)
+                if words := proven_words(definition, solution.objective, solution.objective_unit):
+                    stdout.print(f"Optimum: {words}", soft_wrap=True)
             if target is not None and target.exists():
                 print_written(target)
     if stopped:
@@ -99,13 +100,6 @@ def solve(
         end_interrupted(f"{stopped}; the best point until then is {where}")
     if not solution.success:
         fail(solution.status)
-
-
-def _print_bound(problem: GaitProblem, solution: Solution) -> None:
-    """What no feasible point betters, where that is proven."""
-    words = proven_words(problem_part(problem), solution.objective, solution.objective_unit)
-    if words:
-        stdout.print(f"Optimum: {words}", soft_wrap=True)
 
 
 def _print(solution: Solution) -> None:

@@ -14,6 +14,7 @@ from benchmarks.gaitbench.known import certified
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
 from benchmarks.guarantees.nao import around as box_around
+from benchmarks.guarantees.nao import within
 from compare.analysis.proven import CERTIFICATES
 from compare.questions.certainty import branch_and_bound, certificate, power_form
 from compare.questions.certainty.branch_and_bound import certify
@@ -42,14 +43,6 @@ def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
     """A phase with bounds this part of the ranges around the best known gait, and that gait."""
     problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
     return box_around(problem, best, part), best
-
-
-def within(problem: GaitProblem, lower: np.ndarray, upper: np.ndarray) -> GaitProblem:
-    """A problem with other bounds of its variables."""
-    named = (("lower", lower), ("upper", upper))
-    return problem.with_values(
-        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
-    )
 
 
 @pytest.mark.parametrize("name", GAITS)
