@@ -16,7 +16,7 @@ import numpy as np
 import nlp_gait
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 SMALL = 1e-6
 COLUMNS = {

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import nlp_gait
 from benchmarks.rows import Array
-from nlp_gait.problems.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao
+from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 

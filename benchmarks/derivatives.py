@@ -18,7 +18,7 @@ from nlp_gait.backends.derivatives.compiled import DERIVATIVES, CompiledNlp
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 NAMES = ("nlp_f", "nlp_g", *DERIVATIVES.values())
 # Problems whose starts take long, with their options.

@@ -23,8 +23,8 @@ from compare.study.study import Study, run_study
 from compare.study.task import IPOPT, ProblemSpec, Task
 from nlp_gait.decoding import decoded
 from nlp_gait.files import read_json, write_json
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import ActiveConstraint
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import ActiveConstraint
 
 FILE = Path(__file__).parents[1] / "docs" / "difficulty.json"
 STARTS, RUNS, EVALUATIONS = 100, 31, 10_000

@@ -20,8 +20,8 @@ import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.problem import Array, GaitProblem, Result
-from nlp_gait.problems.humanoid.body import GRAVITY
+from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.gaits.humanoid.body import GRAVITY
 from nlp_gait.robots.biped import NAO_LEG_M, biped_of
 from tests.pinocchio_oracle import floating_model, stand
 

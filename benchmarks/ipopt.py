@@ -13,7 +13,7 @@ from benchmarks.rows import Row
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.nlp import NlpModel, nlp_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.problem import GaitProblem, Point
+from nlp_gait.formulation import GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Angle, Exact
 
 QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}

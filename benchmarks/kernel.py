@@ -17,8 +17,8 @@ from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problems.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler

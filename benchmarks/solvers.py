@@ -14,7 +14,7 @@ from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.starts import available_workers
-from nlp_gait.problem.solution import Outcome
+from nlp_gait.formulation.solution import Outcome
 
 TARGET = 1e-6  # relative distance from the best known objective: 1e-4 %
 SAME_OPTIMUM = 1e-4  # relative

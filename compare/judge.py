@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from nlp_gait.backends.exact import exact_model, violated_rows
-from nlp_gait.backends.over_time.guarantee import Guarantee, guarantee
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
+from nlp_gait.proofs.guarantee import Guarantee, guarantee
 
 DENSE_INTERVALS = 1000  # at least this many equal parts on the dense grid
 

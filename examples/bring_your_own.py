@@ -14,7 +14,7 @@ from scipy.optimize import dual_annealing
 
 import metaheuristics
 import nlp_gait
-from nlp_gait.problem import (
+from nlp_gait.formulation import (
     Assembly,
     Constraint,
     GaitProblem,

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import nlp_gait
 from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.export.setpoints import set_points
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 problem = nlp_gait.load("nao-ssp")

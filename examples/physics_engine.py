@@ -9,7 +9,7 @@ pressure, and what do the servos draw? Needs the extra `sim`; `nlp-gait simulate
 import matplotlib.pyplot as plt
 
 import nlp_gait
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import averaged_pressure, measure
 from nlp_gait.simulation.plan import plan_of

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 
 import metaheuristics
 import nlp_gait
-from nlp_gait.problem import Objective, Parameter
+from nlp_gait.formulation import Objective, Parameter
 
 
 def cost(gait, point, ops):

@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
     from nlp_gait.backends.solvers.registry import solver
-    from nlp_gait.problem import GaitProblem, load, problem_names
-    from nlp_gait.problem.solution import Solution
+    from nlp_gait.formulation import GaitProblem, load, problem_names
+    from nlp_gait.formulation.solution import Solution
 
 # Imported when first used: a search needs no NLP solver, a solve no kernel, and the command line begins at once.
 _LATER = {
-    "GaitProblem": "nlp_gait.problem",
-    "load": "nlp_gait.problem",
-    "problem_names": "nlp_gait.problem",
+    "GaitProblem": "nlp_gait.formulation",
+    "load": "nlp_gait.formulation",
+    "problem_names": "nlp_gait.formulation",
     "CompiledObjective": "nlp_gait.backends.kernel.compiled",
     "compile_objective": "nlp_gait.backends.kernel.compiled",
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
-    "Solution": "nlp_gait.problem.solution",
+    "Solution": "nlp_gait.formulation.solution",
     "solve": "nlp_gait.backends.solve",
     "solver": "nlp_gait.backends.solvers.registry",
 }

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.problem import GaitProblem, registry
+from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.robots.loading import is_robot_file
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.

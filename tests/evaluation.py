@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

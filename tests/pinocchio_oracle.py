@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from nlp_gait.problem import Array, Signals
+from nlp_gait.formulation import Array, Signals
 from nlp_gait.robots import Link, Robot
 
 pin = pytest.importorskip("pinocchio")  # needs NumPy 2

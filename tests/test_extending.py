@@ -24,7 +24,7 @@ from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import registry as algorithms
 from metaheuristics.array import Array
 from metaheuristics.interface import Start
-from nlp_gait.problem import (
+from nlp_gait.formulation import (
     Assembly,
     Constraint,
     GaitProblem,
@@ -37,9 +37,9 @@ from nlp_gait.problem import (
     Variable,
     maker,
 )
-from nlp_gait.problem.registry import PROBLEMS
-from nlp_gait.problems.biped.parts import Contribution, Part
-from nlp_gait.problems.biped.samples import Samples
+from nlp_gait.formulation.registry import PROBLEMS
+from nlp_gait.gaits.biped.parts import Contribution, Part
+from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.robots.custom import humanoid
 
@@ -132,7 +132,7 @@ class MostHipSpeed(Part):
 @pytest.mark.slow
 def test_a_part_of_a_gait_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
     """It joins the paper's parts of single support, limits the motion there, and its limit is a parameter."""
-    from nlp_gait.problems.nao import single_support
+    from nlp_gait.gaits.nao import single_support
 
     paper = single_support.paper_parts
     monkeypatch.setattr(single_support, "paper_parts", lambda *a: (*paper(*a), MostHipSpeed()))

@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 import nlp_gait
 from benchmarks.engine.gaits import PAPER, optimal_cycles, phase_gaits, random_gaits
 from benchmarks.engine.markdown import cells, header
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import DRIVES, Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import plan_of

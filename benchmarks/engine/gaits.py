@@ -14,7 +14,7 @@ from compare.questions.walk.study import CYCLE, optimal_gaits, result_of
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.formulation import GaitProblem, Result
 
 # Gupta, Pratihar, Deb (2023), Tables 6 and 8.
 PAPER = {

@@ -15,8 +15,8 @@ from benchmarks.engine.sensitivity import engine_step
 from compare.papers.stairs.paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.paper import TABLE_4 as STAIRS_TABLE_4
 from compare.papers.walk12.paper import TABLE_3, TABLE_4, PaperRow, row_of
-from nlp_gait.problem import GaitProblem, Result
-from nlp_gait.problems.walk12 import playback as walk12_playback
+from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.gaits.walk12 import playback as walk12_playback
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure

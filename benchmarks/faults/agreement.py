@@ -16,7 +16,7 @@ import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.compiled import LANE_COUNTS, compile_objective
 from nlp_gait.backends.kernel.compiler import native_lanes
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 BLOCK = 100
 TABLE = "{:<14}{:>6}{:>12}{:>14}{:>14}{:>18}{:>18}"

@@ -21,7 +21,7 @@ import numpy as np
 
 import nlp_gait
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 
 class Found(NamedTuple):

@@ -23,15 +23,15 @@ import metaheuristics
 import nlp_gait
 from compare.analysis.proven import CERTIFICATES
 from compare.bench.baseline import baseline_records, shipped
-from compare.questions.certainty.branch_and_bound import certify
-from compare.questions.certainty.certificate import read_certificate
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.decoding import decoded
 from nlp_gait.files import write_json
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.gaitbench.known import Evidence, Known, Probe
-from nlp_gait.problem import Array
+from nlp_gait.proofs.branch_and_bound import certify
+from nlp_gait.proofs.certificate import read_certificate
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
 SAME = 1e-6  # relative difference of two ends of IPOPT that count as one

@@ -16,9 +16,9 @@ import numpy as np
 
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.over_time.guarantee import guarantee
+from nlp_gait.formulation import Array, GaitProblem, registry
 from nlp_gait.gaitbench import known
-from nlp_gait.problem import Array, GaitProblem, registry
+from nlp_gait.proofs.guarantee import guarantee
 
 GAITS, SAMPLES = 100, 100_001
 SEED = 19

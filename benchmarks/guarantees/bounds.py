@@ -13,12 +13,11 @@ import numpy as np
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.backends.kernel.affine import AffineFunction
+from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.known import known
-from nlp_gait.problem import InstantPoint
-from nlp_gait.problems.biped.curves import hip_motion
-from nlp_gait.problems.biped.single_support import swing_foot
-from nlp_gait.problems.nao.body import (
+from nlp_gait.gaits.biped.curves import hip_motion
+from nlp_gait.gaits.biped.single_support import swing_foot
+from nlp_gait.gaits.nao.body import (
     GRAVITY,
     JOINTS,
     arm_joints,
@@ -27,7 +26,8 @@ from nlp_gait.problems.nao.body import (
     upright_links,
     upright_plan,
 )
-from nlp_gait.problems.nao.single_support import ARM_SWING, stance_of
+from nlp_gait.gaits.nao.single_support import ARM_SWING, stance_of
+from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler

@@ -8,10 +8,10 @@ import numpy as np
 
 import nlp_gait
 from benchmarks.guarantees.between_samples import feasible_gaits
-from compare.questions.certainty.bounds import bounds_of
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.known import known
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.proofs.bounds import bounds_of
 
 COUNT = 10_000
 SEED = 2

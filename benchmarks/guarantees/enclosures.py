@@ -17,8 +17,8 @@ import casadi as ca
 import ival
 import numpy as np
 
-from nlp_gait.backends.kernel.affine import AffineFunction, Forms
-from nlp_gait.backends.kernel.quadratic import QuadraticForms, QuadraticFunction
+from nlp_gait.proofs.affine import AffineFunction, Forms
+from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
 
 COUNT = 100_000
 SEED = 19

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 import nlp_gait
-from compare.questions.certainty.branch_and_bound import certify
-from compare.questions.certainty.certificate import certificate_file
-from compare.questions.certainty.power_form import has_power_form
 from nlp_gait.files import write_json
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.definitions import definition_of, names
 from nlp_gait.gaitbench.known import known
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.proofs.branch_and_bound import certify
+from nlp_gait.proofs.certificate import certificate_file
+from nlp_gait.proofs.power_form import has_power_form
 
 REPORT_S = 30.0
 

@@ -13,9 +13,9 @@ import numpy as np
 
 import nlp_gait
 from compare.papers.walk12.paper import TABLE_3
-from compare.questions.certainty.branch_and_bound import certify
-from compare.questions.certainty.certificate import certificate_file
 from nlp_gait.files import write_json
+from nlp_gait.proofs.branch_and_bound import certify
+from nlp_gait.proofs.certificate import certificate_file
 
 TOLERANCES = (0.01, 0.001)
 STARTS = 20

@@ -22,7 +22,7 @@ from compare.study.record import RunRecord
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import refusing
-from nlp_gait.problem import Objective
+from nlp_gait.formulation import Objective
 
 DEFAULT_WEIGHTING = Weighting()
 

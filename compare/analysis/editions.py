@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from compare.study.definition import edition, group_of, sha256_of
+from compare.study.definition import edition, group_of
 from compare.study.record import RunRecord
+from nlp_gait.backends.identity import sha256_of
 
 # An edition's name is a label, so that files can be named after it.
 NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")

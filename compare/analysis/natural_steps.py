@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from nlp_gait.problem import Parameter
+from nlp_gait.formulation import Parameter
 
 
 class NaturalStep(NamedTuple):

@@ -11,9 +11,9 @@ from typing import Any
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.units import with_unit
-from compare.study.definition import HASH
+from nlp_gait.backends.identity import HASH
 
-CERTIFICATES = Path(str(files("compare") / "certificates"))
+CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
 
 
 @cache

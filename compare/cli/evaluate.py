@@ -27,7 +27,7 @@ from nlp_gait.files import csv_text, write_text
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.problems.nao.recorded.problem import Recorded
+    from nlp_gait.gaits.nao.recorded.problem import Recorded
 
 SHOWN_VIOLATIONS = 10
 

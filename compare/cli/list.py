@@ -14,7 +14,7 @@ from compare.cli.command import command
 from compare.cli.common import output_file, print_json, print_table, print_written, stdout
 from compare.cli.options import AsJson
 from nlp_gait.errors import InputError
-from nlp_gait.problem import load, problem_names
+from nlp_gait.formulation import load, problem_names
 
 
 @command
@@ -75,8 +75,8 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
 
 
 def _robot(name: str, out: Path | None, as_json: bool) -> None:
-    from nlp_gait.problems.humanoid.body import humanoid
-    from nlp_gait.problems.humanoid.report import understood_of
+    from nlp_gait.gaits.humanoid.body import humanoid
+    from nlp_gait.gaits.humanoid.report import understood_of
 
     target = None if out is None else output_file(out)
     log = logging.getLogger("nlp_gait")

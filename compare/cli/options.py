@@ -14,13 +14,13 @@ import typer
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import Handling, ProblemSpec, Stop
 from nlp_gait.errors import InputError, kind_name, unknown
-from nlp_gait.problem import Result
-from nlp_gait.problem.registry import problem_maker
-from nlp_gait.problem.result import load_result
+from nlp_gait.formulation import Result
+from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.result import load_result
 from nlp_gait.references import is_reference, name_code
 
 if TYPE_CHECKING:
-    from nlp_gait.problems.nao.recorded.problem import Recorded
+    from nlp_gait.gaits.nao.recorded.problem import Recorded
     from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
 
@@ -158,7 +158,7 @@ class AnyProblem(ProblemOptions):
             InputError: the file holds no gait, or an option has no meaning for one.
         """
         from nlp_gait.export.motions import read_gait
-        from nlp_gait.problems.nao.recorded.problem import recorded
+        from nlp_gait.gaits.nao.recorded.problem import recorded
         from nlp_gait.robots import load_robot
 
         for flag, given in (("--option", self.option), ("--fix", self.fix), ("--derivatives", self.derivatives)):

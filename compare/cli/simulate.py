@@ -66,7 +66,7 @@ def simulate(
     from compare.drawing.playback_figure import plot_playback
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
-    from nlp_gait.problem.result import load_result
+    from nlp_gait.formulation.result import load_result
     from nlp_gait.simulation.engine import mujoco
     from nlp_gait.simulation.film.film import picture_size
     from nlp_gait.simulation.film.video import check_frames, check_video_path

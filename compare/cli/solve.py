@@ -24,8 +24,8 @@ from compare.cli.common import (
 )
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, numbers_in
-from compare.study.definition import problem_part
-from nlp_gait.problem.solution import Solution
+from nlp_gait.backends.identity import problem_part
+from nlp_gait.formulation.solution import Solution
 
 
 @command
@@ -53,9 +53,9 @@ def solve(
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
     import nlp_gait
-    from nlp_gait.backends.over_time.guarantee import guarantee
     from nlp_gait.backends.solvers import registry
     from nlp_gait.files import without_nan, write_json
+    from nlp_gait.proofs.guarantee import guarantee
 
     target = None if out is None else output_file(out)
     loaded = problem.spec().load()

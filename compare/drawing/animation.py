@@ -11,8 +11,8 @@ import numpy as np
 from compare.drawing.figures import new_figure, style
 from nlp_gait.backends.interrupts import held_interrupts
 from nlp_gait.files import new_file
-from nlp_gait.problem import Array
-from nlp_gait.problem.motion.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.simulation.film.video import Frame
 
 if TYPE_CHECKING:

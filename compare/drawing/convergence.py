@@ -10,7 +10,7 @@ import numpy as np
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.distribution import band
 from compare.drawing.figures import Look, legend_below, logarithmic, looks, new_figure, style
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

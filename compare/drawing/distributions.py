@@ -12,7 +12,7 @@ from compare.analysis.statistics.distribution import ECDF_TARGETS, ecdf, perform
 from compare.analysis.statistics.run_length import TARGETS
 from compare.drawing.convergence import cost_figure, shown_percent
 from compare.drawing.figures import Look, legend_below, logarithmic, looks, new_figure, style
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,10 @@ import numpy as np
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
 from compare.drawing.figures import INK, Look, legend_below, looks, new_figure, style
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Result, sampled
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.motion.signals import JOINT_UNITS
-from nlp_gait.problem.motion.skeleton import TRUNK, Skeleton
+from nlp_gait.formulation import Array, Result, sampled
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.motion.signals import JOINT_UNITS
+from nlp_gait.formulation.motion.skeleton import TRUNK, Skeleton
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from compare.analysis.units import heading, with_unit
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 
 def axis_label(name: str, unit: str) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Result, sampled
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.motion.skeleton import Skeleton
+from nlp_gait.formulation import Result, sampled
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.motion.skeleton import Skeleton
 
 
 @one_at_a_time

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from compare.study.progress import Progress
 from compare.study.record import RunRecord
 from compare.study.runner import Run, run_task
 from compare.study.study import Study, record_file, run_study
@@ -16,6 +15,7 @@ from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
+from nlp_gait.progress import Progress
 
 Runs = dict[tuple[str, str], list[RunRecord]]
 """Records in the order of their runs, by title of the problem and of the solver."""

@@ -19,16 +19,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from compare.study.definition import fingerprint, sha256_of
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps, as_json
+from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers import ipopt, stages
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import OutputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Best, Evaluations, Guess, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
+from nlp_gait.progress import Progress, ignore_progress
 
 KEPT, MADE = b"k", b"m"
 NAME_DIGITS = 20  # of a hash, in the name of a run's file
@@ -46,9 +46,9 @@ class Finished:
         anew: see above.
     """
 
-    def __init__(self, out: Path | None = None, anew: Progress = unwatched) -> None:
+    def __init__(self, out: Path | None = None, anew: Progress = ignore_progress) -> None:
         self.anew = anew
-        self._steps = None if out is None else Steps(out, unwatched, code=[ipopt, stages], anew=anew)
+        self._steps = None if out is None else Steps(out, ignore_progress, code=[ipopt, stages], anew=anew)
         self._counts = None if out is None else _Counts()
 
     def asked(self, question: str, problem: GaitProblem, **inputs: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from compare.study.task import ProblemSpec
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.robots.perturbation import MASS, perturbed_name, split_name
 
 

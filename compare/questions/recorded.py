@@ -13,9 +13,9 @@ import nlp_gait
 from compare.judge import Evaluation, evaluate
 from nlp_gait.errors import GaitError
 from nlp_gait.files import without_nan
-from nlp_gait.problem import Result
-from nlp_gait.problem.solution import Solution
-from nlp_gait.problems.nao.recorded.problem import Recorded
+from nlp_gait.formulation import Result
+from nlp_gait.formulation.solution import Solution
+from nlp_gait.gaits.nao.recorded.problem import Recorded
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import plan_of

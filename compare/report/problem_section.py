@@ -20,7 +20,7 @@ from compare.report.gait_section import gaits_part
 from compare.study.engine import Played
 from compare.study.record import RunRecord
 from nlp_gait.files import file_safe
-from nlp_gait.problem.solution import ActiveConstraint
+from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
 

@@ -13,7 +13,7 @@ from compare.study.task import LABEL
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, writable_folder, write_json
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.measurements import measure

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.definition import problem_part, sha256_of
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.study import RECORDS, read_records
 from compare.study.task import LABEL, ProblemSpec
+from nlp_gait.backends.identity import problem_part, sha256_of
 from nlp_gait.columns import Columns, read_columns
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 # Columns beside the variables.
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")

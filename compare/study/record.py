@@ -11,14 +11,14 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL, ProblemSpec, Task
-from nlp_gait.backends.over_time.guarantee import Guarantee
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, refusing, without_nan
+from nlp_gait.formulation import Objective, Result
+from nlp_gait.formulation.result import StoredProblem
+from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import html_table
-from nlp_gait.problem import Objective, Result
-from nlp_gait.problem.result import StoredProblem
-from nlp_gait.problem.solution import ActiveConstraint, Evaluations
+from nlp_gait.proofs.guarantee import Guarantee
 from nlp_gait.references import named_as
 
 SCHEMA = 2

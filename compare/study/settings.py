@@ -12,7 +12,7 @@ from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, S
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, read_text, refusing
-from nlp_gait.problem.registry import PROBLEMS
+from nlp_gait.formulation.registry import PROBLEMS
 from nlp_gait.references import named_as
 
 SCHEMA = 1  # of study files; they may leave it out

@@ -10,12 +10,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from compare.study.definition import input_differences, sha256_of
-from compare.study.progress import Progress
+from compare.study.definition import input_differences
 from compare.study.workers import side_by_side
+from nlp_gait.backends.identity import sha256_of
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_json, remove_leftovers, writable_folder, write_json
+from nlp_gait.progress import Progress
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from compare.judge import evaluate
-from compare.study.definition import HASH, differences, key_of, without_hashes
+from compare.study.definition import differences, key_of, without_hashes
 from compare.study.record import RunRecord, Verdict, read_record, run_file
 from compare.study.rows import frame_of
 from compare.study.runner import Run, run_task
 from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
+from nlp_gait.backends.identity import HASH
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError

@@ -14,13 +14,14 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.study.definition import SOURCE, group_of, problem_part, sha256_of, source_of
+from compare.study.definition import group_of, source_of
 from metaheuristics.interface import Algorithm
+from nlp_gait.backends.identity import SOURCE, problem_part, sha256_of
 from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.registry import PROBLEMS, check_options
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.registry import PROBLEMS, check_options
 from nlp_gait.references import check_reference, installed, is_own, load_object, short_name, source_sha256
 from nlp_gait.robots.loading import is_robot_file, robot_content
 
@@ -43,7 +44,7 @@ class ProblemSpec:
     """A problem as plain data.
 
     Attributes:
-        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.problem.registry.problem_maker``; or a ``GaitProblem``
+        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.formulation.registry.problem_maker``; or a ``GaitProblem``
             itself, which then has its options already.
         options: what it is built with, where that differs from the defaults.
         values: parameters, where they differ from the defaults.

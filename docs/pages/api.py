@@ -14,8 +14,8 @@ from docs.pages.markdown import write_all
 # Front doors, and the modules of which scripts and notebooks take names; a name is described where it stands first.
 DOORS = {
     "nlp_gait": (),
-    "nlp_gait.problem": (),
-    "nlp_gait.problem.solution": ("ActiveConstraint", "ConstraintValue", "Evaluations", "Outcome", "SolveTime"),
+    "nlp_gait.formulation": (),
+    "nlp_gait.formulation.solution": ("ActiveConstraint", "ConstraintValue", "Evaluations", "Outcome", "SolveTime"),
     "nlp_gait.robots": (),
     "nlp_gait.gaitbench": (),
     "nlp_gait.simulation.plan": ("Plan", "plan_of"),

@@ -16,11 +16,11 @@ from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import drawn_gait, gaits_figure
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.formulation import GaitProblem, Result, load, problem_names
+from nlp_gait.formulation.registry import PROBLEMS, problem_maker
+from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.gaitbench.known import known
-from nlp_gait.problem import GaitProblem, Result, load, problem_names
-from nlp_gait.problem.registry import PROBLEMS, problem_maker
-from nlp_gait.problem.solution import ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Exact
 
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own

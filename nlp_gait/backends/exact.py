@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, ConstraintValue
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Exact
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem import Array, GaitProblem, Point
+from nlp_gait.formulation import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
 # Sigmoid widths of the stages in which a jump is approached, in units of the switch (metres for a balance margin).

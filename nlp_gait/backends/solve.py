@@ -13,8 +13,8 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import InputError, checked_count, shown
-from nlp_gait.problem import Array, GaitProblem, load
-from nlp_gait.problem.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
+from nlp_gait.formulation import Array, GaitProblem, load
+from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 
 # A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6

@@ -24,8 +24,8 @@ from nlp_gait.backends.interrupts import children_ignore_interrupts, never
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import WorkerError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Outcome
 
 # How often the parent looks whether Ctrl-C was pressed [s].
 LOOK_EVERY_S = 0.05

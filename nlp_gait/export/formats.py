@@ -10,7 +10,7 @@ from nlp_gait.export.setpoints import SetPoints, set_points
 from nlp_gait.export.tables import write_csv, write_json
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import write_text
-from nlp_gait.problem import Result, sampled
+from nlp_gait.formulation import Result, sampled
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import plan_model
 from nlp_gait.simulation.plan import plan_of

@@ -14,8 +14,8 @@ from nlp_gait.backends.derivatives.straight_line import number
 from nlp_gait.backends.derivatives.structure import structure_of
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
 from nlp_gait.export.c_files import comment, write_c_files
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
 
 # Files of the export by the template that each is made from; the C++ file is put together from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from nlp_gait.files import csv_text, new_file, write_text
-from nlp_gait.problem import Result, Signals
-from nlp_gait.problem.result import SCHEMA
+from nlp_gait.formulation import Result, Signals
+from nlp_gait.formulation.result import SCHEMA
 
 
 def write_csv(path: Path, signals: Signals) -> None:

@@ -10,8 +10,8 @@ from nlp_gait.backends.kernel.compiler import native_source
 from nlp_gait.backends.kernel.kernel_source import kernel_of, kernel_source
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.export.c_files import comment, write_c_files
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance, Sides
-from nlp_gait.problem import Array
 
 # Files of the export by the template that each is made from; the C++ file is put together from the kernel.
 TEMPLATES = {

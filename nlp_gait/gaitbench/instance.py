@@ -12,11 +12,11 @@ import numpy as np
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.errors import InputError, check_name
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import check_installed
 from nlp_gait.gaitbench.definitions import Definition, definition_of
 from nlp_gait.gaitbench.known import Evidence, Known, known
 from nlp_gait.gaitbench.problem import gaitbench
-from nlp_gait.problem import Array, GaitProblem
 
 # What was built for an instance is shared by all threads, and built by one of them.
 _BUILDING = threading.RLock()

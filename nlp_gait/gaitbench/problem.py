@@ -9,8 +9,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from nlp_gait.gaitbench.definitions import Definition, definition_of
-from nlp_gait.problem import (
+from nlp_gait.formulation import (
     Array,
     Assembly,
     Constraint,
@@ -22,6 +21,7 @@ from nlp_gait.problem import (
     load,
     maker,
 )
+from nlp_gait.gaitbench.definitions import Definition, definition_of
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # No search meets an equation to the last bit: it is a band of this share of its row's scale to either side.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.feedback import Balance, Feedback, check_period
 from nlp_gait.simulation.plan import Plan

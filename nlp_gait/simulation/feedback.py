@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
 

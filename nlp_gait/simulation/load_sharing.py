@@ -16,10 +16,10 @@ from casadi import SX
 from scipy import sparse
 
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.problem import Array, Signals
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problems.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
-from nlp_gait.problems.biped.instant import BOTH_FEET
+from nlp_gait.formulation import Array, Signals
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.gaits.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
+from nlp_gait.gaits.biped.instant import BOTH_FEET
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.feedback import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan

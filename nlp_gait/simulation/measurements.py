@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import SIDES, Plan

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Result, Signals, finely_sampled
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.motion.playback import Tread
-from nlp_gait.problem.motion.steps import walk
+from nlp_gait.formulation import Array, Result, Signals, finely_sampled
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.motion.playback import Tread
+from nlp_gait.formulation.motion.steps import walk
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.problem import Array, Columns, Signals, in_space
+from nlp_gait.formulation import Array, Columns, Signals, in_space
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import mujoco

@@ -7,8 +7,8 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import ExactValues, exact_model
-from nlp_gait.problem import Constraint, GaitProblem, load
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.formulation import Constraint, GaitProblem, load
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, row_violations, toy
 

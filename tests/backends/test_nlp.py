@@ -11,7 +11,7 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.problem import Constraint, load
+from nlp_gait.formulation import Constraint, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, corner, row, toy
 

@@ -8,8 +8,8 @@ from typing import Literal
 from casadi import MX
 
 from nlp_gait.backends.exact import exact_model, violated_rows
-from nlp_gait.problem import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
-from nlp_gait.problem.solution import ConstraintValue
+from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
+from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # From the two variables, the parameter "limit" and an interpretation, to the objective and the constraints.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from compare.study.record import History, RunRecord, Times, Verdict
-from nlp_gait.problem.solution import ActiveConstraint
+from nlp_gait.formulation.solution import ActiveConstraint
 
 # A point of nao-dsp that can be played.
 DSP_X = {

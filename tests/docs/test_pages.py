@@ -17,7 +17,7 @@ from docs.check import faults_of
 from docs.pages import algorithms, api, commands, problems
 from docs.pages.gallery import ORDER
 from docs.pages.markdown import literal, table
-from nlp_gait.problem import load, problem_names
+from nlp_gait.formulation import load, problem_names
 
 ROOT = Path(__file__).parents[2]
 OWN = ("nlp_gait", "metaheuristics", "compare")

@@ -11,7 +11,7 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError, OutputError, UnknownNameError
 from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.problem import Result, load_result, problem_names
+from nlp_gait.formulation import Result, load_result, problem_names
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
 

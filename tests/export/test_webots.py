@@ -9,7 +9,7 @@ import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.export.setpoints import SetPoints, set_points
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion, write_motion
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 from nlp_gait.robots import load_robot
 
 OPTIMUM = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)

@@ -176,7 +176,7 @@ def test_naming_is_what_runs_code(tmp_path: Path) -> None:
     """A file of data that names code runs nothing; the same file runs once the code is named."""
     mark = tmp_path / "it-ran"
     own = tmp_path / "own.py"
-    own.write_text(f"from nlp_gait.problem import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
+    own.write_text(f"from nlp_gait.formulation import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
     walk = load_object(f"{own}:leg", "problem")
     assert mark.exists()
     mark.unlink()

@@ -263,7 +263,7 @@ def test_animate_while_a_picture_is_drawn(
 @pytest.mark.slow
 def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
-    from nlp_gait.problem import GaitProblem
+    from nlp_gait.formulation import GaitProblem
 
     with monkeypatch.context() as patch:
         press_after(patch, GaitProblem, "fix", 2)  # the first one checks what was asked

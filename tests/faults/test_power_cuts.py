@@ -18,7 +18,7 @@ from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.tables import write_npz
 from nlp_gait.files import writable_folder, write_json
-from nlp_gait.problem import Signals
+from nlp_gait.formulation import Signals
 from tests.compare.records import record
 from tests.faults.forgetful_disk import Files, ForgetfulDisk
 

@@ -13,10 +13,10 @@ from compare.study.task import ProblemSpec
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.problem import Result
-from nlp_gait.problem.registry import LARGEST_COUNT
-from nlp_gait.problem.result import load_result
-from nlp_gait.problem.sampling import LONGEST_S, SHORTEST_S, sampled
+from nlp_gait.formulation import Result
+from nlp_gait.formulation.registry import LARGEST_COUNT
+from nlp_gait.formulation.result import load_result
+from nlp_gait.formulation.sampling import LONGEST_S, SHORTEST_S, sampled
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames

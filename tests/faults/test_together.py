@@ -20,7 +20,7 @@ import nlp_gait
 from benchmarks.faults import together
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 from tests.backends.toys import corner, toy
 from tests.faults.processes import ROOT
 

@@ -13,16 +13,16 @@ from typing import Any
 from xml.etree import ElementTree
 
 from compare.papers.nao.runs import read_points, write_points
-from compare.questions.certainty.certificate import check, read_certificate
-from compare.study.definition import problem_part
 from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
 from compare.study.settings import StudySettings, read_settings
 from compare.study.steps import Steps
 from compare.study.study import Study, check_study
+from nlp_gait.backends.identity import problem_part
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
-from nlp_gait.problem import load, load_result
+from nlp_gait.formulation import load, load_result
+from nlp_gait.proofs.certificate import check, read_certificate
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import biped_of
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml

@@ -12,7 +12,7 @@ import pytest
 
 from nlp_gait import gaitbench
 from nlp_gait.errors import MissingExtraError
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 ID = "ssp-v5"
 

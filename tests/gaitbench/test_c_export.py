@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from nlp_gait import gaitbench
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.c_export import export_objective, prefix_of
-from nlp_gait.problem import Array
 
 EQUAL = 1e-12
 IDS = ("walk12-w015", "ssp-v5-time10")

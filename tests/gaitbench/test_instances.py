@@ -13,10 +13,10 @@ import pytest
 
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import Array, load
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.gaitbench.known import known
 from nlp_gait.gaitbench.problem import held
-from nlp_gait.problem import Array, load
 
 # A published value may change by rounding alone: other compilers, other widths of SIMD.
 PUBLISHED = 1e-12

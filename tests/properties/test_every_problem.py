@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.problem import Array, GaitProblem, load
-from nlp_gait.problem.registry import PROBLEMS
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Outcome
+from nlp_gait.formulation import Array, GaitProblem, load
+from nlp_gait.formulation.registry import PROBLEMS
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
 from tests.evaluation import evaluated
 
 # Left out of all but the first test, with the reason.

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nlp_gait.problem import Array, GaitProblem, Signals, load
-from nlp_gait.problems.nao.body import GRAVITY, upright_links
+from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.gaits.nao.body import GRAVITY, upright_links
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench

@@ -13,7 +13,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 from tests.referee import nao, stairs, stairs_ideal, walk12
 
 POINTS = 1000

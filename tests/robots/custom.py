@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 Record = dict[str, Any]
 

@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, tree_from, weld
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics

@@ -14,7 +14,7 @@ from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
 from nlp_gait.export.tables import write_npz
 from nlp_gait.files import new_file, write_text
-from nlp_gait.problem import Signals
+from nlp_gait.formulation import Signals
 from nlp_gait.simulation.film.video import write_video
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import nlp_gait
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 
 GAITS = {
     # Gupta, Pratihar, Deb (2023), Table 6, and our optimum to the digits that the documentation prints.

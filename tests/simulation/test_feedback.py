@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Result
+from nlp_gait.formulation import Array, Result
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
 

@@ -33,7 +33,7 @@ import sys
 import numpy as np
 import nlp_gait
 from functools import partial
-from nlp_gait.problem import Result
+from nlp_gait.formulation import Result
 from nlp_gait.simulation.engine import mujoco
 mujoco(pictures=True)
 from nlp_gait.simulation.film.film import pictures

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.problem import Array, Result, load
+from nlp_gait.formulation import Array, Result, load
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation.load_sharing import Sharing, Support, bearing_rows, double_supports, instants_of, share_loads
 from nlp_gait.simulation.plan import Plan, plan_of
+from tests.gaits.nao.test_cycle import OPTIMUM
 from tests.pinocchio_oracle import left_over
-from tests.problems.nao.test_cycle import OPTIMUM
 from tests.properties.mirror import JOINT_SIGNS, partner
 
 # Two double-precision algorithms on torques of some Nm.

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from nlp_gait.problem import Signals, in_space  # noqa: E402
+from nlp_gait.formulation import Signals, in_space  # noqa: E402
 from nlp_gait.robots import load_robot  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import averaged_pressure, measure  # noqa: E402

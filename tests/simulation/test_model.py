@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.problems.nao.body import GRAVITY
+from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.conditions import Conditions

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from nlp_gait.problem import GaitProblem, Result
+from nlp_gait.formulation import GaitProblem, Result
 
 pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is played in the engine

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from casadi import DM, SX
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_point_masses, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench
 

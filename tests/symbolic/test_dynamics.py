@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import Body, tree_from, weld
 from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_wrench

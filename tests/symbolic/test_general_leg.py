@@ -12,9 +12,9 @@ from casadi import DM, SX
 from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array
-from nlp_gait.problems.humanoid.newton import newton_steps, residuals
-from nlp_gait.problems.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.humanoid.newton import newton_steps, residuals
+from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import biped_of
 from nlp_gait.robots.leg import Leg

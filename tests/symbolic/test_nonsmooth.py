@@ -9,7 +9,7 @@ from casadi import MX, SX
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Lifted, Nonsmooth, Root
 
 MARGIN = 0.01

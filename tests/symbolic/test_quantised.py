@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.symbolic.contact import Contact, Ground, solve_definite
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
 from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, explicit_quantum, implicit_quantum

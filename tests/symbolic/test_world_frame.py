@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 from benchmarks.guarantees.bounds import errors
-from nlp_gait.problems.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
+from nlp_gait.gaits.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.inverse_kinematics import leg_angles

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 # Targets of the distribution: from 100 % above the best known to 1e-6, evenly in logarithm.
 ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(0, -6, 31))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 RESAMPLES = 2000
 SEED = 0  # intervals are repeatable

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.study.record import RunRecord
-from nlp_gait.problem import Array, Objective
+from nlp_gait.formulation import Array, Objective
 
 # Relative distances from the best known objective for which the expected running time is tabled.
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 
 def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:

@@ -69,7 +69,7 @@ def certainty(
 
 
 def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
-    from compare.questions.certainty.certificate import check, read_certificate
+    from nlp_gait.proofs.certificate import check, read_certificate
 
     file = read_certificate(path)
     found = check(file, paths=paths, seed=seed)

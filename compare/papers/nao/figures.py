@@ -15,7 +15,7 @@ from compare.papers.nao.findings import NAMES, Findings, PhaseFindings, Points
 from compare.papers.nao.paper import SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.runs import ALGORITHMS
 from compare.papers.runs import point
-from nlp_gait.problem import Array, Result
+from nlp_gait.formulation import Array, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

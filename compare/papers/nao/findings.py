@@ -15,7 +15,7 @@ from compare.papers.nao.paper import PrintedPhase
 from compare.papers.nao.runs import Held, power_with_legs_twice
 from compare.papers.runs import best
 from compare.study.record import RunRecord, Verdict
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read

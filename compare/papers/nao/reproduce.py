@@ -29,11 +29,11 @@ from compare.papers.nao.runs import (
 )
 from compare.papers.runs import Runs, best, run_all
 from compare.report.writing import write_document
-from compare.study.progress import Progress
 from compare.study.steps import Step, Steps
 from compare.study.study import record_file
 from compare.study.task import IPOPT, Task
 from nlp_gait.files import writable_folder
+from nlp_gait.progress import Progress
 
 FULL = Effort()
 STEPS = FULL.steps

@@ -12,17 +12,17 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers.nao.paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
-from compare.study.definition import fingerprint
 from compare.study.record import RunRecord
 from compare.study.runner import run_task
 from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, read_bytes
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problems.nao.body import PLANNED_JOINTS
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.gaits.nao.body import PLANNED_JOINTS
 
 ALGORITHMS = ("pso", "ga")
 LEVER = "nao-dsp-lever"

@@ -13,12 +13,12 @@ from compare.papers.nao_claims.published import SPEED_M_S
 from compare.papers.nao_claims.report import document
 from compare.papers.nao_claims.runs import SPECS, gaits_first, walks_then
 from compare.report.writing import write_document
-from compare.study.progress import Progress
 from compare.study.steps import Steps
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
-from nlp_gait.problems.biped.cart_table import walker
-from nlp_gait.problems.nao.cycle import cart_table
+from nlp_gait.gaits.biped.cart_table import walker
+from nlp_gait.gaits.nao.cycle import cart_table
+from nlp_gait.progress import Progress
 from nlp_gait.simulation import playback
 from nlp_gait.simulation.engine import mujoco
 

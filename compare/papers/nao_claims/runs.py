@@ -14,15 +14,15 @@ from compare.papers.nao_claims.effort import Effort
 from compare.papers.nao_claims.published import SPEED_M_S, STRETCHED_M, documented
 from compare.questions.sweep.study import Axis
 from compare.questions.walk.study import CYCLE, optimal_gaits
-from compare.study.definition import fingerprint
 from compare.study.steps import Step
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, Result, finely_sampled
-from nlp_gait.problems.biped.cart_table.walker import Footsteps, cart_table_walk
-from nlp_gait.problems.nao.cycle.cart_table import nao_on_a_table
-from nlp_gait.problems.nao.motors import SHARED
+from nlp_gait.formulation import Array, Result, finely_sampled
+from nlp_gait.gaits.biped.cart_table.walker import Footsteps, cart_table_walk
+from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.gaits.nao.motors import SHARED
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive

@@ -18,7 +18,7 @@ from compare.questions.pareto.report import SEARCH_NAMES
 from compare.questions.pareto.search import REFERENCE, Scale
 from compare.questions.pareto.study import ParetoStudy
 from metaheuristics.array import Array
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 EVEN_POINTS = 200  # of the true front, which distances are measured from
 NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them

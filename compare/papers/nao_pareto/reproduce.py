@@ -15,11 +15,11 @@ from compare.questions.kept import Finished
 from compare.questions.pareto.compare import Challenge, challenge
 from compare.questions.pareto.study import ParetoStudy, pareto_study
 from compare.report.writing import write_document
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress
 from compare.study.steps import Steps
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
 from nlp_gait.files import writable_folder
+from nlp_gait.progress import Progress
 
 FULL = Effort()
 

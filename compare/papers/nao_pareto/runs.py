@@ -12,10 +12,10 @@ import numpy as np
 from compare.questions.pareto.competing import MARGINS, competing_objective
 from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.search import PowerAndCompeting, Scale
-from compare.study.definition import fingerprint
 from compare.study.steps import Step
 from compare.study.task import ProblemSpec
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.kernel.compiled import compile_objective
 
 ALGORITHMS = tuple(FRONT_ALGORITHMS)

@@ -13,10 +13,10 @@ from compare.papers.stairs.motion import Leg, first_step, two_steps
 from compare.papers.stairs.paper import TABLE_4
 from compare.papers.stairs.runs import complete, plan_spec, tracked
 from compare.papers.stairs.tables import Findings
-from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import SETBACK
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import SETBACK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

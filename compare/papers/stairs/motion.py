@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.gait import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
-from nlp_gait.problems.stairs.governing import GOVERNING, stair_plan
-from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import GRAVITY
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.formulas.gait import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
+from nlp_gait.gaits.stairs.governing import GOVERNING, stair_plan
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import GRAVITY
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.formulas.loads import MOVING, link_angles
-from nlp_gait.problems.stairs.formulas.planar_biped import biped_dynamics
-from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import GRAVITY
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.formulas.loads import MOVING, link_angles
+from nlp_gait.gaits.stairs.formulas.planar_biped import biped_dynamics
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import GRAVITY
 
 STEP_S = 1e-3
 N = len(MOVING)

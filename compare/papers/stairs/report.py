@@ -14,9 +14,9 @@ from compare.papers.stairs.tables import Findings, all_tables
 from compare.report.document import Document
 from compare.report.template import document_from
 from compare.study.task import IPOPT
-from nlp_gait.problems.stairs.closed_loop import QUANTUM
-from nlp_gait.problems.stairs.governing import GOVERNING_VARIABLES
-from nlp_gait.problems.stairs.stair import PAPER_TIMES
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM
+from nlp_gait.gaits.stairs.governing import GOVERNING_VARIABLES
+from nlp_gait.gaits.stairs.stair import PAPER_TIMES
 
 NEAR_BOUND = 0.01  # of a gain's range
 

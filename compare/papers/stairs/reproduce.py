@@ -11,9 +11,9 @@ from compare.papers.stairs.report import document
 from compare.papers.stairs.runs import Effort, first_tasks, other_steps, track_tasks
 from compare.papers.stairs.tables import Findings
 from compare.report.writing import write_document
-from compare.study.progress import Progress
 from compare.study.steps import Steps
 from nlp_gait.files import writable_folder
+from nlp_gait.progress import Progress
 
 FULL = Effort()
 STEPS = FULL.steps

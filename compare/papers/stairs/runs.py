@@ -14,19 +14,19 @@ from compare.papers.runs import Runs, best, point, searches, starts
 from compare.papers.stairs.motion import swing_leg
 from compare.papers.stairs.paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.papers.stairs.replay import FEEDBACK, OPEN_LOOP, replay
-from compare.study.definition import fingerprint
 from compare.study.record import RunRecord
 from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
-from nlp_gait.problem import Array
-from nlp_gait.problems.stairs.closed_loop import InverseKinematics
-from nlp_gait.problems.stairs.formulas.planar_biped import LINKS
-from nlp_gait.problems.stairs.network import LEGS, NetworkSettings, network_angles
-from nlp_gait.problems.stairs.robot import toe_foot_biped
-from nlp_gait.problems.stairs.stair import PAPER_TIMES
-from nlp_gait.problems.stairs.track import PLAN
+from nlp_gait.backends.identity import fingerprint
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.closed_loop import InverseKinematics
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.network import LEGS, NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import PAPER_TIMES
+from nlp_gait.gaits.stairs.track import PLAN
 
 ALGORITHMS: Mapping[str, Algorithm] = {
     "aco": AntColony(population=ANTS, spread=EVAPORATION),

@@ -10,8 +10,8 @@ import numpy as np
 from compare.papers.walk12.paper import F1MAX
 from compare.papers.walk12.runs import CORNER_M, walk
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.problems.walk12.locomotion import locomotion
-from nlp_gait.problems.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.locomotion import locomotion
+from nlp_gait.gaits.walk12.robot import point_mass_biped
 
 STEP_M = 1e-4
 

@@ -14,8 +14,8 @@ from compare.papers.walk12.paper import row_of
 from compare.papers.walk12.runs import GA, PAPER, PathPoint
 from compare.papers.walk12.tables import Findings
 from compare.study.record import RunRecord
-from nlp_gait.problems.walk12.locomotion import locomotion
-from nlp_gait.problems.walk12.robot import PointMassBiped, point_mass_biped
+from nlp_gait.gaits.walk12.locomotion import locomotion
+from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

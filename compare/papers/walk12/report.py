@@ -29,9 +29,9 @@ from compare.report.document import Document
 from compare.report.template import document_from
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
-from nlp_gait.problem import load
-from nlp_gait.problems.walk12.model import Zmp
-from nlp_gait.problems.walk12.robot import point_mass_biped
+from nlp_gait.formulation import load
+from nlp_gait.gaits.walk12.model import Zmp
+from nlp_gait.gaits.walk12.robot import point_mass_biped
 
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau

@@ -14,11 +14,11 @@ from compare.papers.walk12.runs import PAPER, Effort, PathPoint, first_tasks, pa
 from compare.papers.walk12.tables import Findings
 from compare.report.document import Table
 from compare.report.writing import write_document, write_parts
-from compare.study.progress import Progress
 from compare.study.steps import Steps
 from nlp_gait.files import writable_folder
-from nlp_gait.problems.walk12.locomotion import JOINTS, locomotion
-from nlp_gait.problems.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
+from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.progress import Progress
 
 FULL = Effort()
 STEPS = FULL.steps

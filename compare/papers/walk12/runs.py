@@ -12,13 +12,13 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.runs import Runs, best, searches, starts
 from compare.papers.walk12.paper import F1MAX, TABLE_3, TABLE_4, PaperRow
-from compare.study.definition import fingerprint
 from compare.study.steps import Step
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import Continuation
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problems.walk12.problem import Horizon
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.walk12.problem import Horizon
 
 PAPER, MODEL = "paper", "model"  # whose f1max
 HORIZONS: tuple[Horizon, ...] = get_args(Horizon)

@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.questions.certainty.multistart import Ends
 from metaheuristics.array import Array
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 # Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this part of
 # its range.

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.files import without_nan
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
 
 BATCH = 250
 
@@ -47,7 +47,7 @@ def multistart(
     seed: int = 0,
     solver: Solver | None = None,
     anew: Progress | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Ends:
     """Ends of a solver from random starts; batch k draws its start points from the seed and k, whatever ran before.
 

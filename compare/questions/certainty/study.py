@@ -12,22 +12,22 @@ import numpy as np
 
 import metaheuristics
 from compare.analysis.units import with_unit
-from compare.questions.certainty import bounds
-from compare.questions.certainty.branch_and_bound import Certificate, certify
-from compare.questions.certainty.certificate import CODE, certificate_file
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
-from compare.questions.certainty.power_form import has_power_form
-from compare.study.definition import fingerprint, sha256_of
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from compare.study.task import plain_problem
+from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import without_nan
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.proofs import bounds
+from nlp_gait.proofs.branch_and_bound import Certificate, certify
+from nlp_gait.proofs.certificate import CODE, certificate_file
+from nlp_gait.proofs.power_form import has_power_form
 
 # Branch and bound is for this many variables at most, for its work grows exponentially with them; NAO's phases have bounds of
 # their own, narrow enough for nine.
@@ -135,7 +135,7 @@ def certainty(
     time_limit_s: float = 1800.0,
     seed: int = 0,
     anew: Progress | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Certainty:
     """Evidence by many starts, a long search and, for few variables, branch and bound; each step is kept under ``out``.
 

@@ -14,7 +14,7 @@ from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
 from compare.report.document import Figure, Table
-from nlp_gait.problem import Signals
+from nlp_gait.formulation import Signals
 
 KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}

@@ -14,17 +14,17 @@ import numpy as np
 from compare.judge import evaluate
 from compare.questions.kept import Finished
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problems.biped.curves import SPANS
-from nlp_gait.problems.nao.single_support_free import fitted_start
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.gaits.biped.curves import SPANS
+from nlp_gait.gaits.nao.single_support_free import fitted_start
+from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.symbolic.splines import finer
 
 # A study of many variables may take longer than a single solve of few.
@@ -81,7 +81,7 @@ def motions(
     *,
     seed: int = 0,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> list[Motion]:
     """Solve all tasks; what an earlier call has finished is read from its file.
 
@@ -96,7 +96,7 @@ def motions(
         OutputError: a motion cannot be kept.
     """
     finished = finished or Finished()
-    steps = Steps(out, unwatched, code=[sys.modules[__name__]], anew=finished.anew)
+    steps = Steps(out, ignore_progress, code=[sys.modules[__name__]], anew=finished.anew)
     solver = finished.solver(IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS))
     found: list[Motion] = []
     for task in study:

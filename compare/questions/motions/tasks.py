@@ -8,7 +8,7 @@ from typing import Any
 
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError
-from nlp_gait.problems.biped.curves import SPANS
+from nlp_gait.gaits.biped.curves import SPANS
 
 PHASES = ("nao-ssp", "nao-dsp")
 ORDERS = tuple(SPANS)[:-1]

@@ -13,7 +13,7 @@ from compare.drawing.labels import axis_label, name_in_words, units_of
 from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.motors.study import Variant
 from compare.report.document import Figure, Table, Value, text_table
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 STILL = 1e-4  # of a variable's range
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.questions.kept import Finished
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.registry import problem_maker
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.progress import Progress, ignore_progress
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.
 VARIANTS: Mapping[str, str] = {
@@ -82,7 +82,7 @@ def motor_variants(
     starts: int = 10,
     seed: int = 0,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> tuple[Variant, ...]:
     """Optimum under each variant.
 

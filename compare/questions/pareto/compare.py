@@ -10,12 +10,12 @@ import numpy as np
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
-from compare.study.progress import Progress, unwatched
 from metaheuristics.array import Array
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.progress import Progress, ignore_progress
 
 MOST_CHALLENGES = 1000
 
@@ -105,7 +105,7 @@ def challenge(
     front: Sequence[FrontPoint],
     points: Sequence[FrontPoint],
     solver: Solver | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Challenge:
     """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
 

@@ -11,8 +11,8 @@ from casadi import MX
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.problem import Array, Assembly, GaitProblem, Objective, Parameter, Point
-from nlp_gait.problem.solution import Solution
+from nlp_gait.formulation import Array, Assembly, GaitProblem, Objective, Parameter, Point
+from nlp_gait.formulation.solution import Solution
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 POWER, SPEED = "power", "speed"

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.questions.pareto.competing import REWARD, CompetingObjective, rewarding
-from compare.study.progress import Progress, unwatched
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.solve import solution_of, solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Outcome, Solution
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Outcome, Solution
+from nlp_gait.progress import Progress, ignore_progress
 
 # The front ends where another hundredth of the criterion would cost ten times the least power.
 LARGEST_TRADE_OFF = 1000.0
@@ -57,7 +57,7 @@ def pareto_front(
     starts: int = 5,
     seed: int = 0,
     solver: Solver | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> list[FrontPoint]:
     """Points of the front, by rising criterion, about evenly spaced along it.
 

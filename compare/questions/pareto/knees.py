@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.questions.pareto.front import FrontPoint
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 # A bend is a knee if the front turns by this much [rad] within this part of its length, the ranges of both objectives being 1.
 LEAST_TURN = np.pi / 12

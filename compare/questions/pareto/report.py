@@ -11,7 +11,7 @@ from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer, all_digits
 from compare.questions.pareto.study import ParetoStudy
 from compare.report.document import Figure, Table, text_table
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 SEARCH_COLOURS = {
     "NSGA2": COLOURS["ga"],

@@ -12,13 +12,13 @@ import numpy as np
 
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from metaheuristics.array import Array
 from metaheuristics.multi_objective import FrontAlgorithm, front_algorithm, minimize_many
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
 
 # The corner that is dominated by every counted point, with the ranges of the true front as 1: a tenth beyond its worst values.
 REFERENCE = 1.1
@@ -88,7 +88,7 @@ def search_fronts(
     searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> list[SearchFront]:
     """Fronts of all runs; each run is kept as a file when it is done.
 
@@ -106,7 +106,7 @@ def search_fronts(
         SearchError: an unknown algorithm, or a budget that is not allowed.
         OutputError: a run cannot be kept.
     """
-    steps = Steps(out, unwatched)
+    steps = Steps(out, ignore_progress)
     compiled = PowerAndCompeting(compile_objective(problem), criterion, scale)
     ranges = [scale.least_power, scale.power_range, scale.largest, scale.range]
     identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}

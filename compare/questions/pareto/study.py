@@ -15,14 +15,14 @@ from compare.questions.pareto.competing import CompetingObjective, competing_obj
 from compare.questions.pareto.front import FrontPoint, pareto_front
 from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.steps import Steps
 from compare.study.task import plain_problem
 from metaheuristics.multi_objective import check_budgets, front_algorithm
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,7 +71,7 @@ def pareto_study(
     runs: int,
     seed: int,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> ParetoStudy:
     """The front, and the searches beside it; finished steps are kept under ``out`` and not done again.
 

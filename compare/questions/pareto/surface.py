@@ -19,11 +19,11 @@ from compare.questions.kept import Finished
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import front_ends
 from compare.report.document import Figure
-from compare.study.progress import Progress, unwatched
 from compare.study.task import plain_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ def pareto_surface(
     starts: int,
     seed: int,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Surface:
     """Least power over a square grid of at least this many points, from the cheapest values of both criteria to the largest.
 

@@ -14,7 +14,7 @@ from compare.drawing.labels import name_in_words
 from compare.questions.answer import Answer, all_digits
 from compare.questions.prices.price import Price, Prices
 from compare.report.document import Figure, Part, Table, Value, text_table
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 SHOWN = 10  # bars of each kind
 LISTED = 12  # rows of the robot's table; all are in the CSV file

@@ -13,17 +13,17 @@ from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_st
 from compare.questions.kept import Finished
 from compare.questions.other_robot import is_mass, present_value, with_robot
 from compare.questions.prices.price import STANDS, Price, Prices, price_from
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import Outcome
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import Outcome
+from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.robots import Robot
 from nlp_gait.robots.perturbation import quantities
 
@@ -86,7 +86,7 @@ def prices(
     checks: int = 3,
     solver: Solver | None = None,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Prices:
     """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
 

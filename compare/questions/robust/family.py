@@ -10,8 +10,8 @@ import numpy as np
 from compare.questions.other_robot import present_value, robot_name, with_robot
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import ExactValues, exact_model
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 # Limits for which a round looks for the worst corner: the largest violations, one of each group of rows.
 CORNERS_IN_ROUND = 3

@@ -12,12 +12,12 @@ import numpy as np
 
 from compare.questions.kept import Finished
 from compare.questions.robust.study import Robust
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
-from nlp_gait.problem import Array, GaitProblem, Result
+from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import averaged_pressure
 from nlp_gait.simulation.plan import SIDES, Plan, plan_of
@@ -47,7 +47,7 @@ class Played:
 
 
 def played(
-    spec: ProblemSpec, found: Robust, finished: Finished | None = None, progress: Progress = unwatched
+    spec: ProblemSpec, found: Robust, finished: Finished | None = None, progress: Progress = ignore_progress
 ) -> tuple[Played, ...]:
     """Both gaits on every robot of the scenario problem; ``progress`` is told of each. What is finished is not played again.
 

@@ -19,16 +19,16 @@ import numpy as np
 
 from compare.questions.kept import Finished
 from compare.questions.robust.family import Box, Corner, Family, Worst
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import without_nan
-from nlp_gait.problem.solution import Solution
-from nlp_gait.problem.worst_case import worst_case
+from nlp_gait.formulation.solution import Solution
+from nlp_gait.formulation.worst_case import worst_case
+from nlp_gait.progress import Progress, ignore_progress
 
 ROUNDS = 8
 
@@ -95,7 +95,7 @@ def robust(
     seed: int = 0,
     samples: int = 20,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Robust:
     """Robust optimum over a box of robots.
 

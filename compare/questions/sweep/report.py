@@ -16,7 +16,7 @@ from compare.drawing.labels import axis_label, quantity, units_of
 from compare.questions.answer import Answer, all_digits
 from compare.questions.sweep.study import SweepPoint
 from compare.report.document import Figure, Table, Value, text_table
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 
 def sweep_answer(points: Sequence[SweepPoint], problem: GaitProblem, algorithm: str) -> Answer:

@@ -12,15 +12,15 @@ from typing import Any, cast
 import numpy as np
 
 from compare.questions.kept import Finished
-from compare.study.progress import Progress, unwatched
 from compare.study.record import RunRecord, record_from
 from compare.study.runner import attempt, run_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import Solution
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import Solution
+from nlp_gait.progress import Progress, ignore_progress
 
 MOST_POINTS = 10_000  # of an axis, and of the whole grid
 
@@ -89,7 +89,7 @@ def sweep(
     evaluations: int = 10_000,
     seed: int = 0,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
 

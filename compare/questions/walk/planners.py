@@ -11,18 +11,18 @@ import numpy as np
 
 from compare.questions.kept import Finished
 from compare.questions.walk.study import CYCLE, Gait, result_of, walked
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.problem import GaitProblem, Result
-from nlp_gait.problem.registry import problem_maker
-from nlp_gait.problems.biped.cart_table.walker import Body, Footsteps, cart_table_walk
-from nlp_gait.problems.biped.cycle_motion import LIFT
-from nlp_gait.problems.humanoid.cart_table import humanoid_on_a_table
-from nlp_gait.problems.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.cycle_motion import LIFT
+from nlp_gait.gaits.humanoid.cart_table import humanoid_on_a_table
+from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.robots.biped import biped_of
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.walking import Walk
@@ -93,7 +93,7 @@ def rivals(
     steps: int,
     drive: Drive,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> Iterator[Rival]:
     """Gaits of other planners over the footsteps, the times and the swing height of each feasible gait, one after the other.
 

@@ -14,7 +14,7 @@ from compare.questions.answer import all_digits, table_of
 from compare.questions.walk.planners import CART_TABLE, LEAST_POWER, LEAST_TORQUE, Rival
 from compare.questions.walk.study import Gait
 from compare.report.document import Figure, Part
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.simulation.walking import Walk
 
 COLOURS = {CART_TABLE: "#D55E00", LEAST_TORQUE: "#009E73", LEAST_POWER: "#000000"}

@@ -19,8 +19,8 @@ from compare.questions.walk.planners_report import planners_parts
 from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
-from nlp_gait.problem import GaitProblem, Result, finely_sampled
-from nlp_gait.problem.motion.steps import walk
+from nlp_gait.formulation import GaitProblem, Result, finely_sampled
+from nlp_gait.formulation.motion.steps import walk
 from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.walking import Walk
 

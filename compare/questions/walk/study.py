@@ -8,16 +8,16 @@ from typing import Any, cast
 
 from compare.questions.kept import Finished
 from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
-from compare.study.definition import fingerprint
-from compare.study.progress import Progress, unwatched
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
-from nlp_gait.problem import GaitProblem, Result
-from nlp_gait.problems.biped.cycle import SPEED
-from nlp_gait.problems.humanoid.cycle import SPEED_M_S
+from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.gaits.biped.cycle import SPEED
+from nlp_gait.gaits.humanoid.cycle import SPEED_M_S
+from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import plan_of
 from nlp_gait.simulation.playback import play
@@ -73,7 +73,7 @@ def optimal_gaits(
     starts: int,
     seed: int,
     finished: Finished | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = ignore_progress,
 ) -> list[Gait]:
     """Optimal cycle at every point of an axis, each from its neighbours, there and back.
 

@@ -12,7 +12,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import IPOPT, Task
 from nlp_gait.backends.solve import solution_of
 from nlp_gait.errors import InputError
-from nlp_gait.problem.solution import Best
+from nlp_gait.formulation.solution import Best
 
 # Runs of one solver for which compiling is weighed. The same number in every study: compiled and interpreted functions differ in
 # the last bits, and no run may depend on how many others there are.

@@ -19,7 +19,7 @@ from nlp_gait.backends.derivatives.structure import structure_of
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 # -O1: more optimisation takes the compiler half as long again and gains nothing that can be measured.
 FLAGS = ("-std=c++17", "-O1", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")

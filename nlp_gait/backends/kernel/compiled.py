@@ -18,8 +18,8 @@ from nlp_gait.backends.kernel.interpreted import InterpretedKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.errors import CompilerError, InputError, checked_count, shown
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.numbers import real_numbers
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.numbers import real_numbers
 
 LOG = logging.getLogger("nlp_gait")
 # Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.kernel_source import Kernel
-from nlp_gait.problem import Array
-from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.locking import one_at_a_time
 
 # Candidates in one call of the virtual machine; more would only use more memory.
 BLOCK = 64

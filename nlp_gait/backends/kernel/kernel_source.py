@@ -11,8 +11,8 @@ import numpy as np
 
 from nlp_gait.backends.exact import ExactModel, exact_model
 from nlp_gait.backends.kernel.compiler import native_source
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
 
 SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
 

@@ -10,7 +10,7 @@ import numpy as np
 from nlp_gait.backends.kernel.compiler import Compiler, lane_flags
 from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, kernel_source
 from nlp_gait.backends.kernel.library_cache import load_library
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 # No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing here: so
 # results are the virtual machine's bit for bit, but for what vector functions of libm round differently. Hidden symbols let

@@ -12,8 +12,8 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import checked_count
-from nlp_gait.problem import GaitProblem
-from nlp_gait.problem.solution import Outcome, Solution
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import Outcome, Solution
 
 
 class Continuation:

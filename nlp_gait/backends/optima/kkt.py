@@ -15,7 +15,7 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.backends.nlp import NlpModel, nlp_model
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 
 # Singular values of the active rows, each of length 1, below this share of the largest are zero.
 RANK = 1e-9

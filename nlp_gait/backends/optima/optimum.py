@@ -16,9 +16,9 @@ import numpy as np
 from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kkt_step
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.solution import Guess, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.solution import Guess, Outcome
 
 # Tolerance at which IPOPT distinguishes bounds with a price from those without: at kinks of |power| both are small.
 SHARP = IpoptSettings(tolerance=1e-12)

@@ -18,8 +18,8 @@ import numpy as np
 from nlp_gait.backends.optima.kkt import column, kkt_functions, kkt_step
 from nlp_gait.backends.optima.optimum import WEAK, Optimum
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6

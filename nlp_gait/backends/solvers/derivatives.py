@@ -6,7 +6,7 @@ import casadi as ca
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 # Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
 # against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.

@@ -21,8 +21,8 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.solvers.stages import StagedSolver
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Outcome
 
 LOG = logging.getLogger("nlp_gait")
 

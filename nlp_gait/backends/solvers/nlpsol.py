@@ -22,9 +22,9 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.solution import Evaluations, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.solution import Evaluations, Outcome
 
 PROBE_TIME_LIMIT_S = 60.0
 PROBE = """

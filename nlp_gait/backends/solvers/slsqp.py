@@ -16,8 +16,8 @@ from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Best, Evaluations, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Best, Evaluations, Outcome
 
 # Forward differences in the scaled variables: the square root of the machine's precision.
 STEP = 1.5e-8

@@ -11,8 +11,8 @@ import numpy as np
 
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.interrupts import never
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Evaluations, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Evaluations, Outcome
 
 
 class Solver(Protocol):

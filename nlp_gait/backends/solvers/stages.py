@@ -14,9 +14,9 @@ from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import WIDTHS, NlpModel
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.locking import one_at_a_time
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 # Sigmoid widths of further stages, which are tried only if the exact functions find the point infeasible.

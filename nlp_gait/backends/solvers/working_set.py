@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NO_OTHERS
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]
 

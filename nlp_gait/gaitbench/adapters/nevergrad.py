@@ -8,7 +8,7 @@ import nevergrad as ng
 import numpy as np
 from nevergrad.functions import ExperimentFunction
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymoo.core.problem import Problem
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.measurements import averaged_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import Plan

@@ -13,7 +13,7 @@ from nlp_gait.backends.derivatives.assembly import plan_of
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.derivatives.structure import NotMapped, structure_of
 from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.problem import Array
+from nlp_gait.formulation import Array
 
 OPTIONS = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 X, P = MX.sym("x", 2), MX.sym("p")

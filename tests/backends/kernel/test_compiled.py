@@ -14,7 +14,7 @@ from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 from tests.backends.toys import corner, toy
 
 # glibc's vector functions are off by up to 4 units in the last place, and torques are sums of cancelling terms.

@@ -8,7 +8,7 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.solve import solve
-from nlp_gait.problem import Constraint
+from nlp_gait.formulation import Constraint
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 

@@ -8,7 +8,7 @@ from casadi import MX
 
 from nlp_gait.backends.optima.continuation import Continuation, solve_both_ways
 from nlp_gait.backends.solvers import ipopt
-from nlp_gait.problem import Constraint, GaitProblem
+from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

@@ -13,8 +13,8 @@ from nlp_gait.backends.optima.continuation import Continuation, best_success
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Constraint, GaitProblem
-from nlp_gait.problem.solution import Outcome
+from nlp_gait.formulation import Constraint, GaitProblem
+from nlp_gait.formulation.solution import Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

@@ -15,8 +15,8 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
 from nlp_gait.backends.solvers.stages import CONVERGED
-from nlp_gait.problem import Constraint
-from nlp_gait.problem.solution import Evaluations, Outcome
+from nlp_gait.formulation import Constraint
+from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, corner, row, row_violations, toy
 

@@ -14,8 +14,8 @@ from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import Constraint, GaitProblem, load
-from nlp_gait.problem.solution import FEASIBILITY_TOLERANCE, Outcome, Solution
+from nlp_gait.formulation import Constraint, GaitProblem, load
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome, Solution
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 

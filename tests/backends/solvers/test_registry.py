@@ -19,8 +19,8 @@ from nlp_gait.backends.solvers.nlpsol import CasadiSolver, probe
 from nlp_gait.backends.solvers.registry import SOLVERS, solver
 from nlp_gait.backends.solvers.solver import Solver, judged
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import Array, GaitProblem
-from nlp_gait.problem.solution import Evaluations, Outcome
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import Evaluations, Outcome
 from tests.backends.toys import corner, toy
 
 # Of the objective of the toy: fatrop relaxes bounds by 1e-8 of them, SLSQP differentiates by differences.

@@ -15,7 +15,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import QUIET
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.backends.solvers.working_set import WorkingSet
-from nlp_gait.problem import load
+from nlp_gait.formulation import load
 
 SIDES = 200
 NAMES = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")

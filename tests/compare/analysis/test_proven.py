@@ -6,7 +6,7 @@ import pytest
 
 import nlp_gait
 from compare.analysis.proven import proven_bound, proven_words
-from compare.study.definition import problem_part
+from nlp_gait.backends.identity import problem_part
 
 
 def test_the_closest_of_several_proofs_is_told() -> None:

@@ -23,7 +23,7 @@ from compare.analysis.statistics.run_length import (
     relative_gap,
 )
 from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
-from nlp_gait.problem import Objective
+from nlp_gait.formulation import Objective
 from tests.compare.records import record
 
 POWER = Objective(name="power", unit="W")

@@ -7,7 +7,7 @@ from PIL import Image
 import nlp_gait
 from compare.drawing.animation import contact_sheet, frames
 from compare.drawing.skeletons import skeleton_of
-from nlp_gait.problem import Result, problem_names
+from nlp_gait.formulation import Result, problem_names
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 WALK = (0.13, 0.1135, 0.02, 0.0204)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compare.papers.stairs.motion import Leg, first_step, swing_leg, two_steps
-from nlp_gait.problems.stairs.track import PARAMETERS, PLAN
+from nlp_gait.gaits.stairs.track import PARAMETERS, PLAN
 
 TREAD, RISE = 0.254, 0.1778
 PLANNED = {"torso_pitch_rad": 1.45, **{parameter.name: parameter.default for parameter in PARAMETERS}}

@@ -9,13 +9,13 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from compare.questions.certainty.branch_and_bound import certify
 from compare.questions.certainty.clusters import LocalOptimum, cluster, unseen
 from compare.questions.certainty.multistart import Ends, multistart
 from compare.questions.certainty.report import certainty_answer
 from compare.questions.certainty.study import certainty
 from nlp_gait.errors import InputError
-from nlp_gait.problem import Constraint
+from nlp_gait.formulation import Constraint
+from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 

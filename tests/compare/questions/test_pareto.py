@@ -19,7 +19,7 @@ from compare.questions.pareto.search import SearchFront
 from compare.questions.pareto.study import ParetoStudy, pareto_study, parse_searches
 from compare.questions.pareto.surface import pareto_surface, surface_answer
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 X = np.array([0.31, -0.00122, 0.0035, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0])
 # Slopes by multipliers and by differences of neighbouring optima agree to this part.

@@ -12,9 +12,9 @@ from compare.questions.recorded import judge_gait
 from nlp_gait import load
 from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
-from nlp_gait.problem import Result
-from nlp_gait.problems.nao.recorded.motion import JointAngles
-from nlp_gait.problems.nao.recorded.problem import recorded
+from nlp_gait.formulation import Result
+from nlp_gait.gaits.nao.recorded.motion import JointAngles
+from nlp_gait.gaits.nao.recorded.problem import recorded
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 

@@ -20,7 +20,7 @@ from compare.questions.kept import Finished, _outcome, _plain
 from compare.questions.motors import study as motors
 from compare.study.steps import Steps
 from nlp_gait.backends.starts import run_starts
-from nlp_gait.problem.solution import Best, Outcome
+from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
 
 RUN = CliRunner()

@@ -17,7 +17,7 @@ from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
 from nlp_gait.backends.solvers.registry import solver
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.problem import GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868

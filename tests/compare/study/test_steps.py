@@ -13,8 +13,8 @@ import pytest
 
 import nlp_gait
 from compare.study import steps as module
-from compare.study.definition import fingerprint
 from compare.study.steps import Step, Steps, as_json
+from nlp_gait.backends.identity import fingerprint
 
 
 def test_a_step_runs_once_for_equal_inputs(tmp_path: Path) -> None:

@@ -1,0 +1,51 @@
+"""What a gait problem is, how to make or change one, and a gait of one that was found."""
+
+from nlp_gait.formulation.assembly import (
+    Assembly,
+    Constraint,
+    InstantPoint,
+    NumericPoint,
+    Objective,
+    Over,
+    Parameter,
+    Point,
+    Stretch,
+    Variable,
+    parameters,
+)
+from nlp_gait.formulation.gait_problem import GaitProblem, Start
+from nlp_gait.formulation.motion.grid import Grid
+from nlp_gait.formulation.motion.playback import Playback
+from nlp_gait.formulation.motion.signals import Array, Columns, Signals, in_space
+from nlp_gait.formulation.registry import load, maker, problem_names
+from nlp_gait.formulation.result import Result, load_result
+from nlp_gait.formulation.sampling import finely_sampled, sampled
+
+__all__ = [
+    "Array",
+    "Assembly",
+    "Columns",
+    "Constraint",
+    "GaitProblem",
+    "Grid",
+    "InstantPoint",
+    "NumericPoint",
+    "Objective",
+    "Over",
+    "Parameter",
+    "Playback",
+    "Point",
+    "Result",
+    "Signals",
+    "Start",
+    "Stretch",
+    "Variable",
+    "finely_sampled",
+    "in_space",
+    "load",
+    "load_result",
+    "maker",
+    "parameters",
+    "problem_names",
+    "sampled",
+]

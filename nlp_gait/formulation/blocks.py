@@ -1,0 +1,97 @@
+"""Variables in blocks: one value for every row (a link, a component) and every column (an instant)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from casadi import MX
+
+from nlp_gait.formulation.assembly import Point, Variable
+from nlp_gait.formulation.motion.signals import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Variables ``<quantity>_<row>_<unit>[<column>]``, for example ``angle_HK_rad[12]``.
+
+    Attributes:
+        quantity: for example ``"angle"``.
+        unit: of all values, for example ``"rad/s^2"``.
+        rows: names of the rows.
+        columns: number of columns.
+        limits: lower and upper bound of every row [unit].
+        description: what a row is.
+    """
+
+    quantity: str
+    unit: str
+    rows: tuple[str, ...]
+    columns: int
+    limits: tuple[tuple[float, float], ...]
+    description: str
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Column by column."""
+        suffix = self.unit.replace("/", "_").replace("^", "")
+        return tuple(
+            Variable(
+                name=f"{self.quantity}_{row}_{suffix}[{k}]",
+                unit=self.unit,
+                lower=lower,
+                upper=upper,
+                description=f"{self.description} {row} at instant {k}",
+            )
+            for k in range(self.columns)
+            for row, (lower, upper) in zip(self.rows, self.limits, strict=True)
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of variables."""
+        return len(self.rows) * self.columns
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Blocks one after the other; the whole of x.
+
+    Attributes:
+        blocks: in the order of x.
+    """
+
+    blocks: tuple[Block, ...]
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """All variables in the order of x."""
+        return tuple(variable for block in self.blocks for variable in block.variables)
+
+    def split(self, point: Point) -> dict[str, MX]:
+        """Symbols of each block by quantity, (rows, columns)."""
+        ends = np.cumsum([0, *(block.size for block in self.blocks)])
+        parts = ca.vertsplit(point.x, [int(end) for end in ends])
+        return {
+            block.quantity: ca.reshape(part, len(block.rows), block.columns)
+            for block, part in zip(self.blocks, parts, strict=True)
+        }
+
+    def values(self, x: Array) -> dict[str, Array]:
+        """Values of each block by quantity, (rows, columns), from x (n,)."""
+        ends = np.cumsum([block.size for block in self.blocks])[:-1]
+        return {
+            block.quantity: part.reshape(block.columns, len(block.rows)).T
+            for block, part in zip(self.blocks, np.split(x, ends), strict=True)
+        }
+
+    def join(self, values: Mapping[str, Array]) -> Array:
+        """x (n,) from the values of each block (rows, columns)."""
+        return np.concatenate([values[block.quantity].T.ravel() for block in self.blocks])
+
+
+def labels(rows: Sequence[str], columns: Sequence[int] | range) -> tuple[str, ...]:
+    """Row labels of a constraint on a (rows, columns) matrix in column-major order: ``"HK, 12"``."""
+    return tuple(f"{row}, {k}" for k in columns for row in rows)

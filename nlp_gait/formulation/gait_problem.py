@@ -1,0 +1,390 @@
+"""What a gait problem is: variables, parameters, one assembly of objective and constraints, and what else it can do.
+
+A problem holds mathematics. It knows no solver: ``backends/`` turn it into an NLP or into compiled code, both from the same
+``assemble``. Everything that a user may want to change without rebuilding is a parameter: limits, weights, and the bounds of
+every variable, which appear among the parameters as ``<variable>.lower`` and ``<variable>.upper``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from casadi import DM, MX
+
+from nlp_gait.errors import InputError, UnknownNameError, shown, unknown
+from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
+from nlp_gait.formulation.locking import CASADI, one_at_a_time
+from nlp_gait.formulation.motion.grid import Grid
+from nlp_gait.formulation.motion.playback import Playback
+from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.formulation.motion.skeleton import Skeleton
+from nlp_gait.formulation.numbers import is_number, real_numbers
+from nlp_gait.formulation.origin import Origin, pickled
+from nlp_gait.robots import Robot
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+T = TypeVar("T")
+LARGEST = 1e100  # of a parameter; the square of a larger one is no number any more
+# Changes what a problem assembles.
+Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
+# Start point (n,) from the parameters by name.
+Start = Callable[[Mapping[str, float], np.random.Generator], Array]
+# A point lies on a bound that it misses by this share of the variable's default range.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GaitProblem:
+    """A gait problem with the current values of its parameters.
+
+    Copies made by ``with_values`` share everything that was built from the mathematics; ``derived`` is how to change the
+    mathematics. A problem may be used by several threads. It is pickled as its maker's name, options and values.
+
+    Attributes:
+        name: for example ``"nao-ssp"``.
+        title: one line.
+        variables: in the order of x.
+        own_parameters: limits and weights, without the variables' bounds.
+        objective: name, unit, sense.
+        assemble: builds objective and constraints from symbols and an interpretation.
+        options: what the mathematics was built with (robot, intervals, ...); written by ``formulation.registry.maker``.
+        refine: makes the same problem with a number of times as many samples, or None if it has none; likewise.
+        grid: samples, or None if the problem has none.
+        motion: time histories at a point of numbers, or None.
+        start: start point (n,) for gradient methods from the parameters by name and a generator; None means uniform within
+            the bounds.
+        robot: whose joints move, where it is a tree of rigid links, else None.
+        durations: variables that hold the duration of each phase, in their order.
+        skeleton: what is drawn of a motion, from it and the parameters by name, or None.
+        playback: what a physics engine needs to play the motion, or None.
+        hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
+        amplifies_rounding: True where a rounding error may decide a jump, so that another sine gives another gait: its compiled
+            code then rounds as the virtual machine does, on every lane count, and is slower.
+        starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
+        searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
+        values: parameters that differ from their defaults.
+        stretches: the motion's rows as functions of time, part by part; empty where a problem is sampled by definition.
+        loaded_as: what ``load`` was asked for, where that is not the name: code of one's own.
+    """
+
+    name: str
+    title: str
+    variables: tuple[Variable, ...]
+    own_parameters: tuple[Parameter, ...]
+    objective: Objective
+    assemble: Callable[[Point, Nonsmooth], Assembly]
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
+    refine: Callable[[int], GaitProblem] | None = None
+    grid: Grid | None = None
+    motion: Callable[[NumericPoint], Signals] | None = None
+    start: Start | None = None
+    robot: Robot | None = None
+    durations: tuple[str, ...] = ()
+    skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
+    playback: Playback | None = None
+    hessian: Literal["exact", "limited-memory"] = "exact"
+    amplifies_rounding: bool = False
+    starts: int = 20
+    searchable: bool = True
+    values: Mapping[str, float] = field(default_factory=dict)
+    stretches: tuple[Stretch, ...] = ()
+    loaded_as: str = ""
+    # No argument, so that every copy but those of ``with_values`` begins with nothing built.
+    _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _origin: Origin | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse names that stand twice."""
+        counts = Counter([*self.names, *(parameter.name for parameter in self.parameters)])
+        twice = [name for name, count in counts.items() if count > 1]
+        if twice:
+            raise InputError(f"problem {self.name!r}: these variables or parameters stand twice: {', '.join(twice)}")
+
+    @property
+    def address(self) -> str:
+        """What ``load`` takes, and files of results name."""
+        return self.loaded_as or self.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the variables, in the order of x."""
+        return tuple(variable.name for variable in self.variables)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, the variables' bounds included, in the order of p."""
+        lower, upper = ((v.bound("lower") for v in self.variables), (v.bound("upper") for v in self.variables))
+        return (*self.own_parameters, *lower, *upper)
+
+    @cached_property
+    def p(self) -> Array:
+        """(k,) current parameter values."""
+        return _frozen([self.values.get(q.name, q.default) for q in self.parameters])
+
+    @cached_property
+    def lower(self) -> Array:
+        """(n,) current lower bounds."""
+        return self.p[-2 * len(self.variables) : -len(self.variables)]
+
+    @cached_property
+    def upper(self) -> Array:
+        """(n,) current upper bounds."""
+        return self.p[-len(self.variables) :]
+
+    @cached_property
+    def scale(self) -> Array:
+        """(n,) width of each variable's default range: its unit of length for solvers."""
+        return _frozen([v.upper - v.lower for v in self.variables])
+
+    def value(self, name: str) -> float:
+        """Current value of a parameter."""
+        return self.parameter_values[self._parameter(name).name]
+
+    def with_values(self, /, **values: float) -> GaitProblem:
+        """The same problem with other parameter values; nothing is rebuilt. Names with a dot go in as ``**{...}``.
+
+        Raises:
+            UnknownNameError: no such parameter.
+            InputError: not finite, outside what the parameter allows, or bounds inverted.
+        """
+        for name, value in values.items():
+            parameter = self._parameter(name)
+            if not is_number(value):
+                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {shown(value)}")
+            if abs(float(value)) > LARGEST:
+                raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
+            if not parameter.minimum <= value <= parameter.maximum:
+                raise InputError(
+                    f"parameter {name!r} must be within [{parameter.minimum}, {parameter.maximum}] {parameter.unit}, got {value}"
+                )
+        merged = {**self.values, **{name: float(value) for name, value in values.items()}}
+        changed = replace(self, values=merged)
+        object.__setattr__(changed, "_built", self._built)  # the mathematics is the same
+        object.__setattr__(changed, "_origin", self._origin)
+        changed._check_pairs()
+        return changed
+
+    def fix(self, /, **values: float) -> GaitProblem:
+        """The same problem with some variables held at a value, which must lie within their bounds."""
+        bounds: dict[str, float] = {}
+        for name, value in values.items():
+            i = self.variable_index(name)
+            if not (is_number(value) and self.lower[i] <= value <= self.upper[i]):
+                raise InputError(
+                    f"variable {name!r} cannot be fixed at {shown(value)}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
+                    f"{self.variables[i].unit}; widen them with --set {name}.lower=... or --set {name}.upper=..."
+                )
+            bounds |= {f"{name}.lower": value, f"{name}.upper": value}
+        return self.with_values(**bounds)
+
+    def dense(self, factor: int) -> GaitProblem | None:
+        """The same problem and parameter values on a grid with ``factor`` times as many intervals."""
+        refine = self.refine
+        if refine is None:
+            return None
+        return self.built(f"dense {factor}", lambda: refine(factor)).with_values(**self.values)
+
+    def derived(
+        self,
+        *,
+        name: str = "",
+        title: str = "",
+        objective: Objective | None = None,
+        variables: Sequence[Variable] = (),
+        parameters: Sequence[Parameter] = (),
+        change: Change | None = None,
+    ) -> GaitProblem:
+        """A problem with other mathematics; time histories, start points and denser grids follow along.
+
+        Args:
+            name: of the new problem, if it gets one.
+            title: likewise.
+            objective: name, unit and sense, where ``change`` replaces the objective.
+            variables: in addition, after those that are there.
+            parameters: in addition.
+            change: makes the new assembly from this problem's, the point of all variables and parameters, and the
+                interpretation of non-smooth operations.
+
+        Raises:
+            InputError: a name that is there already.
+        """
+
+        def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+            assembly = self.assemble(point.only(self.names), ops)
+            return assembly if change is None else change(assembly, point, ops)
+
+        def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+            base = self.start(parameters, rng) if self.start is not None else _uniform(self.names, parameters, rng)
+            return np.concatenate([base, _uniform([variable.name for variable in variables], parameters, rng)])
+
+        def refine(factor: int) -> GaitProblem:
+            finer = self.dense(factor)
+            assert finer is not None  # only where there is one; for the type checker
+            return finer.derived(
+                name=name, title=title, objective=objective, variables=variables, parameters=parameters, change=change
+            )
+
+        motion = self.motion
+        return replace(
+            self,
+            name=name or self.name,
+            title=title or self.title,
+            objective=objective or self.objective,
+            variables=(*self.variables, *variables),
+            own_parameters=(*self.own_parameters, *parameters),
+            assemble=assemble,
+            motion=None if motion is None else lambda at: motion(at.only(self.names)),
+            start=start if self.start is not None or variables else None,
+            refine=None if self.refine is None else refine,
+            stretches=self.stretches if change is None and not variables else (),
+            loaded_as="" if name else self.loaded_as,
+        )
+
+    @one_at_a_time
+    def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
+        """Time histories at x (n,) and the current parameter values.
+
+        Raises:
+            InputError: x has the wrong length or is not finite, or the problem has no time histories.
+        """
+        if self.motion is None:
+            raise InputError(f"problem {self.name!r} has no time histories")
+        return self.motion(self.at(x))
+
+    @one_at_a_time
+    def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
+        """The point x (n,) with the current parameter values, in numbers."""
+        return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
+
+    @cached_property
+    def parameter_values(self) -> dict[str, float]:
+        """Current values by name."""
+        return dict(zip((q.name for q in self.parameters), self.p.tolist(), strict=True))
+
+    @one_at_a_time
+    def start_point(self, rng: np.random.Generator) -> Array:
+        """(n,) start point for a gradient method, within the bounds."""
+        if self.start is not None:
+            return np.clip(self.start(self.parameter_values, rng), self.lower, self.upper)
+        return rng.uniform(self.lower, self.upper)
+
+    def variable_index(self, name: str) -> int:
+        """Position of a variable in x; raises UnknownNameError."""
+        if not isinstance(name, str) or name not in self.names:
+            raise unknown(f"variable of {self.name}", name, self.names)
+        return self.names.index(name)
+
+    def check_x(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
+        """(n,) floats from values in order or by name; InputError if one lacks, is too many, or is not finite."""
+        if isinstance(x, Mapping):
+            missing = [name for name in self.names if name not in x]
+            if missing or len(x) > len(self.names):
+                extra = [name for name in x if name not in self.names]
+                raise InputError(
+                    f"x of {self.name} must name every variable once; missing: {', '.join(missing) or 'none'}, "
+                    f"unknown: {', '.join(map(str, extra)) or 'none'}"
+                )
+            x = [x[name] for name in self.names]
+        array = real_numbers(f"x of {self.name}", x)
+        if array.shape != (len(self.names),):
+            raise InputError(
+                f"x of {self.name} must have {len(self.names)} values ({', '.join(self.names)}), got shape {array.shape}"
+            )
+        for name, value in zip(self.names, array, strict=True):
+            if not math.isfinite(value):
+                raise InputError(f"x of {self.name}: {name} must be finite, got {value}")
+        return array
+
+    def check_within(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
+        """(n,) values of ``check_x``, put onto the bounds that they miss by rounding, and at which a variable is fixed.
+
+        Raises:
+            InputError: as ``check_x``, or a value outside the bounds.
+        """
+        array = self.check_x(x)
+        beyond = np.maximum(self.lower - array, array - self.upper)
+        outside = np.flatnonzero((beyond > ROUNDING * self.scale) & (self.lower < self.upper))
+        if outside.size:
+            i = outside[0]
+            raise InputError(
+                f"x0 of {self.name}: {self.names[i]} is {array[i]:g}, outside its bounds [{self.lower[i]:g}, "
+                f"{self.upper[i]:g}] {self.variables[i].unit}; begin within them, or widen them"
+            )
+        return np.clip(array, self.lower, self.upper)
+
+    def by_name(self, x: Array) -> dict[str, float]:
+        """Values of x by variable name."""
+        return dict(zip(self.names, (float(v) for v in x), strict=True))
+
+    @one_at_a_time
+    def symbols(self) -> Point:
+        """Fresh symbols for x and p."""
+        parameters = [q.name for q in self.parameters]
+        return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
+
+    def made_by(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
+        """The same problem, which ``make`` with these options makes again elsewhere: it can be pickled if ``make`` can."""
+        made = replace(self)
+        object.__setattr__(made, "_built", self._built)
+        object.__setattr__(made, "_origin", Origin(make, dict(options)))
+        return made
+
+    def __copy__(self) -> GaitProblem:
+        """Itself: nothing of it can be changed."""
+        return self
+
+    def __deepcopy__(self, memo: object) -> GaitProblem:
+        """Itself: nothing of it can be changed."""
+        return self
+
+    def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
+        """For pickle; InputError if no maker makes exactly this problem."""
+        return pickled(self, self._origin)
+
+    def built(self, key: str, build: Callable[[], T]) -> T:
+        """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
+        if key not in self._built:
+            with CASADI:
+                if key not in self._built:  # another thread may have built it meanwhile
+                    self._built[key] = build()
+        found: T = self._built[key]
+        return found
+
+    def _parameter(self, name: str) -> Parameter:
+        if isinstance(name, str):
+            for parameter in self.parameters:
+                if parameter.name == name:
+                    return parameter
+            if name in self.options:
+                raise UnknownNameError(
+                    f"{name!r} is an option of {self.name}, no parameter: another value makes another problem; "
+                    f"build it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                )
+        raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
+
+    def _check_pairs(self) -> None:
+        values = self.parameter_values
+        for name, low in values.items():
+            stem = name.removesuffix(".lower")
+            if stem != name and low > (high := values[f"{stem}.upper"]):
+                raise InputError(
+                    f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
+                    f"set {name} and {stem}.upper so that lower <= upper"
+                )
+
+
+def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Random values of variables within their bounds."""
+    return rng.uniform(*(np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
+
+
+def _frozen(values: Sequence[float]) -> Array:
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array

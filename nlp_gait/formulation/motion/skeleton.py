@@ -1,0 +1,144 @@
+"""What is drawn of a gait: lines between joints, soles, the ground, centre of mass and zero-moment point over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlp_gait.formulation.motion.signals import Array, Signals
+
+LEFT, RIGHT, TRUNK = "left", "right", "trunk"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limb:
+    """Joints from one end to the other.
+
+    Attributes:
+        side: left, right or trunk; it gives the colour.
+        points: (T, K, 3) [m].
+    """
+
+    side: str
+    points: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sole:
+    """Outline of a foot.
+
+    Attributes:
+        side: left or right.
+        corners: (T, K, 3) [m].
+        supports: (T,) whether it bears load.
+    """
+
+    side: str
+    corners: Array
+    supports: np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Skeleton:
+    """A gait as it is drawn; x forward, y left, z up.
+
+    Attributes:
+        t: (T,) [s].
+        limbs: lines.
+        soles: outlines.
+        ground: (K, 2) line (x, z) of the floor or stair, seen from the side [m].
+        com: (T, 3) centre of mass [m], if known.
+        zmp: (T, 3) zero-moment point on the ground [m], if known.
+        planar: only the side view means anything.
+        title: one line.
+    """
+
+    t: Array
+    limbs: tuple[Limb, ...]
+    soles: tuple[Sole, ...]
+    ground: Array
+    com: Array | None
+    zmp: Array | None
+    planar: bool = False
+    title: str = ""
+
+    def support(self, k: int) -> Array | None:
+        """(M, 2) support polygon at a sample: the hull of the loaded soles, seen from above [m]; None if there is none."""
+        loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
+        return _hull(np.concatenate(loaded)) if loaded else None
+
+    def margin(self) -> Array:
+        """(T,) distance of the zero-moment point from the nearest edge of the support polygon [m], negative outside of it.
+
+        NaN where it is not known, or nothing bears load. At the first and the last instant the soles that bear load are those of
+        the instant beside it: a foot that just touches the ground there bears none over the gait.
+        """
+        if self.zmp is None:
+            return np.full(len(self.t), np.nan)
+        last = len(self.t) - 1
+        bearing = [min(max(k, 1), max(last - 1, 0)) for k in range(last + 1)]
+        return np.array([self._margin_at(k, self.zmp[k], bearing[k]) for k in range(last + 1)])
+
+    def _margin_at(self, k: int, zmp: Array, bearing: int) -> float:
+        loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
+        if not loaded:
+            return math.nan
+        corners = _hull(np.concatenate(loaded)[:, :2])
+        if corners is None:  # a planar model: only its length counts
+            x = np.concatenate(loaded)[:, 0]
+            return float(min(zmp[0] - x.min(), x.max() - zmp[0]))
+        edges = np.roll(corners, -1, axis=0) - corners  # counter-clockwise
+        away = zmp[:2] - corners
+        inside = (edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]) / np.linalg.norm(edges, axis=1)
+        if (inside >= 0.0).all():
+            return float(inside.min())
+        along = np.clip((away * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
+        return -float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
+
+    def box(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates of everything that moves, (3,) each [m]."""
+        parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
+        everything = np.concatenate([part.reshape(-1, 3) for part in parts])
+        return everything.min(axis=0), everything.max(axis=0)
+
+
+def _hull(points: Array) -> Array | None:
+    """(M, 2) corners of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
+    from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:  # soles of no width, as in a planar model
+        return None
+
+
+def on_flat_ground(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
+    """A gait on a floor, with the centre of mass and the zero-moment point of its time histories."""
+    arrays = signals.arrays
+    return Skeleton(
+        t=arrays["t"],
+        limbs=tuple(limbs),
+        soles=tuple(soles),
+        ground=flat_ground(*(sole.corners for sole in soles)),
+        com=arrays["com"],
+        zmp=grounded(arrays["zmp"]),
+    )
+
+
+def flat_ground(*points: Array) -> Array:
+    """Line (x, z) at height zero below all points (..., 3)."""
+    x = np.concatenate([p[..., 0].ravel() for p in points])
+    return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
+
+
+def rectangle(back: float, front: float, right: float, left: float) -> Array:
+    """(4, 3) corners at height zero."""
+    return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
+
+
+def grounded(zmp: Array) -> Array:
+    """(T, 3) from (T, 2)."""
+    return np.column_stack([zmp, np.zeros(len(zmp))])

@@ -1,0 +1,84 @@
+"""A walk of several steps from one cycle: every second step is the mirror image of the one before, a step further."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.robots import Robot
+from nlp_gait.robots.mirror import mirror_sign, partners
+
+JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
+SIDES_SWAPPED = {
+    f"{side}_{what}": f"{other}_{what}"
+    for side, other in (("left", "right"), ("right", "left"))
+    for what in ("foot", "bears", "force", "moment")
+}
+# What stays where it is when a walk goes on, and what a reflection at the plane y = 0 does to a quaternion (w, x, y, z).
+UNMOVED = (
+    *JOINT_ARRAYS,
+    "attitude",
+    *(f"{side}_{what}" for side in ("left", "right") for what in ("bears", "force", "moment")),
+)
+MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def walk(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
+    """Time histories of so many steps.
+
+    Args:
+        cycle: of one step that begins on the left foot and ends in the mirror image of its beginning.
+        robot: whose joints are mirrored.
+        steps: at least 1.
+        rise_m: how far a step leads up.
+
+    Raises:
+        InputError: no step.
+    """
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
+    image = mirror_image(cycle, robot)
+    advance, period = np.array([step_of(cycle), 0.0, rise_m]), float(cycle.arrays["t"][-1])
+    parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
+    arrays = {name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]}
+    return replace(cycle, arrays=arrays)
+
+
+def step_of(cycle: Signals) -> float:
+    """How far a cycle moves the hip forward [m]."""
+    hip = cycle.arrays["hip"]
+    return float(hip[-1, 0] - hip[0, 0])
+
+
+def mirror_image(signals: Signals, robot: Robot) -> Signals:
+    """Time histories with left and right exchanged. Torques are those of a robot that is itself symmetric."""
+    images = partners(robot)
+    columns = [signals.joints.index(images[name]) for name in signals.joints]
+    signs = np.array([mirror_sign(robot, name, images[name]) for name in signals.joints])
+    arrays: dict[str, Array] = {}
+    for name, array in signals.arrays.items():
+        if name in JOINT_ARRAYS:
+            arrays[name] = signs * array[:, columns]
+        elif name == "t":
+            arrays[name] = array
+        elif name == "attitude":
+            arrays[name] = array * MIRRORED_ATTITUDE
+        else:
+            # A reflection turns a moment, as any turning, the other way than a force.
+            reflected = np.array([1.0, -1.0, 1.0]) * (-1.0 if signals.columns[name].unit == "Nm" else 1.0)
+            arrays[SIDES_SWAPPED.get(name, name)] = array * reflected[: array.shape[1]]
+    return replace(signals, arrays=arrays)
+
+
+def _moved(signals: Signals, way: Array, delay: float) -> dict[str, Array]:
+    """Arrays with all positions moved by (x, y, z) [m] and all times delayed [s]."""
+    arrays = {}
+    for name, array in signals.arrays.items():
+        if name in UNMOVED:
+            arrays[name] = array
+        else:
+            arrays[name] = array + (delay if name == "t" else way[: array.shape[1]])
+    return arrays

@@ -1,0 +1,287 @@
+"""What a solver hands back: numbers and names, no solver objects."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.notebook import html_table
+
+if TYPE_CHECKING:
+    from nlp_gait.formulation.gait_problem import GaitProblem
+
+# A total violation below this counts as feasible (each row in units of its scale).
+FEASIBILITY_TOLERANCE = 1e-6
+SHOWN = 20  # variables, and rows with a price, that a notebook shows
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActiveConstraint:
+    """A bound that holds the optimum back.
+
+    Attributes:
+        name: row or variable bound, for example ``"dbm_y_mean"`` or ``"bounds[hip_height_m]"``.
+        side: ``"lower"`` or ``"upper"``.
+        bound: value of the bound [unit].
+        unit: of the bound.
+        price: change of the optimal objective per unit by which the bound is raised.
+        price_unit: for example ``"W per m"``.
+    """
+
+    name: str
+    side: str
+    bound: float
+    unit: str
+    price: float
+    price_unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstraintValue:
+    """One constraint row at a point; a missing bound is None."""
+
+    name: str
+    value: float
+    lower: float | None
+    upper: float | None
+    violation: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluations:
+    """Calls of the NLP's functions: values, gradient of the objective, Jacobian of the rows, Hessian."""
+
+    f: int = 0
+    g: int = 0
+    gradient: int = 0
+    jacobian: int = 0
+    hessian: int = 0
+
+    def __add__(self, other: Evaluations) -> Evaluations:
+        """Sum by kind."""
+        return Evaluations(**{kind: getattr(self, kind) + getattr(other, kind) for kind in asdict(self)})
+
+    def by_kind(self) -> dict[str, int]:
+        """Counts by kind; of f alone for a solver that calls nothing else."""
+        return {"f": self.f} if self == Evaluations(f=self.f) else asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolveTime:
+    """Wall time [s]: building the symbolic NLP, generating and compiling derivatives, solving."""
+
+    build: float
+    compile: float
+    solve: float
+
+
+class Best(NamedTuple):
+    """Best point after a number of calls: its objective, None if nothing was feasible until then, and the time [s]."""
+
+    calls: int
+    objective: float | None
+    time_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Guess:
+    """Primal and dual point of the lifted NLP, from which a neighbouring problem can be started warm.
+
+    Attributes:
+        primal: scaled variables, then the lifted ones.
+        bounds: multipliers of their bounds, positive at an upper bound.
+        rows: multipliers of all rows, the problem's first.
+        width: sigmoid width at which they were found.
+    """
+
+    primal: Array
+    bounds: Array
+    rows: Array
+    width: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """One run of an NLP solver from one start point.
+
+    Attributes:
+        solver: its name.
+        x0: (n,) start point.
+        x: (n,) end point, within the bounds.
+        claimed: the solver claims success.
+        status: how it ended, in words.
+        objective: exact value at x, in the problem's sense.
+        cost: the same as it is minimised: negated if the problem maximises it.
+        violation: exact total violation at x.
+        iterations: over all stages, where the solver counts them.
+        evaluations: over all stages.
+        time_s: wall time of the run itself [s].
+        build_s: time to build the symbolic NLP, whenever that was [s].
+        compile_s: time to make the solver, with derivatives and their compilation, whenever that was [s].
+        functions: ``"compiled"`` or ``"interpreted"``.
+        linear_solver: that was really used, where the solver says it.
+        guess: warm start with multipliers, where the solver has one.
+        history: best so far, where the solver keeps it.
+        objective_s: part of the time in the exact functions, NaN where it is not known [s].
+    """
+
+    solver: str
+    x0: Array
+    x: Array
+    claimed: bool
+    status: str
+    objective: float
+    cost: float
+    violation: float
+    iterations: int
+    evaluations: Evaluations
+    time_s: float
+    build_s: float = 0.0
+    compile_s: float = 0.0
+    functions: str = "interpreted"
+    linear_solver: str = ""
+    guess: Guess | None = None
+    history: tuple[Best, ...] = ()
+    objective_s: float = math.nan
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the exact functions find it feasible, with a finite cost."""
+        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
+
+    @property
+    def success(self) -> bool:
+        """Success is claimed, and the exact functions find it feasible."""
+        return self.claimed and self.feasible
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
+        if self.feasible:
+            return (0.0 if self.success else 1.0), self.cost
+        return 2.0, math.inf if math.isnan(self.violation) else self.violation
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Solution:
+    """Best of all starts, judged by the exact functions.
+
+    Attributes:
+        problem: name.
+        options: what the problem was built with.
+        parameters: values that differ from the defaults.
+        success: at least one start converged to a point that is feasible for the exact functions.
+        status: in words; if nothing converged, what stands in the way.
+        objective: exact value, in the problem's sense; name and unit beside it.
+        x: by variable name.
+        violation: exact total violation.
+        worst_violations: violated rows, worst first.
+        iterations: of the start that is reported.
+        evaluations: over all starts.
+        time_s: over all starts.
+        solver: for example ``"ipopt"``.
+        linear_solver: that it really used; empty if it does not say.
+        functions: ``"compiled"`` or ``"interpreted"``.
+        active_constraints: bounds with a price, highest first.
+        starts: outcome of every start.
+        seed: of the start points.
+    """
+
+    problem: str
+    options: dict[str, Any]
+    parameters: dict[str, float]
+    success: bool
+    status: str
+    objective: float
+    objective_name: str
+    objective_unit: str
+    x: dict[str, float]
+    violation: float
+    worst_violations: tuple[ConstraintValue, ...]
+    iterations: int
+    evaluations: Evaluations
+    time_s: SolveTime
+    solver: str
+    linear_solver: str
+    functions: str
+    active_constraints: tuple[ActiveConstraint, ...]
+    starts: tuple[Outcome, ...]
+    seed: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the exact functions find x feasible."""
+        return self.violation <= FEASIBILITY_TOLERANCE
+
+    def __repr__(self) -> str:
+        """One line: what was found, and from how many starts."""
+        found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
+        converged = sum(start.success for start in self.starts)
+        return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
+
+    def _repr_html_(self) -> str:
+        bounds = {a.name: f"{a.price:.4g} {a.price_unit}" for a in self.active_constraints}
+        x = [(name, f"{value:.6g}", bounds.pop(f"bounds[{name}]", "")) for name, value in list(self.x.items())[:SHOWN]]
+        rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
+        left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
+        note = self.status + (f"; {left_out} more rows in .x and .active_constraints" if left_out else "")
+        return html_table(
+            repr(self)[1:-1], ("variable or row", "value", "price of raising its bound"), [*x, *rows], note
+        )
+
+    def signals(self, problem: GaitProblem | None = None) -> Signals:
+        """Time histories at x.
+
+        Args:
+            problem: that was solved; None to load it by its name, which one of your own may not have.
+
+        Raises:
+            UnknownNameError: no problem has that name.
+            InputError: the problem has no time histories.
+        """
+        return self._of(problem).signals(self.x)
+
+    def plot(self, problem: GaitProblem | None = None) -> Any:
+        """The gait as a Matplotlib figure: stick figures from the side, power and balance margin over time.
+
+        Args:
+            problem: as in ``signals``.
+
+        Raises:
+            UnknownNameError: no problem has that name.
+            InputError: the problem has no time histories.
+        """
+        from nlp_gait.formulation.result import Result
+
+        drawing = import_module("compare.drawing.gait_figure")  # by name: it stands above, and few results are drawn
+        found = self._of(problem)
+        gait = drawing.drawn_gait(Result(problem=found, x=found.check_x(self.x)))
+        return drawing.gaits_figure({self.solver: gait})
+
+    def _of(self, problem: GaitProblem | None) -> GaitProblem:
+        """The problem that was solved, with the values that it had."""
+        from nlp_gait.formulation.registry import load
+
+        return (problem or load(self.problem, **self.options)).with_values(**self.parameters)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionaries, lists and numbers, with the schema version of results."""
+        starts = [
+            {
+                "index": index,
+                "success": start.success,
+                "status": start.status,
+                "objective": start.objective,
+                "violation": start.violation,
+                "iterations": start.iterations,
+                "time_s": start.time_s,
+                "x0": dict(zip(self.x, start.x0.tolist(), strict=True)),
+                "x": dict(zip(self.x, start.x.tolist(), strict=True)),
+            }
+            for index, start in enumerate(self.starts)
+        ]
+        return {"schema": 1, **asdict(replace(self, starts=())), "starts": starts}

@@ -1,0 +1,48 @@
+"""One motion for several robots or grounds: every scenario's constraints, and the worst scenario's objective."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation.assembly import Assembly, Point
+from nlp_gait.formulation.gait_problem import GaitProblem
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+
+def worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
+    """Scenario problem: one x that keeps the limits of all scenarios, with the least objective in the worst one.
+
+    Limits, bounds and parameter values are the first scenario's.
+
+    Args:
+        scenarios: problems with the same variables and parameters, whose objective is minimised.
+
+    Raises:
+        InputError: no scenarios, other variables or parameters, or an objective that is maximised.
+    """
+    if not scenarios:
+        raise InputError("a worst case needs at least one scenario")
+    first = scenarios[0]
+    for other in scenarios:
+        if other.names != first.names or [q.name for q in other.parameters] != [q.name for q in first.parameters]:
+            raise InputError(f"all scenarios of {first.name!r} must have the same variables and parameters")
+        if other.objective.sense != "minimise":
+            raise InputError(f"a worst case is of an objective that is minimised; {first.objective.name} is maximised")
+
+    def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+        parts = [assembly, *(scenario.assemble(point, ops) for scenario in scenarios[1:])]
+        constraints = tuple(
+            replace(constraint, name=f"{constraint.name}@{k}" if k else constraint.name)
+            for k, part in enumerate(parts)
+            for constraint in part.constraints
+        )
+        # As the least of the negatives: its lifted variable is an epigraph variable for whatever the objectives hold.
+        worst = -reduce(ops.min, [-part.objective for part in parts])
+        indexes = {f"{name}@{k}" if k else name: v for k, part in enumerate(parts) for name, v in part.indexes.items()}
+        return Assembly(objective=worst, constraints=constraints, indexes=indexes)
+
+    worst = first.derived(title=f"{first.title}, worst of {len(scenarios)} scenarios", change=change)
+    return replace(worst, refine=None)  # a denser grid of the first scenario alone would be another problem

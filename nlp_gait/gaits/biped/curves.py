@@ -1,0 +1,138 @@
+"""Curves of a phase: the papers' cubics of the hip, and quintics and splines on top of any cubic.
+
+A curve is the papers' cubic plus a spline that leaves its ends alone. The spline's coefficients are variables after the papers'
+own; with all of them at zero the motion is the papers'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
+from nlp_gait.symbolic.splines import coefficient_count, spline
+from nlp_gait.symbolic.trajectories import Motion, cubic, plus, stack
+
+Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
+SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))
+
+# Samples in each interval if none are asked for: a cubic has no room between 11 samples, a spline has.
+SAMPLES, SPLINE_SAMPLES = 1, 4
+# Coefficients of a spline lie within these bounds, wider than any optimum's, and start within a share of them.
+BOUNDS = {"m": 0.3, "rad": 3.0}
+START_SHARE = 0.05
+
+HIP_CURVES = ("hip_x", "hip_y", "hip_z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Splines:
+    """Splines on top of the papers' cubics.
+
+    Attributes:
+        trajectory: their order.
+        units: of each curve by name, ``"m"`` or ``"rad"``.
+        length_scale: of the bounds in metres, for a robot of another size than NAO.
+    """
+
+    trajectory: Trajectory
+    units: Mapping[str, str]
+    length_scale: float = 1.0
+
+    @property
+    def count(self) -> int:
+        """Coefficients of each curve."""
+        return coefficient_count(SPANS[self.trajectory])
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Knots between the ends."""
+        spans = SPANS[self.trajectory]
+        return tuple(k / spans for k in range(1, spans))
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Coefficients, curve by curve."""
+        return tuple(
+            Variable(
+                name=f"{curve}_{unit}[{k}]",
+                unit=unit,
+                lower=-self._bound(unit),
+                upper=self._bound(unit),
+                description=f"coefficient {k} of the spline on {curve}",
+            )
+            for curve, unit in self.units.items()
+            for k in range(self.count)
+        )
+
+    def _bound(self, unit: str) -> float:
+        return BOUNDS[unit] * (self.length_scale if unit == "m" else 1.0)
+
+    def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
+        """What each curve adds to its cubic."""
+        coefficients = ca.vertcat(*(at[variable.name] for variable in self.variables))
+        added = spline(ca.reshape(coefficients, self.count, len(self.units)), duration, phase)
+        return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
+
+    def start_of(self, names: Sequence[str]) -> Start | None:
+        """Start points of variables: the papers' anywhere within their bounds, coefficients near zero; None without any."""
+        if self.count == 0:
+            return None
+        own = {variable.name for variable in self.variables}
+        share = np.array([START_SHARE if name in own else 1.0 for name in names])
+
+        def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+            lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
+            middle, half = (lower + upper) / 2, (upper - lower) / 2
+            return np.asarray(middle + share * rng.uniform(-half, half))
+
+        return start
+
+
+def hip_motion(
+    at: InstantPoint, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
+) -> Motion:
+    """Motion of the torso's origin as cubics in x, y and z (3,) [m].
+
+    Args:
+        at: values of the variables hip_height_m and hip_v<axis>_<end>_m_s.
+        along: x at both ends [m].
+        across: y at both ends [m].
+        duration: of the phase [s].
+        phase: time / duration.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.
+    """
+    height = at["hip_height_m"]
+    ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
+    return stack(
+        *(
+            cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
+            for axis, (start, end) in ends.items()
+        )
+    )
+
+
+def hip_on_spline(
+    at: InstantPoint,
+    more: Mapping[str, Motion],
+    along: tuple[float, float],
+    across: tuple[float, float],
+    duration: SX,
+    phase: SX,
+) -> Motion:
+    """Motion of the torso's origin (3,) [m]: the papers' (see ``hip_motion``), and what each curve adds."""
+    return plus(hip_motion(at, along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
+
+
+def grid_for(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:
+    """Samples of a phase: as many in an interval as are asked for, or for 0 as many as suit the trajectory and the loads."""
+    if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
+        samples_per_interval = SPLINE_SAMPLES if planned_loads or trajectory != "cubic" else SAMPLES
+    return Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")

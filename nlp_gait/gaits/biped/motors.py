@@ -1,0 +1,200 @@
+"""Real motors in the problems of a phase: what they can give, and what they draw.
+
+An option lists what is taken into account, in addition to the paper or in place of it:
+
+    limits          speed, torque against speed, and continuous torque of every motor
+    ankle           roll of an ankle limited by its pitch, where that is known of the robot
+    free-braking    braking draws nothing, in place of as much as driving: the positive part of torque times rate
+    regeneration    braking gives back what it takes, in place of drawing it: torque times rate with its sign
+    heat            heat constant of each motor from its data sheet, in place of one K for all
+    rotor           inertia of every rotor at its joint: torques and what follows from them, and the engine's joints alike
+
+Two joints may share a motor, whose rotor counts half at each: NAO's hip yaw-pitch joints do. No source gives a limit of
+acceleration, so there is none here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX
+
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.formulation import Parameter, Point
+from nlp_gait.formulation.blocks import labels
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, Draw
+from nlp_gait.gaits.biped.parts import Contribution, Part, rows
+from nlp_gait.gaits.biped.samples import Samples, time_mean
+from nlp_gait.robots import Robot
+from nlp_gait.robots.robot import Motor
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+ANKLE = "ankle"
+FEATURES = ("limits", ANKLE, "free-braking", "regeneration", "heat", "rotor")
+
+SUPPLY = Parameter(
+    name="supply_share",
+    unit="1",
+    default=1.0,
+    description="voltage of the motors as a share of the data sheet's; speed at no load and torque at stall follow it",
+    minimum=0.05,
+    maximum=2.0,
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motors:
+    """What of the real motors a problem takes into account.
+
+    Attributes:
+        features: see above.
+        robot: whose motors they are, without the inertia of their rotors.
+        joints: that they turn.
+        shared: two of them that one motor turns.
+        coupling: limit of one ankle joint by the other, if it is known.
+
+    Raises:
+        UnknownNameError: no such feature.
+        InputError: features that exclude each other; a joint of the robot without data of its motor, or of its rotor.
+    """
+
+    features: tuple[str, ...]
+    robot: Robot
+    joints: tuple[str, ...]
+    shared: tuple[str, ...] = ()
+    coupling: Part | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse unknown features, and two rules for braking."""
+        known = [name for name in FEATURES if name != ANKLE or self.coupling is not None]
+        for name in self.features:
+            if name not in known:
+                raise unknown("feature in motors", name, known)
+        if {"free-braking", "regeneration"} <= set(self.features):
+            raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
+        if self.features:
+            self._ratings, self.model  # noqa: B018  a robot without data is refused now
+
+    @classmethod
+    def parsed(
+        cls,
+        text: str,
+        robot: Robot,
+        joints: tuple[str, ...],
+        shared: tuple[str, ...] = (),
+        coupling: Part | None = None,
+    ) -> Motors:
+        """Features from an option's text, separated by commas; none if it is empty."""
+        features = tuple(part.strip() for part in text.split(",") if part.strip())
+        return cls(features=features, robot=robot, joints=joints, shared=shared, coupling=coupling)
+
+    @cached_property
+    def model(self) -> Robot:
+        """The robot as the dynamics take it: with the inertia of its rotors, if asked for."""
+        if "rotor" not in self.features:
+            return self.robot
+        found = {}
+        for joint, rating in zip(self.joints, self._ratings, strict=True):
+            if rating.reflected_inertia_kgm2 is None:
+                raise InputError(
+                    f"robot {self.robot.name!r}: the motor of joint {joint!r} has no rotor_inertia_gcm2, which motors=rotor needs"
+                )
+            found[joint] = rating.reflected_inertia_kgm2 / (len(self.shared) if joint in self.shared else 1)
+        return replace(self.robot, armatures_kgm2=found)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Limits of the motors."""
+        limits = (MotorLimits(self, self._ratings),) if "limits" in self.features else ()
+        return (*limits, *((self.coupling,) if self.coupling is not None and ANKLE in self.features else ()))
+
+    @property
+    def draw(self) -> Draw | None:
+        """How the motors draw power; None for the paper's way."""
+        return self._power if {"free-braking", "regeneration", "heat"} & set(self.features) else None
+
+    def _power(self, at: Point, samples: Samples, ops: Nonsmooth) -> MX:
+        """Mean electrical power over the phase [W]."""
+        driven = ca.vec(samples.power)
+        if "regeneration" in self.features:
+            mechanical = driven
+        elif "free-braking" in self.features:
+            mechanical = (driven + ops.abs(driven)) / 2
+        else:
+            mechanical = ops.abs(driven)
+        if "heat" in self.features:
+            constants = DM([rating.heat_W_per_Nm2 for rating in self._ratings])
+            heat = constants.T @ self.by_motor(samples.torque) ** 2
+        else:
+            heat = at[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
+        return time_mean(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
+
+    @cached_property
+    def _ratings(self) -> tuple[Motor, ...]:
+        """Data of the motors, one for each joint."""
+        ratings = []
+        for joint in self.joints:
+            motor = self.robot.joint(joint).motor
+            if motor is None:
+                raise InputError(
+                    f"robot {self.robot.name!r}: joint {joint!r} has no motor data, which the option motors needs"
+                )
+            ratings.append(motor)
+        return tuple(ratings)
+
+    def by_motor(self, torque: MX) -> MX:
+        """Torques (J, n) with both joints' that share a motor at that motor, in the first one's row."""
+        if not self.shared:
+            return torque
+        first, second = (self.joints.index(joint) for joint in self.shared)
+        sharing = np.eye(len(self.joints))
+        sharing[first, second], sharing[second, second] = 1.0, 0.0
+        return ca.sparsify(DM(sharing)) @ torque
+
+
+class MotorLimits(Part):
+    """Speed, torque against speed |tau| <= stall (1 - |qd| / no-load), and root mean square torque of every motor.
+
+    As two lines of each sign, tau +- qd stall / no-load within +- stall, in braking too, where a motor could give more.
+
+    Args:
+        motors: whose limits they are.
+        ratings: one for each joint.
+    """
+
+    parameters = (SUPPLY,)
+    reads_motion = True
+
+    def __init__(self, motors: Motors, ratings: Sequence[Motor]) -> None:
+        self._motors, self._ratings = motors, ratings
+
+    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+        """Two-sided rows, and an upper bound on the mean squares' roots."""
+        torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
+        n = torque.shape[1]
+        joints = self._motors.joints
+        motors = [k for k, joint in enumerate(joints) if joint not in self._motors.shared[1:]]
+        names = tuple(joints[k] for k in motors)
+        loads = self._motors.by_motor(torque)[motors, :]
+        ratings = [self._ratings[k] for k in motors]
+        stall = DM([rating.stall_torque_Nm for rating in ratings])
+        slope = DM([rating.stall_torque_Nm / rating.no_load_rad_s for rating in ratings])
+        place = DM(len(motors), len(moving))
+        for column, joint in enumerate(moving):
+            place[names.index(joint), column] = 1.0
+        drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
+        speed = DM([self._motors.robot.joint(joint).velocity_limit_rad_s for joint in moving])
+        fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
+        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, labels(moving, range(n)), "instant")
+        too_weak = [
+            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, labels(names, range(n)), "instant")
+            for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
+        ]
+        continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
+        rms = ca.sqrt(time_mean(loads**2))
+        too_hot = rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
+        return Contribution(rows=(too_fast, *too_weak, too_hot))

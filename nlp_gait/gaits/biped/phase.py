@@ -1,0 +1,361 @@
+"""A support phase of a spatial biped sampled over time: how the robot moves and what that asks of motors and ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.formulation import (
+    Array,
+    Assembly,
+    Grid,
+    InstantPoint,
+    NumericPoint,
+    Parameter,
+    Point,
+    Signals,
+    Stretch,
+    Variable,
+    in_space,
+)
+from nlp_gait.formulation.motion.playback import PLAYED
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader, Loads, PlannedInstant, Planner
+from nlp_gait.gaits.biped.parts import REACH_MARGIN, Part
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples, Trace
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.economy import economical, tabulated
+from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion
+
+Derivatives = Literal["analytic", "finite-difference"]
+
+# Of the ground on each sole: its force, and its moment about the point under the ankle.
+WRENCHES = {
+    f"{foot}_{half}": in_space(unit) for foot in BOTH_FEET.values() for half, unit in (("force", "N"), ("moment", "Nm"))
+}
+COLUMNS = {
+    "zmp": in_space("m", "xy"),
+    **{name: in_space("m") for name in ("hip", "com", "left_foot", "right_foot")},
+    **WRENCHES,
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Phase:
+    """A support phase: how the robot moves, what that asks of motors and ground, and what is wanted of it.
+
+    Attributes:
+        robot: with links welded that never move.
+        joints: those whose torques and rates count.
+        planned: those whose angles the phase plans.
+        variables: of the motion, in the order of x.
+        duration: variable that holds the phase's duration.
+        plan: the motion.
+        loads: torques and ZMP.
+        grid: its samples.
+        derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
+        parts: what limits the phase.
+        goal: what it minimises.
+        kinks: phases at which the motion's formula changes: knots of splines.
+    """
+
+    robot: Robot
+    joints: tuple[str, ...]
+    planned: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    duration: str
+    plan: Planner
+    loads: Loader
+    grid: Grid
+    derivatives: Derivatives = "analytic"
+    parts: Sequence[Part] = ()
+    goal: Goal = Goal()
+    kinks: tuple[float, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of the goal and of all parts; pairs of bounds stand last, for there are many."""
+        own = (*self.goal.parameters, *(parameter for part in self.parts for parameter in part.parameters))
+        return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
+
+    def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
+        """Rows of all parts, the goal, and the indexes of both."""
+        added = [part.contribute(at, samples, ops) for part in self.parts]
+        value, before, after = self.goal.value(at, samples, ops)
+        indexes = {name: index for part in added for name, index in part.indexes.items()}
+        return Assembly(
+            objective=value,
+            constraints=tuple(row for part in added for row in part.rows),
+            indexes={**before, **indexes, **after},
+        )
+
+    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
+        """The phase at N + 1 equidistant samples, each evaluated once; mapped, never unrolled."""
+        return self.samples_at(at, ops, None)
+
+    def samples_at(self, at: Point, ops: Nonsmooth, phases: MX | None) -> Samples:
+        """The phase at its samples, or at other phases (1, k).
+
+        Finite differences are of the samples themselves, so that other phases have analytic derivatives only.
+        """
+        traces, motion, pressed = self._traces, self._reads_motion, len(BOTH_FEET) * self._reads_wrenches
+        if self.derivatives == "analytic":
+            planned, reach, torque, power, zmp, miss, *rest = self._sampled(
+                at, ops, motion, pressed > 0, traces, phases
+            )
+            wrenches, moved, seen = rest[:pressed], rest[pressed : pressed + 3 * motion], rest[pressed + 3 * motion :]
+        else:
+            q, _, _, hip, planned, reach, world, _, *seen = self._mapped(self._kinematics(ops, traces), at)
+            miss = MX(0, self.grid.parts + 1)
+            qd, qdd = self._differences(q, at)
+            n = self.grid.parts + 1
+            torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
+            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if pressed else []
+            power, moved = qd * moving, [q, qd, qdd]
+        return Samples(
+            joints=self.joints,
+            moving=self.moving,
+            per_interval=self.grid.samples_per_interval if phases is None else 1,
+            duration=at[self.duration],
+            planned=planned,
+            reach=reach,
+            torque=torque,
+            power=power,
+            zmp=zmp,
+            miss=miss,
+            motion=tuple(moved),
+            wrenches=dict(zip(BOTH_FEET, wrenches, strict=False)),
+            traces=dict(zip(traces, seen, strict=True)),
+        )
+
+    def stretch(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[Stretch, ...]:
+        """The phase as functions of time; none with finite differences, which are of its samples.
+
+        Args:
+            name: of the phase in a longer motion.
+            begins: durations of the phases before it.
+        """
+        if self.derivatives != "analytic":
+            return ()
+
+        def assemble(at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+            return self.assemble(at, self.samples_at(at, ops, phases), ops)
+
+        def times(values: Mapping[str, float]) -> tuple[float, float]:
+            start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
+            return start, start + max(values[self.duration], LEAST_DURATION)
+
+        return (
+            Stretch(
+                name=name,
+                assemble=assemble,
+                times=times,
+                intervals=self.grid.intervals,
+                means=("power_W", "paper_power_W", "dbm_x_mean_m", "dbm_y_mean_m"),
+                kinks=self.kinks,
+            ),
+        )
+
+    def signals(self, at: NumericPoint) -> Signals:
+        """Time histories at a point of numbers."""
+        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._exact_kinematics, at)
+        if self.derivatives == "finite-difference":
+            qd, qdd = self._differences(q, at)
+        n = self.grid.parts + 1
+        torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
+        wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
+        rows = [self.joints.index(name) for name in self.moving]
+
+        def full(moved: Any, others: Array) -> Array:
+            """(N + 1, J) with the joints that stand still."""
+            values = np.tile(others, (n, 1))
+            values[:, rows] = _numbers(moved)
+            return values
+
+        still_rates = np.zeros(len(self.joints))
+        com, left, right, *_ = (_numbers(part) for part in ca.vertsplit(world, 3))
+        halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
+        arrays = {
+            "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
+            "q": full(q, self._held),
+            "qd": full(qd, still_rates),
+            "qdd": full(qdd, still_rates),
+            "tau": _numbers(torque),
+            "zmp": _numbers(zmp),
+            "hip": _numbers(hip),
+            "com": com,
+            "left_foot": left,
+            "right_foot": right,
+            **dict(zip(WRENCHES, halves, strict=True)),
+        }
+        if not attitude.shape[0]:
+            return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
+        arrays["attitude"] = _numbers(attitude)
+        return Signals(joints=self.joints, arrays=arrays, columns={**COLUMNS, "attitude": PLAYED["attitude"]})
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Joints whose angle changes over the phase."""
+        joints = self._symbolic_plan(Exact())[1].joints
+        return tuple(name for name in self.joints if not joints[name].velocity.is_zero())
+
+    @cached_property
+    def _held(self) -> Array:
+        """(J,) angles of the joints that stand still, zero for the others [rad]."""
+        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
+        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
+
+    @cached_property
+    def _exact_kinematics(self) -> ca.Function:
+        return self._kinematics(Exact(), {})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the variables."""
+        return tuple(variable.name for variable in self.variables)
+
+    @property
+    def _traces(self) -> dict[str, Trace]:
+        return {name: trace for part in self.parts for name, trace in part.traces.items()}
+
+    @property
+    def _reads_motion(self) -> bool:
+        return self.goal.reads_motion or any(part.reads_motion for part in self.parts)
+
+    @property
+    def _reads_wrenches(self) -> bool:
+        return any(part.reads_wrenches for part in self.parts)
+
+    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], PlannedInstant, InstantPoint]:
+        x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
+        at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
+        return [x, margin, phase], self.plan(at, phase, ops), at
+
+    def _sampled(
+        self,
+        at: Point,
+        ops: Nonsmooth,
+        motion: bool,
+        wrenches: bool,
+        traces: Mapping[str, Trace],
+        phases: MX | None,
+    ) -> list[Any]:
+        """Outputs of ``_sample`` at all samples, or at other phases; equations that it leaves open are tied."""
+        inputs, outputs = self._sample(ops, motion, wrenches, traces)
+        roots = ops.open_roots()
+        if roots is None:
+            return self._mapped(ca.Function("sample", inputs, economical(outputs)), at, phases=phases)
+        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at, phases=phases)
+        tied = ca.Function("sample", [roots.unknowns, *inputs], economical([roots.residual, *outputs]))
+        found: list[Any] = []
+
+        def residual(unknowns: MX) -> MX:
+            rows, *rest = self._mapped(tied, at, unknowns, phases=phases)
+            found.extend(rest)
+            return rows
+
+        ops.solved(start, residual)
+        return found
+
+    def _sample(
+        self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]
+    ) -> tuple[list[SX], list[SX]]:
+        """One sample with analytic derivatives: x, margin and phase, and torques and what else is read."""
+        inputs, plan, at = self._symbolic_plan(ops)
+        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()}, plan.wrench)
+        power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
+        torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
+        outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
+        outputs += [loads.wrenches[side] for side in BOTH_FEET] if wrenches else []
+        outputs += self._motion(plan) if motion else []
+        outputs += [trace(at, inputs[2]) for trace in traces.values()]
+        return inputs, outputs
+
+    def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
+        """One sample: angles that move with their derivatives, hip, planned angles, reach, and what follows.
+
+        That is the centre of mass with both feet and the planned wrench one below the other, the attitude, and traces.
+        """
+        inputs, plan, at = self._symbolic_plan(ops)
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
+        tree = tree_from(self.robot, self.robot.feet["left"].link)
+        angles = {name: joint.position for name, joint in plan.joints.items()}
+        com = centre_of_mass(tree, forward_kinematics(tree, angles, plan.ankles["L"]))
+        soles = [
+            plan.ankles[side] - SX([0, 0, self.robot.feet[foot].ankle_height_m]) for side, foot in BOTH_FEET.items()
+        ]
+        world = ca.vertcat(com, *soles, plan.wrench)
+        seen = [trace(at, inputs[2]) for trace in traces.values()]
+        known = [plan.hip, planned, plan.reach, world, plan.attitude]
+        return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
+
+    def _motion(self, plan: PlannedInstant) -> list[SX]:
+        """Angles of the joints that move, and both derivatives."""
+        return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
+
+    @cached_property
+    def _dynamics(self) -> ca.Function:
+        """One sample: torques, those of the moving joints, and ZMP, from the inputs of ``_loaded``."""
+        inputs, loads = self._loaded()
+        torque, moving = (ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.joints, self.moving))
+        return ca.Function("dynamics", inputs, economical([torque, moving, loads.zmp]))
+
+    @cached_property
+    def _ground(self) -> ca.Function:
+        """One sample: wrenches (6,) on both soles, from the inputs of ``_loaded``."""
+        inputs, loads = self._loaded()
+        return ca.Function("ground", inputs, economical([loads.wrenches[side] for side in BOTH_FEET]))
+
+    def _loaded(self) -> tuple[list[SX], Loads]:
+        """Loads of one sample as functions of angles, both derivatives, hip, and what ``_kinematics`` gives of the world."""
+        plan = self._symbolic_plan(Exact())[1]
+        parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
+        hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
+        _, left, right, *wrench = ca.vertsplit(world, 3)
+        moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
+        feet = {"L": left[:2], "R": right[:2]}
+        loads = self.loads({**plan.joints, **moved}, hip, feet, ca.vertcat(*wrench) if wrench else SX(0, 1))
+        return [*parts, hip, world], loads
+
+    def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
+        """A function of columns and (x, margin, phase) at all samples, or at other phases (1, k), one column each.
+
+        Columns are those of its inputs that differ from sample to sample.
+        """
+        n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
+        margin = ca.repmat(at[REACH_MARGIN], 1, n)
+        if phases is not None:
+            return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, phases]))
+        function, table = tabulated(function, DM(np.linspace(0.0, 1.0, n)).T)
+        return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, table]))
+
+    def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
+        """First and second time derivative of sampled angles (m, N + 1): central, one-sided at the ends, twice.
+
+        Source:
+            Gupta, Pratihar, Deb (2023), section 3.1: "numerical differentiation as per the given time interval"; the
+            stencil is that of MATLAB's ``gradient``, the paper's environment.
+        """
+        n = self.grid.parts + 1
+        stencil = np.zeros((n, n))
+        stencil[0, :2], stencil[-1, -2:] = (-1.0, 1.0), (-1.0, 1.0)
+        for k in range(1, n - 1):
+            stencil[k, k - 1], stencil[k, k + 1] = -0.5, 0.5
+        rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))
+        qd = q @ rate
+        return qd, qd @ rate
+
+
+def _numbers(values: Any) -> Array:
+    """(N + 1, m) from columns of numbers."""
+    return np.asarray(DM(values).full().T)

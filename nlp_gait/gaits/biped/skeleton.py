@@ -1,0 +1,86 @@
+"""What is drawn of any biped: legs, soles, and every other limb that is long enough to be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.formulation import Array, Signals
+from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, on_flat_ground, rectangle
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.kinematics import forward_kinematics
+
+ON_GROUND = 1e-6  # [m]; a sole that is higher does not bear load
+SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras
+
+
+def skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
+    """What draws a robot; joints that a gait does not move stand at zero."""
+    return lambda signals, parameters: _skeleton(robot, signals)
+
+
+def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
+    arrays, at = signals.arrays, _link_origins(robot, signals)
+    limbs, soles = [], []
+    for side in (LEFT, RIGHT):
+        leg = [at[link] for link in _chain(robot, robot.feet[side].link)]
+        limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
+        soles.append(level_sole(robot, side, arrays[f"{side}_foot"]))
+    feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
+    height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
+    for tip in _tips(robot):
+        chain = _chain(robot, tip)
+        if feet & set(chain):
+            continue
+        far = _at_zero(robot, tip)
+        if np.linalg.norm(far) < SHORTEST_SHARE * height:
+            continue
+        side = TRUNK if abs(far[1]) < 0.1 * height else LEFT if far[1] > 0 else RIGHT
+        limbs.append(Limb(side=side, points=np.stack([at[link] for link in chain], axis=1)))
+    return on_flat_ground(signals, limbs, soles)
+
+
+def level_sole(robot: Robot, side: str, centre: Array) -> Sole:
+    """Sole of a foot that stays level, from the point under its ankle (T, 3) [m]; it bears load on the ground alone."""
+    foot = robot.feet[side]
+    outline = rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
+    return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
+
+
+def _chain(robot: Robot, link: str) -> list[str]:
+    """Links from the root to one."""
+    return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)))]
+
+
+def _tips(robot: Robot) -> list[str]:
+    """Links at the far ends."""
+    parents = {joint.parent for joint in robot.joints.values()}
+    return [link for link in robot.links if link not in parents]
+
+
+def _at_zero(robot: Robot, link: str) -> Array:
+    """(3,) of a link's joint from the root at zero angles [m]."""
+    return np.sum([(0.0, 0.0, 0.0), *(joint.origin_m for joint in robot.path_to_root(link))], axis=0)
+
+
+def _link_origins(robot: Robot, signals: Signals) -> dict[str, Array]:
+    """World positions (T, 3) of every link's joint, seen from the left foot, which is flat."""
+    q, base = SX.sym("q", len(signals.joints)), SX.sym("base", 3)
+    angles = {name: SX(0) for name in robot.joints} | {name: q[i] for i, name in enumerate(signals.joints)}
+    tree = tree_from(robot, robot.feet[LEFT].link)
+    poses = forward_kinematics(tree, angles, base)
+    origins: dict[str, SX] = {}
+    for body, pose in zip(tree, poses, strict=True):
+        # A body's reference point is the joint by which it is reached; its own joint is elsewhere where that leads up.
+        own = robot.joint_to.get(body.link.name)
+        upwards = body.joint is not None and body.direction < 0
+        offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or own is None else np.zeros(3)
+        origins[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
+    function = ca.Function("origins", [q, base], list(origins.values()))
+    standing = signals.arrays["left_foot"] + np.array([0.0, 0.0, robot.feet[LEFT].ankle_height_m])
+    values = function.map(len(signals.arrays["t"]))(signals.arrays["q"].T, standing.T)
+    return {name: np.array(value.full().T) for name, value in zip(origins, values, strict=True)}

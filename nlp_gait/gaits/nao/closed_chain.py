@@ -1,0 +1,140 @@
+"""Legs between two flat, standing soles and a torso that leans: the closed chain of double support.
+
+Torso and soles are held apart by twelve leg joints of which two are one motor: that leaves the torso five of its six freedoms.
+Its position, roll and pitch are free here; its yaw and the angle of the hips' yaw-pitch follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import DM, SX
+
+from nlp_gait.errors import InputError
+from nlp_gait.gaits.nao.legs import AXIS_TOLERANCE, FORWARD, LEG_JOINTS, TO_THE_LEFT, leg_geometry
+from nlp_gait.robots import Robot
+from nlp_gait.symbolic.inverse_kinematics import leg_angles
+from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, plus, stack, through
+
+UP = (0.0, 0.0, 1.0)
+YAW_PITCHES = {side: f"{side}HipYawPitch" for side in "LR"}
+# Each step of Newton's method squares the error: from 0.3 rad of lean four end at rounding; limits on the turn say so if not.
+NEWTON_STEPS = 4
+
+
+class Stance(NamedTuple):
+    """Both legs from the pose of the torso.
+
+    Attributes:
+        joints: motions of the twelve leg joints by name [rad].
+        reach: (2,) cosines of the left and the right knee.
+    """
+
+    joints: dict[str, Motion]
+    reach: SX
+
+
+def check_yaw_pitches(robot: Robot) -> None:
+    """Refuse hips whose yaw-pitch turns both legs as the torso's yaw does: the pair would not follow from the lean.
+
+    Raises:
+        InputError: the axes are equally steep.
+    """
+    left, right = (robot.joint(YAW_PITCHES[side]).axis[2] for side in "LR")
+    if abs(left - right) <= AXIS_TOLERANCE:
+        raise InputError(
+            f"robot {robot.name!r}: the axes of {' and '.join(YAW_PITCHES.values())} must differ in z, got {left} and {right}; "
+            "with equal ones a lean of the torso is not closed by one motor"
+        )
+
+
+def leaning_legs(
+    robot: Robot, torso: Motion, lean: Motion, ankles: Mapping[str, SX], margin: SX, ops: Nonsmooth
+) -> Stance:
+    """Motions of both legs under a torso whose pose is given, over ankles that stand with flat soles.
+
+    Args:
+        robot: with links welded that never move.
+        torso: (3,) its origin [m].
+        lean: (2,) its roll about its own x axis and its pitch before that [rad].
+        ankles: (3,) by side, at rest [m].
+        margin: on the reach of a knee (see ``Nonsmooth.acos``).
+        ops: interpretation of acos.
+
+    Source:
+        Sole and knee have the angles of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); those at the hip follow from the torso's
+        turn. The formulation is this package's own.
+    """
+    moved = through(lambda pose: _hips(robot, pose, ankles), stack(torso, lean))
+    yaw_pitch, *sides = (_part(moved, rows) for rows in (slice(0, 1), slice(1, 6), slice(6, 11)))
+    joints: dict[str, Motion] = {}
+    reach: list[SX] = []
+    for side, hip in zip("LR", sides, strict=True):
+        geometry = leg_geometry(robot, side)
+        to_ankle = plus(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
+        leg = leg_angles(to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
+        _, pitch, *below = (_part(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
+        at_hip = (_part(hip, slice(3, 4)), plus(pitch, _part(hip, slice(4, 5))))
+        joints |= {f"{side}{name}": motion for name, motion in zip(LEG_JOINTS, (*at_hip, *below), strict=True)}
+        joints[YAW_PITCHES[side]] = yaw_pitch
+        reach.append(leg.reach)
+    return Stance(joints, ca.vertcat(*reach))
+
+
+def closure(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> tuple[SX, SX]:
+    """Angle of the hips' yaw-pitch [rad], and how far each sole is from flat (2,) [rad], at a pose (5,) of the torso."""
+    turn = _solved(robot, pose, ankles)
+    return turn[1], ca.vertcat(*(_misfit(robot, side, turn, pose, ankles[side]) for side in "LR"))
+
+
+def _part(motion: Motion, rows: slice) -> Motion:
+    return Motion(*(value[rows] for value in motion))
+
+
+def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
+    """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond upright [rad]."""
+    turn = _solved(robot, pose, ankles)
+    found = [turn[1]]
+    for side in "LR":
+        hip, rotation = _hip(robot, side, turn, pose)
+        rest = rotation.T @ axis_rotation(FORWARD, _plane(hip, ankles[side]))  # roll about x, then the pitch about y
+        found += [hip, ca.atan2(rest[2, 1], rest[1, 1]), ca.atan2(rest[0, 2], rest[0, 0])]
+    return ca.vertcat(*found)
+
+
+def _solved(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
+    """(2,) torso's yaw and hips' yaw-pitch that let both soles be flat [rad], by Newton's method from zero."""
+    turn, at = SX.sym("turn", 2), SX.sym("pose", 5)
+    misfits = ca.vertcat(*(_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
+    slope = ca.jacobian(misfits, turn)
+    step = ca.Function("step", [turn, at], [turn - ca.inv_minor(slope) @ misfits])
+    found = SX(2, 1)
+    for _ in range(NEWTON_STEPS):
+        found = step(found, pose)
+    return found
+
+
+def _misfit(robot: Robot, side: str, turn: SX, pose: SX, ankle: SX) -> SX:
+    """Sine of the angle between the knee's axis, which a flat sole gives, and the plane across the axis of the hip's roll."""
+    hip, rotation = _hip(robot, side, turn, pose)
+    plane = _plane(hip, ankle)
+    return ca.cos(plane) * rotation[1, 0] + ca.sin(plane) * rotation[2, 0]
+
+
+def _hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
+    """Hip joint (3,) [m] and rotation (3, 3) of the link above the hip's roll, in the world."""
+    yaw, roll = robot.joint(YAW_PITCHES[side]), robot.joint(f"{side}HipRoll")
+    axes = (UP, TO_THE_LEFT, FORWARD)
+    about_z, about_y, about_x = (axis_rotation(k, a) for k, a in zip(axes, (turn[0], pose[4], pose[3]), strict=True))
+    torso = about_z @ about_y @ about_x
+    pelvis = torso @ axis_rotation(yaw.axis, turn[1])
+    return pose[:3] + torso @ DM(yaw.origin_m) + pelvis @ DM(roll.origin_m), pelvis
+
+
+def _plane(hip: SX, ankle: SX) -> SX:
+    """Roll of a leg's plane against upright, from hip and ankle (3,) [rad] (see ``leg_angles``)."""
+    return ca.atan2(ankle[1] - hip[1], hip[2] - ankle[2])

@@ -1,0 +1,197 @@
+"""The closed loop on stairs: desired angles, one quantum of the nine-link dynamics, and what a quantum costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.formulation import Point
+from nlp_gait.gaits.stairs.formulas.gait import Stair, stair_height
+from nlp_gait.gaits.stairs.formulas.loads import LEAST_LOAD, link_angles
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
+from nlp_gait.gaits.stairs.formulas.posture import posture
+from nlp_gait.gaits.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.gaits.stairs.network import learned
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, stair_of
+from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.quantised import (
+    Controller,
+    QuantisedState,
+    after,
+    controller_torque,
+    explicit_quantum,
+    implicit_quantum,
+)
+
+Scheme = Literal["implicit", "explicit"]
+InverseKinematics = Literal["closed-form", "network"]
+QUANTUM = 0.01  # dt [s], (eq. 43)
+EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
+# Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
+CONTACTS = ("T", "S", "A", "S'", "T'")
+N = len(LINKS)
+# What a quantum is given besides the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated with respect to it.
+GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
+TORSO = LINKS.index("UH")
+
+
+class Rollout(NamedTuple):
+    """The closed loop at the end of every quantum; columns are quanta.
+
+    Attributes:
+        desired: (18, m) desired angles and rates.
+        state: (18, m) angles [rad] and rates [rad/s] of the nine links.
+        torque: (9, m) generalised torques of the links [Nm].
+        zmp: (1, m) ahead of the stance ankle, on the virtual slope in double support [m].
+    """
+
+    desired: MX
+    state: MX
+    torque: MX
+    zmp: MX
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClosedLoop:
+    """Closed loop over whole quanta of time.
+
+    Attributes:
+        quanta: number of steps of the rollout.
+        scheme: of the quantised dynamics.
+        gains: number of different K_p, and of different K_d: 1 or one for each link.
+        inverse_kinematics: where the desired angles of both legs come from.
+    """
+
+    quanta: int
+    scheme: Scheme
+    gains: int
+    inverse_kinematics: InverseKinematics = "closed-form"
+
+    def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
+        """States, torques and ZMP.
+
+        Args:
+            point: for the problem's parameters.
+            tuned: K_p (gains,), K_d (gains,) and the desired torso pitch; gains are not negative.
+            ops: interpretation of what is not smooth.
+        """
+        stair = stair_of(point)
+        size = ca.vertcat(stair.tread, stair.rise)
+        times = np.arange(self.quanta + 1) * QUANTUM
+        plan = ca.repmat(ca.vertcat(governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
+        desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        if self.inverse_kinematics == "network":
+            desired = learned(desired)
+        constants = ca.vertcat(
+            size,
+            *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
+            point["gravity_compensation"],
+            point["disturbance_Nm"],
+        )
+        aims = desired[:, 1:] if self.scheme == "implicit" else desired[:, :-1]
+        given = ca.vertcat(aims, DM(times[None, :-1]), ca.repmat(constants, 1, self.quanta))
+        inputs = given, ca.repmat(tuned, 1, self.quanta)
+        initial = desired[:, 0]
+        states = ops.rollout(self.step, initial, *inputs)
+        before = ca.horzcat(initial, states[:, :-1])
+        slope = ca.repmat(stair.rise / stair.tread, 1, self.quanta) * (DM(times[None, 1:]) < point["t2_s"])
+        torque, zmp = self._outcome.map(self.quanta)(before, states, *inputs, slope)
+        return Rollout(desired[:, 1:], states, torque, zmp)
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """(state (18,), given, tuned) to the state one quantum later."""
+        state, inputs, parts = self._symbols()
+        following = after(state, solve_definite(*self._equations(state, parts)), QUANTUM)
+        return ca.Function(
+            "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
+        )
+
+    def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
+        """Of the acceleration within one quantum."""
+        q, v = state
+        found = points(toe_foot_biped().rods, q, SX(2, 1))
+        motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, q)
+        stair = Stair(parts["size"][0], parts["size"][1])
+        contacts = [
+            Contact(
+                found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH),
+                ca.jacobian(found[name][1], q).T,
+                ca.jacobian(found[name][0], q).T,
+            )
+            for name in CONTACTS
+        ]
+        control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
+        if self.scheme == "implicit":
+            return implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
+        return explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
+
+    @cached_property
+    def _outcome(self) -> ca.Function:
+        """(state, next state, given, tuned, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
+        state, inputs, parts = self._symbols()
+        following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
+        slope = SX.sym("slope")
+        rods = toe_foot_biped().rods
+        G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
+        acted = following if self.scheme == "implicit" else state
+        torque = controller_torque(parts["control"], parts["desired"], acted, G)
+
+        acceleration = (following.v - state.v) / QUANTUM
+        weight, moment, pull = SX(0), SX(0), SX(0)
+        for link, middle in centres(points(rods, state.q, SX(2, 1))).items():
+            rod = rods[link]
+            velocity = ca.jtimes(middle, state.q, state.v)
+            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration)
+            spin = acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
+            weight += rod.mass * (a[1] + GRAVITY)
+            pull += rod.mass * a[0]
+            moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
+        least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
+        zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
+        return ca.Function(
+            "outcome",
+            [ca.vertcat(*state), ca.vertcat(*following), *inputs, slope],
+            ca.cse([torque, zmp]),
+            {"is_diff_in": [True, True, False, True, False]},
+        )
+
+    def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
+        """QuantisedState, the inputs given and tuned, and what they hold by name, with controller and desired state."""
+        given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
+        ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
+        parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
+        kp, kd, torso = ca.vertsplit(tuned, [0, self.gains, 2 * self.gains, 2 * self.gains + 1])
+        each = N // self.gains
+        aim = parts.pop("aim")
+        parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), parts.pop("gravity_share"))
+        parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
+        return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
+
+
+def _desired(ops: Nonsmooth) -> ca.Function:
+    """(time, governing parameters with stair and reach margin) to the desired angles and rates (18,)."""
+    s, passing = SX.sym("s", 4), SX.sym("passing", 4)
+    values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
+    plan = stair_plan(values)
+    step = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
+    )
+    given = ca.vertcat(values, size, margin)
+    pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
+    time = SX.sym("time")
+    starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
+    passed = (time - starts) / plan.durations
+    shares = ca.fmin(ca.fmax(passed, 0), 1)
+    now = (passed >= 0) * ca.vertcat(passed[:3] < 1, 1)
+    return ca.Function("desired", [time, given], [ca.cse(ca.vertcat(*pose(shares, now, given)))])

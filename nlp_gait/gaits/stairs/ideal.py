@@ -1,0 +1,222 @@
+"""Climbing one step at least effort: full trajectory optimisation, the floor under every planner and controller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from math import inf
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker, parameters
+from nlp_gait.formulation.blocks import Block, Layout
+from nlp_gait.gaits.stairs.formulas.gait import Stair, StairPlan
+from nlp_gait.gaits.stairs.formulas.loads import JOINTS, MOVING
+from nlp_gait.gaits.stairs.formulas.posture import posture
+from nlp_gait.gaits.stairs.ideal_model import AXES, IdealModel
+from nlp_gait.gaits.stairs.playback import Performance, playback, standing
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.skeleton import skeleton
+from nlp_gait.gaits.stairs.stair import (
+    ANGLE_LIMITS,
+    COLUMNS,
+    GRAVITY,
+    LEAST_STANCE_FORCE,
+    PAPER_TIMES,
+    STAIR_PARAMETERS,
+    joint_signals,
+)
+from nlp_gait.symbolic.nonsmooth import Exact
+
+RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
+FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
+# Shares of the step's time: the rear sole lifts at t1 = 0.5 s, the toe at t2 = 1.4 s of 3.5 s (Table III).
+SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
+# A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
+NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
+# A plan whose legs reach on common stairs; it need be neither optimal nor balanced.
+PLAN = {
+    "hip_height": 0.66,
+    "zmp_start": 0.18,
+    "zmp_end": 0.05,
+    "end_rate": 2.0,
+    "torso_pitch": 1.35,
+    "foot_pitch": 0.0,
+    "sole_angle": np.pi / 6,
+    "toe_angle": np.pi / 6,
+    "catch_angle": 0.01,
+    **dict(zip(("t1", "t2", "t_bc", "t3"), PAPER_TIMES, strict=True)),
+}
+HIP_BEHIND = 0.08  # the hip starts so far behind the middle of the rear tread [m]
+REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stretched leg
+FINE_INTERVALS = 1000  # of a gait that is played
+
+PARAMETERS = (
+    *STAIR_PARAMETERS,
+    *parameters(
+        ("step_time_s", "s", 3.5, "t3, time of the step", 0.1, inf),
+        ("torque_weight", "1/(N m)^2/s", 0.01, "cost of squared torque", 0.0, inf),
+        ("acceleration_weight", "s^3/rad^2", 1e-3, "cost of squared link acceleration", 0.0, inf),
+        ("friction", "1", 0.6, "mu below the rear foot", 0.0, inf),
+        ("stance_friction", "1", 10.0, "mu below the stance foot; the default does not bind", 0.0, inf),
+        LEAST_STANCE_FORCE,
+        ("zmp_margin_m", "m", 0.0, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
+        ("clearance_m", "m", -0.002, "least height of foot points above the smoothed stair", -inf, inf),
+    ),
+)
+
+
+@maker()
+def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
+    """Trajectory optimisation of one step.
+
+    States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
+    accelerations and the ground's forces on sole and toe of the rear foot.
+
+    Args:
+        intervals: equal parts of the step.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
+    """
+    if intervals < 10:
+        raise InputError(f"intervals must be a whole number >= 10, got {intervals!r}")
+    sole_off, toe_off = round(SOLE_SHARE * intervals), round(TOE_SHARE * intervals)
+    layout = _layout(intervals, sole_off, toe_off)
+    model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off)
+
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return _start(layout, intervals, parameters, rng)
+
+    def motion(at: NumericPoint) -> Signals:
+        values = layout.values(at.x.full().ravel())
+        step_time = float(at["step_time_s"])
+        loads = model.loads_at(values)
+
+        def held(columns: Array) -> Array:
+            """What holds during an interval, at its first instant; the last instant repeats the last interval."""
+            return np.concatenate([columns, columns[:, -1:]], axis=1).T
+
+        return Signals(
+            joints=JOINTS,
+            arrays={
+                "t": np.linspace(0.0, step_time, intervals + 1),
+                **joint_signals(values["angle"].T, values["rate"].T, held(values["acceleration"])),
+                "tau": held(loads.torque),
+                "stance_force": held(loads.stance_force),
+                "zmp": held(loads.stance_pressure)[:, 0],
+            },
+            columns=COLUMNS,
+        )
+
+    def performance(at: NumericPoint) -> Performance:
+        values = layout.values(at.x.full().ravel())
+        step = float(at["step_time_s"]) / intervals
+        per_interval = math.ceil(FINE_INTERVALS / intervals)
+        since = np.tile(np.arange(per_interval) * step / per_interval, intervals)
+        # The last instant ends the last interval.
+        which = np.append(np.repeat(np.arange(intervals), per_interval), intervals - 1)
+        since = np.append(since, step)[:, None]
+        q, qd, qdd = (values[name].T[which] for name in ("angle", "rate", "acceleration"))
+
+        def borne(name: str) -> Array:
+            force = np.zeros((intervals, 2))
+            force[: values[name].shape[1]] = values[name].T
+            return force[which]
+
+        return standing(
+            which * step + since[:, 0],
+            q + qd * since + qdd * since**2 / 2,
+            qd + qdd * since,
+            qdd,
+            borne("toe_force"),
+            borne("sole_force"),
+            toe_off * step,
+        )
+
+    return GaitProblem(
+        name="stairs-ideal",
+        title="Stairs, full trajectory optimisation: least effort",
+        variables=layout.variables,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="effort", unit="1"),
+        assemble=model.assemble,
+        grid=Grid(intervals=intervals),
+        motion=motion,
+        skeleton=skeleton,
+        playback=playback(performance, repeats=True),
+        start=start,
+        starts=3,
+        searchable=False,
+    )
+
+
+def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
+    """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
+    angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
+    rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
+    accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
+    table = (
+        ("angle", "rad", MOVING, intervals + 1, angles, "absolute angle of link"),
+        ("rate", "rad/s", MOVING, intervals + 1, rates, "rate of link"),
+        ("acceleration", "rad/s^2", MOVING, intervals, accelerations, "acceleration of link"),
+        ("toe_force", "N", AXES, toe_off, FORCE_LIMITS, "force of the ground on the rear toe along"),
+        ("sole_force", "N", AXES, sole_off, FORCE_LIMITS, "force of the ground on the rear sole along"),
+    )
+    return Layout(
+        blocks=tuple(
+            Block(quantity=quantity, unit=unit, rows=rows, columns=columns, limits=limits, description=description)
+            for quantity, unit, rows, columns, limits, description in table
+        )
+    )
+
+
+def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Planned angles with noise, rates and accelerations by differences, a share of the weight behind."""
+    tread = values["stair_length_m"] / 2
+    angle = _planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
+    angle += NOISE * rng.standard_normal(angle.shape)
+    step = values["step_time_s"] / intervals
+    rate = np.gradient(angle, step, axis=1)
+    blocks = {block.quantity: block for block in layout.blocks}
+    return layout.join(
+        {
+            "angle": angle,
+            "rate": rate,
+            "acceleration": np.diff(rate, axis=1) / step,
+            "toe_force": np.tile([[0.0], [TOE_LOAD]], blocks["toe_force"].columns),
+            "sole_force": np.tile([[0.0], [SOLE_LOAD]], blocks["sole_force"].columns),
+        }
+    )
+
+
+def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
+    """(7, intervals + 1) link angles of a plausible step at equidistant times [rad].
+
+    Args:
+        tread: of one step [m].
+        rise: of one step [m].
+        intervals: equal parts of the step.
+    """
+    ends = np.array([0.0, *PAPER_TIMES])
+    times = np.linspace(0.0, ends[-1], intervals + 1)
+    fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
+    return np.array(_angles().map(intervals + 1)(np.tile([[tread], [rise]], intervals + 1), fractions))
+
+
+@cache
+def _angles() -> ca.Function:
+    """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
+    size, s = SX.sym("size", 2), SX.sym("s", 4)
+    plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
+    found = posture(
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
+    )
+    return ca.Function("angles", [size, s], [found.q.position])

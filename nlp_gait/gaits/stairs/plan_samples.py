@@ -1,0 +1,211 @@
+"""A planned step, sampled phase by phase: posture, torques, ground force and clearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.formulation import Array, Point
+from nlp_gait.gaits.stairs.formulas.gait import PHASES, Stair, StairPlan, stair_height
+from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
+from nlp_gait.gaits.stairs.formulas.planar_biped import points
+from nlp_gait.gaits.stairs.formulas.posture import Posture, posture
+from nlp_gait.gaits.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, stair_of
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+
+EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
+# The swing foot is checked against the stair this often per interval, and not while the toe leaves or meets the ground.
+CLEARANCE_DENSITY = 4
+GROUND_SHARE = 0.1
+
+
+class PlanSamples(NamedTuple):
+    """A step at its samples; columns are samples, both ends of each phase included.
+
+    Attributes:
+        time: (1, m) [s].
+        q: (7, m) link angles in the order of MOVING [rad], qd and qdd their derivatives.
+        qd: (7, m) [rad/s].
+        qdd: (7, m) [rad/s^2].
+        reach: (2, m) cosines of swing and stance knee.
+        torque: (7, m) of the joints [Nm], in the order of JOINTS.
+        power: (7, m) of the joints [W], signed.
+        stance_force: (2, m) of the ground on the stance foot [N].
+        stance_pressure: (1, m) its centre ahead of the stance ankle [m].
+        zmp: (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m].
+        hip: (2, m) [m].
+        ankle: (2, m) of the swing leg [m].
+    """
+
+    time: MX
+    q: MX
+    qd: MX
+    qdd: MX
+    reach: MX
+    torque: MX
+    power: MX
+    stance_force: MX
+    stance_pressure: MX
+    zmp: MX
+    hip: MX
+    ankle: MX
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedStep:
+    """Per-sample functions of a planned step and where they are evaluated.
+
+    Attributes:
+        per_phase: equal parts of each phase.
+    """
+
+    per_phase: int
+
+    @cached_property
+    def grid(self) -> tuple[Array, Array]:
+        """Fractions of the phases and the phase that passes, (4, m) each, at the samples."""
+        return phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
+
+    @cached_property
+    def clearance_grid(self) -> tuple[Array, Array]:
+        """The same where the swing foot is checked against the stair."""
+        fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
+        return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
+
+    def samples(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> PlanSamples:
+        """The step at all samples, or at those of another grid."""
+        s, passing = grid or self.grid
+        return PlanSamples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
+
+    def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> MX:
+        """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
+        return self._mapped(clearance_function(ops), point, *(grid or self.clearance_grid))
+
+    def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
+        """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
+        power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
+        total = MX(0)
+        for first in self._phase_starts:
+            durations = samples.time[first + self.per_phase] - samples.time[first]
+            ends = power[:, first] + power[:, first + self.per_phase]
+            inner = power[:, first : first + self.per_phase + 1]
+            total += durations / self.per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
+        return total
+
+    def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
+        """Joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum of time [s]."""
+        change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
+        columns = []
+        for k in range(change.shape[1]):
+            jump = k + 1 in self._phase_starts
+            columns.append(change[:, k] / (quantum if jump else samples.time[k + 1] - samples.time[k]))
+        return ca.vertcat(*columns)
+
+    @property
+    def _phase_starts(self) -> tuple[int, ...]:
+        """Number of the first sample of each phase."""
+        return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
+
+    def _mapped(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
+        stair = stair_of(point)
+        constants = (governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
+        columns = s.shape[1]
+        repeated = (ca.repmat(value, 1, columns) for value in constants)
+        return function.map(columns)(s if isinstance(s, MX) else DM(s), DM(passing), *repeated)
+
+
+def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
+    """The same grid as ``phase_grid`` gives, at fractions (1, k) of one phase alone."""
+    k = int(fractions.shape[1])
+    parts = [MX(DM.ones(1, k) * float(j < phase)) for j in range(len(PHASES))]
+    parts[phase] = fractions
+    return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
+
+
+def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
+    """Fractions s (4, m) of all phases, and the phase that passes as a column with a single one (4, m).
+
+    Args:
+        fractions: for each phase the fractions of it at which to sample.
+    """
+    s = [np.repeat([[float(j < i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
+    passing = [np.repeat([[float(j == i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
+    for i, part in enumerate(fractions):
+        s[i][i] = part
+    return np.hstack(s), np.hstack(passing)
+
+
+@cache
+def _dynamics() -> ca.Function:
+    """What ``loads`` finds, of (q, qd, qdd, force on the rear toe); alike in every interpretation."""
+    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
+    toe = SX.sym("toe", 2)
+    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    return ca.Function("loads", [q, qd, qdd, toe], list(found))
+
+
+def sample_function(ops: Nonsmooth) -> ca.Function:
+    """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``PlanSamples``.
+
+    The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
+    """
+    inputs, plan, stair, step = _planned(ops)
+    rear_share = SX.sym("rear_share")
+    s = inputs[0]
+    dynamics = _dynamics()
+    support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
+    share = rear_share * (1 - support**2 * (3 - 2 * support))
+    _, force, whole = dynamics(*step.q, SX(2, 1))
+    torque, stance_force, pressure = dynamics(*step.q, share * force)
+    slope = stair.rise / stair.tread
+    # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
+    zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
+    outputs = [
+        ca.dot(plan.durations, s),
+        *step.q,
+        step.reach,
+        torque,
+        torque * (DM(JOINT_RATES) @ step.q.velocity),
+        stance_force,
+        pressure,
+        zmp,
+        step.hip.position,
+        step.ankle.position,
+    ]
+    return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
+
+
+def clearance_function(ops: Nonsmooth) -> ca.Function:
+    """Heights (3,) of toe, sole and ankle above the stair, from the inputs of ``sample_function`` but the last."""
+    inputs, _, stair, step = _planned(ops)
+    found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
+    heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
+    return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
+
+
+def reach_function(per_phase: int) -> ca.Function:
+    """Cosines of both knees (2, m) at the samples of a step, from governing parameters, size and reach margin."""
+    inputs, _, _, step = _planned(Exact())
+    s, passing = PlannedStep(per_phase=per_phase).grid
+    one = ca.Function("reach", inputs, [ca.cse(step.reach)])
+    given = [SX.sym("given", size.shape) for size in inputs[2:]]
+    columns = s.shape[1]
+    return ca.Function(
+        "reach", given, [one.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in given))]
+    )
+
+
+def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+    s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
+    size, margin = SX.sym("size", 2), SX.sym("margin")
+    plan, stair = stair_plan(values), Stair(size[0], size[1])
+    rates = passing / plan.durations
+    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
+    return [s, passing, values, size, margin], plan, stair, step

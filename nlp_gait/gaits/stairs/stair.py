@@ -1,0 +1,138 @@
+"""What the stair problems share: the stair as two parameters, gravity, limits of the links, rows of knees and stance foot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+import casadi as ca
+from casadi import MX
+
+from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, in_space, parameters
+from nlp_gait.formulation.blocks import labels
+from nlp_gait.gaits.stairs.formulas.gait import Stair
+from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+
+GRAVITY = 9.81  # [m/s^2]
+PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
+SETBACK = 0.06  # an edge lies so far behind the ankle that stands on the step [m]
+
+# Stairs of Table IV by case: double tread ("stair length") [m], rise over run.
+CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
+
+# Absolute link angles [rad]: leg and foot clockwise from the forward axis, torso counter-clockwise.
+ANGLE_LIMITS = {
+    "HK": (0.2, 2.4),
+    "KA": (0.3, 3.2),
+    "HK'": (0.3, 2.4),
+    "K'A'": (0.8, 2.8),
+    "UH": (0.8, 1.75),
+    "AS": (-0.6, 1.2),
+    "ST": (-0.6, 1.2),
+}
+KNEE_LIMITS = (0.1, 2.5)  # [rad]
+KNEES = {"knee": ("HK", "KA"), "knee'": ("HK'", "K'A'")}
+
+# Time histories of the stair problems; the plane is sagittal.
+COLUMNS = {
+    "link_q": Columns(unit="rad", labels=MOVING),
+    "link_qd": Columns(unit="rad/s", labels=MOVING),
+    "link_qdd": Columns(unit="rad/s^2", labels=MOVING),
+    "power": Columns(unit="W", labels=JOINTS),
+    "reach": Columns(unit="1", labels=("swing knee", "stance knee")),
+    "stance_force": in_space("N", "xz"),
+    "stance_pressure": in_space("m", "x"),
+    "zmp": in_space("m", "x"),
+    "hip": in_space("m", "xz"),
+    "ankle": in_space("m", "xz"),
+}
+
+
+STAIR_PARAMETERS = parameters(
+    ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
+    ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
+)
+# Row of a table of parameters.
+LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stance foot", 0.0, inf)
+
+
+def within(point: Point, variable: Variable) -> MX:
+    """Value of a variable for the mathematics, kept within its minimum and maximum, beyond which no bound may be set."""
+    return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
+
+
+def stair_of(point: Point) -> Stair[MX]:
+    """Tread and rise of one step from the problem's parameters."""
+    tread: MX = point["stair_length_m"] / 2
+    return Stair(tread, point["rise_run_ratio"] * tread)
+
+
+def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
+    """Histories of joints (columns as JOINTS) from those of links (columns as MOVING, m rows), with the latter beside.
+
+    A joint's angle is the difference of its links' absolute angles, see ``JOINT_RATES``.
+    """
+    links = {"q": q, "qd": qd, "qdd": qdd}
+    joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
+    return {**joints, **{f"link_{name}": value for name, value in links.items()}}
+
+
+def rows(
+    name: str,
+    value: MX,
+    of: Sequence[str],
+    unit: str,
+    scale: float,
+    *,
+    lower: MX | float | None = None,
+    upper: MX | float | None = None,
+    columns: Sequence[int] = (),
+) -> Constraint:
+    """Rows of a table (r, m), each of whose r quantities is bounded at each of m instants.
+
+    Args:
+        name: of the rows.
+        value: (r, m) [unit].
+        of: (r,) names of the quantities.
+        unit: of the values.
+        scale: of a violation, see ``Constraint``.
+        lower: bound, for all or for each.
+        upper: likewise.
+        columns: (m,) numbers of the instants; from zero if empty.
+    """
+    return Constraint(
+        name=name,
+        labels=labels(of, columns or range(value.shape[1])),
+        unit=unit,
+        scale=scale,
+        value=ca.vec(value),
+        lower=None if lower is None else MX(lower),
+        upper=None if upper is None else MX(upper),
+        over="instant",
+    )
+
+
+def knee_limits(name: str, q: MX) -> Constraint:
+    """Knees bent within their limits; q (7, m) are link angles [rad]."""
+    knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
+    return rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
+
+
+def grip(name: str, force: MX, friction: MX) -> Constraint:
+    """|F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
+    limit = friction * force[1, :]
+    both = ca.vertcat(limit - force[0, :], limit + force[0, :])
+    return rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
+
+
+def stance_load(point: Point, force: MX) -> Constraint:
+    """The ground carries the stance foot with a force (2, m) [N] at least as large as the parameter says."""
+    return rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
+
+
+def stance_zmp(point: Point, pressure: MX) -> Constraint:
+    """The centre of pressure (1, m) [m] lies within the stance foot, by the margin that the parameter says."""
+    margin = point["zmp_margin_m"]
+    front = toe_foot_biped().foot_m - margin
+    return rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)

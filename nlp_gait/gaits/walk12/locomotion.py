@@ -1,0 +1,141 @@
+"""Walking on: steps of the 12-joint biped one after the other, stance and swing exchanged, straight or in a circle.
+
+The left leg (theta 1 to 6, ankle to hip) stands first. Every second step is the mirror image of the first: the legs change
+roles, roll angles and the side of all positions change sign. On a circle the swing leg is yawed by K at its hip, theta 9 in
+odd steps and theta 4 in even ones, and the robot heads by K further to the left after each step.
+
+Source:
+    Goswami, Vadakkepat, Phung (2008), sections 4 and 5.4.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.formulation import Array, Columns, Signals, in_space
+from nlp_gait.gaits.walk12.model import Zmp, legs, mass_motion, masses, zero_moment_point
+from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.symbolic.nonsmooth import Exact
+
+JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
+# Columns of a leg's joints in the order of ``LegMotion.joints``: ankle roll, ankle pitch, knee, hip pitch, hip roll.
+COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
+YAW_COLUMN = {"left": 3, "right": 8}
+COLUMNS_OF = {
+    **{name: in_space("m", "xy") for name in ("zmp", "zmp_foot")},
+    **{name: in_space("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
+    "left_stance": Columns(unit="1"),
+}
+MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
+
+
+def locomotion(
+    robot: PointMassBiped,
+    x: Array,
+    *,
+    step_time_s: float = 1.0,
+    turn_rad: float = 0.0,
+    reach_margin_rad: float = 0.05,
+    steps: int = 2,
+    intervals: int = 20,
+    zmp: Zmp = "exact",
+) -> Signals:
+    """Time histories over some steps.
+
+    Where two steps meet, the sample belongs to the earlier one. The printed trajectories leave jumps there: in the hip's
+    lateral velocity (by n pi / T), and with a turn in theta 4 and theta 9, which the paper takes as constant over a step.
+
+    Args:
+        robot: lengths and masses.
+        x: (4,) variables of the problem [m].
+        step_time_s: T.
+        turn_rad: K.
+        reach_margin_rad: kappa; matters only where a leg is out of reach.
+        steps: number of steps.
+        intervals: of each step.
+        zmp: reading of the zero-moment point.
+
+    Returns:
+        t [s]; q, qd, qdd (columns theta_1 to theta_12); zmp, waist (between the hips), com, left_ankle and right_ankle in the
+        world, whose origin is the first stance ankle [m]; zmp_foot, the ZMP relative to the stance ankle in the foot's
+        axes [m]; left_stance, 1 where the left leg stands.
+    """
+    sample = _sample_function(robot, zmp).map(intervals + 1)
+    phases = np.linspace(0.0, 1.0, intervals + 1)
+    ankle, heading = np.zeros(3), 0.0
+    parts: list[dict[str, Array]] = []
+    for step in range(steps):
+        side = 1.0 if step % 2 == 0 else -1.0
+        settings = (step_time_s, side * turn_rad, 1 - np.cos(reach_margin_rad))
+        columns = (ca.repmat(ca.DM(value), 1, intervals + 1) for value in (x, *settings))
+        local = dict(
+            zip(sample.name_out(), (np.array(v.full().T) for v in sample(*columns, phases[None, :])), strict=True)
+        )
+        part = _joints(local, side, turn_rad)
+        part |= _positions(local, side, ankle, heading)
+        part |= {"t": (step + phases) * step_time_s, "left_stance": np.full(intervals + 1, 0.5 + 0.5 * side)}
+        first = 0 if step == 0 else 1
+        parts.append({name: array[first:] for name, array in part.items()})
+        ankle, heading = part["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
+    arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
+
+
+def _joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:
+    """q, qd, qdd (N + 1, 12) of a step; side is 1 if the left leg stands, else -1."""
+    stance, swing = ("left", "right") if side > 0 else ("right", "left")
+    signs = np.ones(5) if side > 0 else MIRRORED_ROLLS
+    joints: dict[str, Array] = {}
+    for name in ("q", "qd", "qdd"):
+        table = np.zeros((len(local[f"stance_{name}"]), len(JOINTS)))
+        table[:, COLUMNS[stance]] = local[f"stance_{name}"] * signs
+        table[:, COLUMNS[swing]] = local[f"swing_{name}"] * signs
+        joints[name] = table
+    joints["q"][:, YAW_COLUMN[swing]] = turn
+    return joints
+
+
+def _positions(local: dict[str, Array], side: float, ankle: Array, heading: float) -> dict[str, Array]:
+    """Points of a step in the world, from its stance ankle (3,) and heading."""
+    mirror = np.array([1.0, side, 1.0])
+    rotation = np.array(
+        [[np.cos(heading), -np.sin(heading), 0.0], [np.sin(heading), np.cos(heading), 0.0], [0.0, 0.0, 1.0]]
+    )
+    zmp_foot = local["zmp"] * mirror[:2]
+    on_ground = np.column_stack([zmp_foot, np.zeros(len(zmp_foot))])
+    swing = ankle + (local["swing_ankle"] * mirror) @ rotation.T
+    stance = np.tile(ankle, (len(zmp_foot), 1))
+    left, right = (stance, swing) if side > 0 else (swing, stance)
+    return {
+        "zmp": (ankle + on_ground @ rotation.T)[:, :2],
+        "zmp_foot": zmp_foot,
+        "waist": ankle + (local["waist"] * mirror) @ rotation.T,
+        "com": ankle + (local["com"] * mirror) @ rotation.T,
+        "left_ankle": left,
+        "right_ankle": right,
+    }
+
+
+@cache
+def _sample_function(robot: PointMassBiped, reading: Zmp) -> ca.Function:
+    """One sample of a step with the left leg standing: (x, T, K, reach margin of a cosine, phase) to its quantities."""
+    x = SX.sym("x", 4)
+    T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
+    stance, swing = legs(x, phase, T, turn, margin, robot, Exact())
+    m = masses(robot)
+    outputs = {
+        **dict(zip(("stance_q", "stance_qd", "stance_qdd"), stance.joints, strict=True)),
+        **dict(zip(("swing_q", "swing_qd", "swing_qdd"), swing.joints, strict=True)),
+        "zmp": zero_moment_point(stance, swing, robot, reading),
+        "com": mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
+        "waist": (stance.hip.position + swing.hip.position) / 2,
+        "swing_ankle": swing.ankle.position,
+    }
+    inputs = [x, T, turn, margin, phase]
+    return ca.Function(
+        "step", inputs, ca.cse(list(outputs.values())), ["x", "T", "K", "margin", "phase"], list(outputs)
+    )

@@ -1,0 +1,191 @@
+"""Motion of the 12-joint walk over one step, and its zero-moment point.
+
+The stance ankle is the origin, x forward, y to the left, z up; the swing leg is the right one, at y = -w. The step begins and
+ends in double support, with the swing foot half a step behind and then half a step ahead.
+
+Source:
+    Goswami, Vadakkepat, Phung (2008), sections 3, 4 and 6 and the appendix.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple, TypeAlias
+
+import casadi as ca
+from casadi import DM, SX
+
+from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.symbolic.balance import zmp_of_point_masses
+from nlp_gait.symbolic.inverse_kinematics import knee_cosine, leg_angles
+from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, constant, stack, through
+
+GRAVITY = 9.81  # [m/s^2]
+
+# How the ZMP is read: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
+# corrected or (A1) as printed; or the point about which the moment of gravity and inertia vanishes.
+Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
+
+
+class LegMotion(NamedTuple):
+    """One leg.
+
+    Attributes:
+        ankle: (3,) [m].
+        hip: (3,) [m].
+        joints: (5,) ankle roll, ankle pitch, knee, hip pitch, hip roll in the paper's signs [rad]: theta 1, 2, 3, 5, 6 of
+            the stance leg and 12, 11, 10, 8, 7 of the swing leg.
+        heading: (3, 3) rotation of the leg's axes, about z.
+    """
+
+    ankle: Motion
+    hip: Motion
+    joints: Motion
+    heading: SX
+
+
+# From a leg and heights (1, k) above the ankle to (3, k) points of the shank, relative to the ankle and in the leg's axes [m].
+Shank: TypeAlias = Callable[[LegMotion, DM], Motion]
+
+
+def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
+    """Positions (3,) of the swing ankle P12 and of the stance hip P6 over the first step [m].
+
+    Args:
+        x: (4,) step length s, frontal shift n, foot lift H, bending height h [m].
+        time: t in [0, T] [s].
+        step_time: T [s].
+        robot: lengths.
+
+    Source:
+        Eqs. (4), (6).
+    """
+    s, n, lift, bend = ca.vertsplit(x)
+
+    def swing_ankle(t: SX) -> SX:
+        share = ca.sin(math.pi / step_time * (t - step_time / 2)) / 2  # P12x / s
+        return ca.vertcat(s * share, -robot.hip_distance_m, lift * ca.sin(math.pi * (share + 0.5)))  # (eq. 4)
+
+    def stance_hip(t: SX) -> SX:
+        forward = s / 4 * ca.sin(math.pi / step_time * (t - step_time / 2))
+        swell = ca.sin(math.pi / 2 * (ca.sin(t * math.pi / (2 * step_time)) + 1))
+        return ca.vertcat(forward, n * swell * ca.sin(math.pi * t / step_time), robot.leg_m - bend)  # (eq. 6)
+
+    return through(swing_ankle, time), through(stance_hip, time)
+
+
+def legs(
+    x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
+) -> tuple[LegMotion, LegMotion]:
+    """Stance leg and swing leg.
+
+    Args:
+        x: (4,) variables [m].
+        phase: t / T.
+        step_time: T [s].
+        turn: K, yaw of the swing leg at its hip [rad], positive to the left.
+        margin: of the reach, see ``Nonsmooth.acos``.
+        robot: lengths.
+        ops: interpretation of acos.
+    """
+    swing_ankle, hip = ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
+    stance_ankle = stack(constant(0.0), constant(0.0), constant(0.0))
+    swing_hip = hip._replace(position=hip.position + _across(robot))
+    stance = _leg(stance_ankle, hip, margin, robot, ops)
+    return stance, _turned(_leg(swing_ankle, swing_hip, margin, robot, ops), turn)
+
+
+def reaches(x: SX, phase: SX, robot: PointMassBiped) -> SX:
+    """(2,) cosines of the stance and the swing knee, without the angles: cheap rows for a constraint."""
+    ankle, hip = ankle_and_hip(x, Motion(phase, SX(1), SX(0)), SX(1), robot)
+    swing = ankle.position - hip.position - _across(robot)
+    return ca.vertcat(*(knee_cosine(ca.sumsqr(v), robot.thigh_m, robot.shank_m) for v in (hip.position, swing)))
+
+
+def masses(robot: PointMassBiped) -> DM:
+    """(7,) masses [kg]: stance foot, stance knee, stance hip, waist, swing hip, swing knee, swing foot."""
+    foot, knee, hip = robot.foot_mass_kg, robot.knee_mass_kg, robot.hip_mass_kg
+    return DM([foot, knee, hip, robot.waist_mass_kg, hip, knee, foot])
+
+
+def mass_motion(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, shank: Shank | None = None) -> Motion:
+    """(3, 7) motion of the masses [m], in the order of ``masses``; by exact forward kinematics unless told otherwise."""
+    heights = DM([robot.foot_com_height_m, robot.shank_m]).T
+    near, far = (_from_ankle(leg, (shank or exact_shank)(leg, heights)) for leg in (stance, swing))
+    orders = zip(near, stance.hip, swing.hip, far, strict=True)
+    return Motion(*(ca.horzcat(a, p6, (p6 + other) / 2, other, b[:, 1], b[:, 0]) for a, p6, other, b in orders))
+
+
+def exact_shank(leg: LegMotion, heights: DM) -> Motion:
+    """Points of the shank by forward kinematics; see ``Shank``."""
+
+    def points(angles: SX) -> SX:
+        roll, pitch = angles[0], angles[1]
+        return ca.vertcat(ca.sin(pitch), ca.cos(pitch) * ca.sin(roll), ca.cos(pitch) * ca.cos(roll)) @ heights
+
+    return through(points, _ankle_angles(leg))
+
+
+def appendix_shank(leg: LegMotion, heights: DM) -> Motion:
+    """Points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
+    upward = Motion(*(hip - ankle for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
+    lean = through(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
+
+    def points(angles: SX) -> SX:
+        roll, pitch, bend = angles[0], angles[1], angles[1] - angles[2]  # bend = pi/2 - theta_B
+        forward, side = ca.sin(bend) * ca.cos(roll), ca.cos(bend) * ca.sin(roll)
+        return ca.vertcat(forward, side, ca.cos(roll) * ca.cos(pitch)) @ heights  # (eqs. A3-A6)
+
+    return through(points, stack(_ankle_angles(leg), lean))
+
+
+def zero_moment_point(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:
+    """(2,) zero-moment point relative to the stance ankle, on the height of that ankle [m].
+
+    Source:
+        Eqs. (12)-(14), (A1)-(A6). As printed, (A1) sums the swing leg with the angles of the stance leg, from x_r.
+    """
+    m = masses(robot)
+    motion = mass_motion(stance, swing, robot, appendix_shank if reading.startswith("appendix") else exact_shank)
+    static_load = reading != "moment-free"
+    point = zmp_of_point_masses(m, motion.position, motion.acceleration, GRAVITY, static_load=static_load)
+    if reading != "appendix-as-printed":
+        return point
+    foot, knee, *hips_and_waist = ca.horzsplit(motion.position[:2, :])[:5]
+    x_r = swing.ankle.position[0] - swing.hip.position[0]
+    swing_knee, swing_foot = (ca.vertcat(x_r + p[0], -robot.hip_distance_m - p[1]) for p in (knee, foot))
+    printed = ca.horzcat(foot, knee, *hips_and_waist, swing_knee, swing_foot)  # (eq. A1)
+    return point + (printed - motion.position[:2, :]) @ m / float(ca.sum1(m))
+
+
+def _across(robot: PointMassBiped) -> DM:
+    return DM([0.0, -robot.hip_distance_m, 0.0])
+
+
+def _leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> LegMotion:
+    """Joint angles (2), (3) from the closed form that NAO's legs have too; unlike (2), it holds for a folded knee."""
+    hip_to_ankle = Motion(*(to - origin for to, origin in zip(ankle, hip, strict=True)))
+    angles = leg_angles(hip_to_ankle, robot.thigh_m, robot.shank_m, margin, ops).joints
+    # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
+    signs = DM([1, -1, 1, -1, 1])
+    return LegMotion(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
+
+
+def _turned(leg: LegMotion, turn: SX) -> LegMotion:
+    """The leg yawed at its hip."""
+    heading = axis_rotation((0.0, 0.0, 1.0), turn)
+    ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
+    return leg._replace(ankle=ankle, heading=heading)
+
+
+def _from_ankle(leg: LegMotion, points: Motion) -> Motion:
+    pairs = zip(leg.ankle, points, strict=True)
+    return Motion(*(ca.repmat(ankle, 1, 2) + leg.heading @ offsets for ankle, offsets in pairs))
+
+
+def _ankle_angles(leg: LegMotion) -> Motion:
+    """(2,) roll and pitch."""
+    return Motion(*(part[:2] for part in leg.joints))

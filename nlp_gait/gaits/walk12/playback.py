@@ -1,0 +1,161 @@
+"""The 12-joint biped as rigid bodies that an engine can take, and its steps in their terms.
+
+Point masses on links without mass are not a body: a joint between two such links has nothing to turn. What is built keeps every
+mass where the model has it, as a small sphere, and spreads it over the links that meet there. Only the foot's mass cannot wholly
+ride on the shank: a share of it is the sole's and the ankle's, at the same height above the ankle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.formulation import Array, NumericPoint, Playback, Signals
+from nlp_gait.formulation.motion.playback import PLAYED
+from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
+from nlp_gait.gaits.walk12.model import GRAVITY, Zmp
+from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.robots import Foot, Joint, Link, Robot
+from nlp_gait.robots.robot import Vector
+from nlp_gait.robots.tree import inertia_moments, point_inertia, tree_from
+from nlp_gait.symbolic.dynamics import newton_euler
+
+SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
+SOLE_SHARE = 0.1  # of the foot's mass that is the sole's; as much is the ankle's
+# The paper says nothing of its servos. The largest torque of each is the robot's weight at a lever as long as what the joint
+# moves: leg, shank, front of the foot. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
+RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
+RATE_LIMIT = 100.0  # [rad/s], likewise; nothing reads it
+FINE_INTERVALS = 1000  # of a step
+BEARINGS = {  # joint by side with its axis: hip yaw, roll, pitch, knee, ankle pitch, ankle roll; pitches lean back (eqs. 2, 3)
+    "left": ("theta_4", "theta_6", "theta_5", "theta_3", "theta_2", "theta_1"),
+    "right": ("theta_9", "theta_7", "theta_8", "theta_10", "theta_11", "theta_12"),
+}
+AXES: tuple[Vector, ...] = ((0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1, 0), (1, 0, 0))
+PARTS = ("yaw", "roll", "thigh", "shank", "ankle", "foot")  # links behind these joints
+
+
+def playback(robot: PointMassBiped, zmp: Zmp) -> Playback:
+    """How steps of the biped are played."""
+    bodies = rigid_bodies(robot)
+
+    def motion(at: NumericPoint, steps: int) -> Signals:
+        walked = locomotion(
+            robot,
+            at.x.full().ravel(),
+            step_time_s=float(at["step_time_s"]),
+            turn_rad=float(at["turn_rad"]),
+            reach_margin_rad=float(at["reach_margin_rad"]),
+            steps=steps,
+            intervals=FINE_INTERVALS,
+            zmp=zmp,
+        ).arrays
+        left = walked["left_stance"] > 0.5
+        heading = np.concatenate([[0], np.cumsum(np.diff(left) != 0)]) * float(at["turn_rad"])
+        still = np.zeros_like(heading)
+        arrays = {
+            **{name: walked[name] for name in ("t", "q", "qd", "qdd", "zmp")},
+            "tau": _torques(bodies, walked, left),
+            "hip": walked["waist"],
+            "attitude": np.column_stack([np.cos(heading / 2), still, still, np.sin(heading / 2)]),
+            "left_foot": walked["left_ankle"],
+            "right_foot": walked["right_ankle"],
+        }
+        return Signals(joints=JOINTS, arrays=arrays, columns=PLAYED)
+
+    return Playback(robot=bodies, gravity=GRAVITY, repeats=True, motion=motion)
+
+
+@cache
+def rigid_bodies(robot: PointMassBiped) -> Robot:
+    """Links with small spheres as masses; the root is the waist, between the hips, and the ankles lie on the ground."""
+    thigh_end, shank_end = -robot.thigh_m, -robot.shank_m
+    hip, knee, foot = robot.hip_mass_kg, robot.knee_mass_kg, robot.foot_mass_kg
+    up = robot.foot_com_height_m
+    across = robot.hip_distance_m / 2
+    weight = GRAVITY * (2 * (knee + foot + hip) + robot.waist_mass_kg)
+    levers = (robot.leg_m,) * 3 + (robot.shank_m,) + (robot.foot_front_m,) * 2
+    # By link: masses with their places in its axes; the three links that meet at a hip share its mass, two a knee's.
+    contents: dict[str, list[tuple[float, Vector]]] = {
+        "waist": [(robot.waist_mass_kg, (0, 0, 0)), (hip / 3, (0, across, 0)), (hip / 3, (0, -across, 0))]
+    }
+    joints, feet = {}, {}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        leg: tuple[Sequence[tuple[float, Vector]], ...] = (
+            [(hip / 3, (0, 0, 0))],
+            [(hip / 3, (0, 0, 0))],
+            [(knee / 2, (0, 0, thigh_end))],
+            [(knee / 2, (0, 0, 0)), ((1 - 2 * SOLE_SHARE) * foot, (0, 0, shank_end + up))],
+            [(SOLE_SHARE * foot, (0, 0, up))],
+            [(SOLE_SHARE * foot, (0, 0, up))],
+        )
+        origins: tuple[Vector, ...] = (
+            (0, sign * across, 0),
+            (0, 0, 0),
+            (0, 0, 0),
+            (0, 0, thigh_end),
+            (0, 0, shank_end),
+            (0, 0, 0),
+        )
+        names = [f"{side} {part}" for part in PARTS]
+        contents |= {name: list(held) for name, held in zip(names, leg, strict=True)}
+        for i, name in enumerate(BEARINGS[side]):
+            joints[name] = Joint(
+                name=name,
+                parent=names[i - 1] if i else "waist",
+                child=names[i],
+                origin_m=origins[i],
+                axis=AXES[i],
+                limits_rad=RANGE,
+                planning_limits_rad=RANGE,
+                velocity_limit_rad_s=RATE_LIMIT,
+                torque_limit_Nm=weight * levers[i],
+            )
+        feet[side] = Foot(
+            link=f"{side} foot",
+            ankle_height_m=0.0,
+            front_m=robot.foot_front_m,
+            back_m=robot.foot_back_m,
+            left_m=robot.foot_width_m / 2,
+            right_m=robot.foot_width_m / 2,
+        )
+    return Robot(
+        name=robot.name,
+        description=robot.description,
+        sources={"masses and lengths": robot.source},
+        root="waist",
+        links={name: _link(name, held) for name, held in contents.items()},
+        joints={name: joints[name] for name in JOINTS},
+        feet=feet,
+    )
+
+
+def _link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
+    """Link of small spheres."""
+    masses, places = np.array([mass for mass, _ in held]), np.array([place for _, place in held], dtype=float)
+    total = float(masses.sum())
+    com = masses @ places / total
+    tensor = 0.4 * total * SPHERE_RADIUS**2 * np.eye(3)
+    for mass, place in zip(masses.tolist(), places, strict=True):
+        tensor += point_inertia(mass, place - com)
+    x, y, z = com.tolist()
+    return Link(name=name, mass_kg=total, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(tensor))
+
+
+def _torques(bodies: Robot, walked: Mapping[str, Array], left: np.ndarray) -> Array:
+    """(T, 12) torques of the joints with the stance foot still and nothing below the other [Nm]."""
+    given = [walked[name].T for name in ("q", "qd", "qdd")]
+    by_side = [np.array(_inverse_dynamics(bodies, side).map(len(left))(*given)).T for side in ("left", "right")]
+    return np.where(left[:, None], *by_side)
+
+
+@cache
+def _inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
+    motion = [SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd")]
+    q, qd, qdd = (dict(zip(JOINTS, ca.vertsplit(part), strict=True)) for part in motion)
+    torques, _ = newton_euler(tree_from(bodies, bodies.feet[side].link), q, qd, qdd, GRAVITY)
+    return ca.Function("torques", motion, [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS)))])

@@ -1,0 +1,207 @@
+"""The 12-joint walk: stability margin against step length (Goswami, Vadakkepat, Phung 2008, section 5)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from casadi import DM, MX, SX
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import (
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Grid,
+    NumericPoint,
+    Objective,
+    Point,
+    Signals,
+    Stretch,
+    Variable,
+    maker,
+    parameters,
+)
+from nlp_gait.gaits.walk12.locomotion import locomotion
+from nlp_gait.gaits.walk12.model import Zmp, legs, reaches, zero_moment_point
+from nlp_gait.gaits.walk12.playback import playback
+from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped
+from nlp_gait.gaits.walk12.skeleton import skeleton
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+Horizon = Literal["step", "1s"]
+
+F1MAX = 442.522  # the paper's largest f1, section 7 [1/(m^2 s)]
+F2MAX = 0.13  # [m]
+LARGEST_TURN = math.radians(8.0)  # section 5.4
+
+VARIABLES = (  # (eq. 7)
+    Variable(name="step_length_m", unit="m", lower=0.05, upper=0.13, description="s, path of the swing foot"),
+    Variable(name="frontal_shift_m", unit="m", lower=0.001, upper=0.13, description="n, sideways motion of the hip"),
+    Variable(name="foot_lift_m", unit="m", lower=0.001, upper=0.13, description="H, greatest height of the swing foot"),
+    Variable(name="bending_height_m", unit="m", lower=0.001, upper=0.13, description="h, hip below a stretched leg"),
+)
+
+PARAMETERS = parameters(
+    ("lambda", "1", 0.15, "weight of stability against step length (eq. 11)", 0.0, 1.0),
+    ("step_time_s", "s", 1.0, "T, time of one step", 0.01, math.inf),
+    ("f1max", "1/(m^2 s)", F1MAX, "f1 that counts as 1 (eq. 11)", 1e-6, math.inf),
+    ("f2max_m", "m", F2MAX, "step length that counts as 1", 1e-6, math.inf),
+    ("reach_margin_rad", "rad", 0.05, "kappa, least angle of a knee", 0.0, 1.0),
+    (
+        "turn_rad",
+        "rad",
+        0.0,
+        "K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging",
+        0.0,
+        LARGEST_TURN,
+    ),
+)
+
+
+@maker()
+def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
+    """Gait of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
+
+    Args:
+        intervals: of Simpson's rule over a step; even.
+        horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
+        zmp: reading of the zero-moment point, see ``model.Zmp``.
+
+    Raises:
+        InputError: an option that is not allowed.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), section 5.
+    """
+    if intervals < 2 or intervals % 2:
+        raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
+    robot = point_mass_biped()
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)
+
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        zmp_at = _sampled(_zmp_function(robot, ops, zmp), point, phases)
+        Q = point["step_time_s"] * ca.sum1(ca.sum2(zmp_at**2)) / phases.shape[1]
+        indexes = {"Q_m2s": Q} if horizon == "step" else {}
+        return Assembly(
+            objective=MX(0), constraints=(_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
+        )
+
+    def motion(at: NumericPoint) -> Signals:
+        return locomotion(
+            robot,
+            at.x.full().ravel(),
+            step_time_s=float(at["step_time_s"]),
+            turn_rad=float(at["turn_rad"]),
+            reach_margin_rad=float(at["reach_margin_rad"]),
+            intervals=intervals,
+            zmp=zmp,
+        )
+
+    return GaitProblem(
+        name="walk12",
+        title="12-joint walk: stability margin against step length",
+        variables=VARIABLES,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="f", unit="1", sense="maximise"),
+        assemble=assemble,
+        grid=Grid(intervals=intervals, refined_by="intervals"),
+        motion=motion,
+        skeleton=skeleton(robot),
+        playback=playback(robot, zmp),
+        stretches=(
+            Stretch(
+                assemble=at_phases,
+                times=lambda values: (0.0, values["step_time_s"]),
+                means=("Q_m2s",) if horizon == "step" else (),
+            ),
+        ),
+        hessian="limited-memory",  # from 640 random starts all converge; of those with the exact one, 5 fail
+    )
+
+
+def simpson_weights(intervals: int) -> DM:
+    """(N + 1, 1) weights of Simpson's rule on [0, 1] with N intervals, N even."""
+    weights = np.full(intervals + 1, 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return DM(weights / (3 * intervals))
+
+
+def _assemble(point: Point, zmp_at: ca.Function, robot: PointMassBiped, intervals: int, horizon: Horizon) -> Assembly:
+    T, s = point["step_time_s"], point["step_length_m"]
+    phases = DM(np.linspace(0.0, 1.0, intervals + 1)).T
+    weights = simpson_weights(intervals)
+    zmp = _sampled(zmp_at, point, phases)
+    Q = T * ca.sum1(zmp**2) @ weights  # (eq. 9)
+    if horizon == "1s":
+        steps = ca.floor(1 / T)
+        begun = 1 / T - steps  # share of the last step that falls within the second
+        Q = steps * Q + begun * T * ca.sum1(_sampled(zmp_at, point, begun * phases) ** 2) @ weights
+    f1 = 1 / Q  # (eq. 10)
+    f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
+    indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_stability(zmp, robot)}
+    return Assembly(objective=f, constraints=(_reach(point, robot, *_panels(intervals // 2)),), indexes=indexes)
+
+
+def _panels(intervals: int) -> tuple[DM, list[str]]:
+    """Phases (1, n) of the ends of Simpson's panels, with their names."""
+    n = intervals + 1
+    return DM(np.linspace(0.0, 1.0, n)).T, [f"{k / intervals:g} T" for k in range(n)]
+
+
+def _reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
+    """Knees bent by at least kappa, at the ends of Simpson's panels or other phases: near-straight legs make the ZMP spike."""
+    x, phase = SX.sym("x", len(VARIABLES)), SX.sym("phase")
+    cosines = ca.Function("reach", [x, phase], ca.cse([reaches(x, phase, robot)]))
+    n = len(names)
+    limit = ca.cos(point["reach_margin_rad"])
+    return Constraint(
+        name="reach",
+        labels=tuple(f"{leg} leg, {name}" for name in names for leg in ("stance", "swing")),
+        unit="1",
+        scale=1.0,
+        value=ca.vec(cosines.map(n)(ca.repmat(point.x, 1, n), phases)),
+        lower=-limit,
+        upper=limit,
+        over="instant",
+    )
+
+
+def _stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
+    """ZMP (2, N + 1) against the sole of the stance foot (eq. 8); the share is one of the step's time."""
+    x, y = zmp[0, :], zmp[1, :]
+    half = robot.foot_width_m / 2
+    margin = ca.fmin(ca.fmin(x + robot.foot_back_m, robot.foot_front_m - x), ca.fmin(y + half, half - y))
+    intervals = zmp.shape[1] - 1
+    trapezoid = np.full(intervals + 1, 1 / intervals)
+    trapezoid[[0, -1]] /= 2
+    return {
+        "stable_share": (margin >= 0) @ DM(trapezoid),
+        "zmp_margin_min_m": ca.mmin(margin),
+        "zmp_x_min_m": ca.mmin(x),
+        "zmp_x_max_m": ca.mmax(x),
+        "zmp_y_min_m": ca.mmin(y),
+        "zmp_y_max_m": ca.mmax(y),
+    }
+
+
+def _zmp_function(robot: PointMassBiped, ops: Nonsmooth, reading: Zmp) -> ca.Function:
+    """One sample: (x, T, K, reach margin of a cosine, phase) to the ZMP (2,) relative to the stance ankle [m]."""
+    x = SX.sym("x", len(VARIABLES))
+    T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
+    stance, swing = legs(x, phase, T, turn, margin, robot, ops)
+    point = zero_moment_point(stance, swing, robot, reading)
+    return ca.Function("zmp", [x, T, turn, margin, phase], ca.cse([point]))
+
+
+def _sampled(zmp_at: ca.Function, point: Point, phases: MX | DM) -> MX:
+    """(2, n) ZMP at phases (1, n); mapped, never unrolled."""
+    margin = 1 - ca.cos(point["reach_margin_rad"])
+    inputs = (point.x, point["step_time_s"], point["turn_rad"], margin)
+    n = phases.shape[1]
+    return zmp_at.map(n)(*(ca.repmat(value, 1, n) for value in inputs), phases)

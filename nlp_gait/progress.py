@@ -1,0 +1,12 @@
+"""How long work reports its progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+# Called with a short line about each step.
+Progress = Callable[[str], None]
+
+
+def ignore_progress(_: str) -> None:
+    """Ignore progress."""

@@ -1,0 +1,175 @@
+"""A function over boxes in affine arithmetic, outward rounded: a fixed library interprets its instructions, nothing is compiled.
+
+A value over a box is an affine form, the sum of a middle, a slope along every edge and an error, and a range; both hold. What
+values have in common is kept by the slopes, so bounds are far narrower than those of intervals (``native/affine.hpp``).
+
+Source:
+    Stolfi, de Figueiredo (1997), Self-Validated Numerical Methods and Applications, chapter 3; rounding errors are added to the
+    error explicitly, with the bounds of Rump (2010), Verification methods, section 2, and four units for functions of libm.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Collection
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
+from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array
+
+SYMBOLS = ("nlp_gait_affine", "nlp_gait_affine_doubles")
+_INTEGER, _LONG, _POINTER = ctypes.c_int, ctypes.c_longlong, ctypes.c_void_p
+
+# Operations that are enclosed; of the numbers that CasADi gives them, all are below 46.
+UNARY = tuple(
+    getattr(ca, f"OP_{name}")
+    for name in (
+        "ASSIGN NEG EXP LOG SQRT SQ TWICE SIN COS TAN ASIN ACOS ATAN NOT FLOOR CEIL FABS SIGN INV SINH COSH TANH".split()
+    )
+)
+BINARY = tuple(
+    getattr(ca, f"OP_{name}")
+    for name in "ADD SUB MUL DIV POW CONSTPOW LT LE EQ NE AND OR FMOD COPYSIGN IF_ELSE_ZERO FMIN FMAX ATAN2".split()
+)
+HALF_OPEN_LE, HALF_OPEN_LT = 200, 201
+
+
+class Forms(NamedTuple):
+    """Affine forms of M outputs over P boxes, along n symbols in [-1, 1].
+
+    Attributes:
+        middle: (P, M).
+        slopes: (P, M, n).
+        error: (P, M); infinite where there is no form.
+        lower: (P, M) of the range.
+        upper: (P, M).
+    """
+
+    middle: Array
+    slopes: Array
+    error: Array
+    lower: Array
+    upper: Array
+
+
+class AffineFunction:
+    """A CasADi function over boxes; safe to call from several threads at once.
+
+    Attributes:
+        inputs: number of its scalar inputs, all arguments one after the other.
+        outputs: likewise.
+    """
+
+    def __init__(self, function: ca.Function, half_open: Collection[int] = ()) -> None:
+        """Read the function's instructions.
+
+        Args:
+            function: with dense arguments and results; of MX expressions it is expanded.
+            half_open: scalar inputs whose boxes lie below their upper ends. Where a formula changes at such an end (a
+                spline's knot), a box has one formula on either side.
+
+        Raises:
+            InputError: an operation that cannot be enclosed.
+            CompilerError: there is no compiler, or it fails.
+        """
+        self._library = _library()
+        scalar = function if function.is_a("SXFunction") else function.expand()
+        starts = np.cumsum([0, *(scalar.numel_in(i) for i in range(scalar.n_in()))])
+        ends = np.cumsum([0, *(scalar.numel_out(i) for i in range(scalar.n_out()))])
+        self.inputs, self.outputs = int(starts[-1]), int(ends[-1])
+        self._code, self._constants = _instructions(scalar, starts.tolist(), ends.tolist(), frozenset(half_open))
+        self._slots = max(int(self._code[:, 1:].max(initial=0)), scalar.sz_w()) + 1
+
+    def __call__(self, boxes: Array, symbols: Array) -> Forms:
+        """Forms over boxes.
+
+        Args:
+            boxes: (P, inputs, 2) lower and upper ends.
+            symbols: (inputs,) number of the symbol along which an input varies, -1 for one that varies along none: then its
+                width is an error. Two inputs with one symbol vary together, each from its lower to its upper end.
+        """
+        boxes = np.require(boxes, dtype=np.float64, requirements=("C", "A"))
+        symbols = np.require(symbols, dtype=np.int32, requirements=("C", "A"))
+        if boxes.shape[1:] != (self.inputs, 2) or symbols.shape != (self.inputs,):
+            raise InputError(
+                f"boxes and symbols of {self.inputs} inputs expected, got {boxes.shape} and {symbols.shape}"
+            )
+        n = int(symbols.max(initial=-1)) + 1
+        result = np.empty((len(boxes), self.outputs, n + 4))
+        memory = np.empty(self._library.nlp_gait_affine_doubles(self._slots, n))
+        pointers = [array.ctypes.data for array in (self._code, self._constants)]
+        self._library.nlp_gait_affine(
+            *pointers,
+            len(self._code),
+            n,
+            self.inputs,
+            symbols.ctypes.data,
+            len(boxes),
+            boxes.ctypes.data,
+            self.outputs,
+            result.ctypes.data,
+            memory.ctypes.data,
+        )
+        return Forms(result[..., 0], result[..., 1 : 1 + n], result[..., 1 + n], result[..., 2 + n], result[..., 3 + n])
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    native = files("nlp_gait.proofs") / "native"
+    source = "\n".join((native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp"))
+    flags = (*BASE_FLAGS, *lane_flags(native_lanes()))
+    library, _ = load_library(source, find_compiler(), flags, SYMBOLS)
+    library.nlp_gait_affine_doubles.argtypes = [_INTEGER, _INTEGER]
+    library.nlp_gait_affine_doubles.restype = _LONG
+    library.nlp_gait_affine.argtypes = [
+        *(_POINTER, _POINTER, _LONG, _INTEGER, _INTEGER, _POINTER, _LONG, _POINTER, _INTEGER, _POINTER, _POINTER)
+    ]
+    library.nlp_gait_affine.restype = None
+    return library
+
+
+def _instructions(
+    function: ca.Function, starts: list[int], ends: list[int], half_open: frozenset[int]
+) -> tuple[Any, Array]:
+    """Instructions (count, 4) of operation, result and arguments, and constants (count,)."""
+    count = function.n_instructions()
+    code = np.full((count, 4), -1, dtype=np.int32)
+    constants = np.zeros(count)
+    open_places: set[int] = set()  # of the work vector, that hold a half-open input now
+    for k in range(count):
+        operation, out, arguments = (
+            function.instruction_id(k),
+            function.instruction_output(k),
+            function.instruction_input(k),
+        )
+        if operation == ca.OP_OUTPUT:
+            code[k, :3] = operation, ends[out[0]] + out[1], arguments[0]
+            continue
+        first, second = -1, -1
+        if operation == ca.OP_CONST:
+            constants[k] = function.instruction_constant(k)
+        elif operation == ca.OP_INPUT:
+            first = starts[arguments[0]] + arguments[1]
+        elif operation in UNARY:
+            first = arguments[0]
+        elif operation in BINARY:
+            first, second = arguments
+            if operation == ca.OP_LE and second in open_places:
+                operation = HALF_OPEN_LE
+            elif operation == ca.OP_LT and first in open_places:
+                operation = HALF_OPEN_LT
+        else:
+            raise InputError(f"function {function.name()!r}: CasADi's operation number {operation} cannot be enclosed")
+        code[k] = operation, out[0], first, second
+        open_places.discard(out[0])
+        if operation == ca.OP_INPUT and first in half_open:
+            open_places.add(out[0])
+    return code, constants

@@ -1,0 +1,182 @@
+"""The rows of a stretch of motion as enclosed functions of its phase."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import MX
+
+from nlp_gait.formulation import Array, Constraint, GaitProblem, Stretch
+from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.proofs.affine import AffineFunction
+from nlp_gait.symbolic.nonsmooth import Exact
+
+Integers = np.ndarray[Any, np.dtype[np.intp]]
+
+
+class Enclosed:
+    """Values as an enclosed function, and groups of them alone where that is far less work.
+
+    Attributes:
+        whole: all values.
+        groups: numbers of the values that belong together, one array a group.
+    """
+
+    def __init__(self, function: ca.Function, half_open: Collection[int], groups: Sequence[Sequence[int]]) -> None:
+        """Read the instructions of a function of SX expressions with one result.
+
+        Raises:
+            InputError: an operation that cannot be enclosed.
+            CompilerError: there is no compiler, or it fails.
+        """
+        self.whole = AffineFunction(function, half_open)
+        self.groups = [np.array(group) for group in groups]
+        self._function, self._half_open = function, half_open
+        self._alone: dict[int, EnclosedPart] = {}
+
+    @one_at_a_time
+    def alone(self, group: int) -> EnclosedPart:
+        """A group by its number, by itself if that takes less than half of the instructions of all; read when first asked for."""
+        if group not in self._alone:
+            rows, arguments = self.groups[group], self._function.sx_in()
+            (values,) = self._function.call(arguments)
+            part = ca.Function("part", arguments, [values[rows.tolist()]])
+            share = part.n_instructions() / self._function.n_instructions()
+            if share < 0.5:
+                self._alone[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
+            else:
+                self._alone[group] = EnclosedPart(self.whole, rows, 1.0)
+        return self._alone[group]
+
+
+class EnclosedPart(NamedTuple):
+    """Some values.
+
+    Attributes:
+        function: that gives them, and others perhaps.
+        columns: of its results, which they are.
+        work: of an evaluation, as a share of that of all values.
+    """
+
+    function: AffineFunction
+    columns: Integers
+    work: float
+
+
+class TimeRows(NamedTuple):
+    """Functions of time of one kind: (x, p, phase) or (x, p, phase, phase an interval later) to values.
+
+    Attributes:
+        names: of the values.
+        units: likewise.
+        values: enclosed; rows of every time and of one name are a group.
+        bounds: p to lower and upper bounds.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Enclosed | None
+    bounds: ca.Function
+
+    @one_at_a_time
+    def limits(self, p: Array) -> tuple[Array, Array]:
+        """Lower and upper bounds (m,) for parameter values."""
+        lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(p))
+        return lower, upper
+
+
+class TimeFunctions(NamedTuple):
+    """A stretch as enclosed functions.
+
+    Attributes:
+        stretch: itself.
+        instants: rows of each instant, then the means' rows and indexes, whose bounds are those of their means.
+        plain: how many of these are rows of instants.
+        squares: numbers of means of squares, which limit a root.
+        changes: rows of each interval.
+        sampled: rows that are stated on samples alone.
+    """
+
+    stretch: Stretch
+    instants: TimeRows
+    plain: int
+    squares: frozenset[int]
+    changes: TimeRows
+    sampled: tuple[str, ...]
+
+
+@one_at_a_time
+def time_functions(problem: GaitProblem, stretch: Stretch) -> TimeFunctions:
+    """Functions of a stretch, read from its rows with all samples at one phase and with one an interval later.
+
+    Raises:
+        InputError: an operation that cannot be enclosed.
+        CompilerError: there is no compiler, or it fails.
+    """
+    point = problem.symbols()
+    now, later = MX.sym("phase"), MX.sym("later")
+    still = stretch.assemble(point, ca.horzcat(now, now, now), Exact())
+    moved = stretch.assemble(point, ca.horzcat(now, later, later), Exact())
+    by_kind: dict[str | None, list[Constraint]] = {}
+    for constraint in still.constraints:
+        by_kind.setdefault(constraint.over, []).append(constraint)
+    wanted = {constraint.name for constraint in by_kind.get("interval", [])}
+    instants = [row for constraint in by_kind.get("instant", []) for row in _at_one_sample(constraint)]
+    means = [(name, *rest) for c in by_kind.get("mean", []) for name, *rest in _each(c)]
+    squares = [
+        (name, unit, value**2, lower, upper)
+        for c in by_kind.get("root-mean-square", [])
+        for name, unit, value, lower, upper in _each(c)
+    ]
+    indexes = [
+        (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in stretch.means if name in still.indexes
+    ]
+    first = len(instants) + len(means)
+    changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
+    return TimeFunctions(
+        stretch=stretch,
+        instants=_rows(instants, [*means, *squares, *indexes], [point.x, point.p, now], stretch),
+        plain=len(instants),
+        squares=frozenset(range(first, first + len(squares))),
+        changes=_rows(changes, [], [point.x, point.p, now, later], stretch),
+        sampled=tuple(c.name for kind in (None, "samples") for c in by_kind.get(kind, [])),
+    )
+
+
+def _each(constraint: Constraint) -> list[tuple[Any, ...]]:
+    """Name, unit, value and bounds of every row."""
+    columns = [ca.vertsplit(column) for column in constraint.columns]
+    return [(name, constraint.unit, *parts) for name, *parts in zip(constraint.row_names, *columns, strict=True)]
+
+
+def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
+    """The same at the first sample alone, without its number."""
+    found: dict[str, tuple[Any, ...]] = {}
+    labels = constraint.labels or ("",)
+    for label, (_, *rest) in zip(labels, _each(constraint), strict=True):
+        stem = label.rpartition(",")[0]
+        found.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(rest))
+    return [(name, *rest) for name, rest in found.items()]
+
+
+def _rows(
+    plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretch
+) -> TimeRows:
+    """Rows of every time, and others, whose means have the bounds."""
+    rows = [*plain, *others]
+    names, units, values, lower, upper = zip(*rows, strict=True) if rows else ((),) * 5
+    bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
+    if not rows:
+        return TimeRows((), (), None, bounds)
+    function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
+    arguments = function.sx_in()
+    scalar = ca.Function("rows", arguments, ca.cse([ca.densify(v) for v in function.call(arguments)]))
+    first = int(inputs[0].numel() + inputs[1].numel())
+    half_open = range(first, first + len(inputs) - 2) if stretch.kinks else ()
+    groups: dict[str, list[int]] = {}
+    for k, (name, *_) in enumerate(plain):
+        groups.setdefault(name.partition("[")[0], []).append(k)
+    return TimeRows(names, units, Enclosed(scalar, half_open, list(groups.values())), bounds)

@@ -1,0 +1,177 @@
+"""Changed mathematics: never an old function, and all that a problem can do goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from casadi import MX
+
+import nlp_gait
+from compare.judge import evaluate
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, toy
+from tests.evaluation import evaluated
+
+PRICE = Parameter(name="price_J_m", unit="J/m", default=2.0, description="of the slack", minimum=0.0)
+SLACK = Variable(name="slack_m", unit="m", lower=0.0, upper=1.0, description="that costs")
+LEAST_SLACK = 0.25
+WALK_X = np.array([0.13, 0.1135, 0.02, 0.0204])
+
+
+def dearer(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+    """The objective with a slack at its price, and a row that asks for some."""
+    asked = Constraint(name="least_slack", unit="m", scale=0.1, value=point["slack_m"], lower=MX(LEAST_SLACK))
+    return replace(
+        assembly,
+        objective=assembly.objective + point["price_J_m"] * point["slack_m"],
+        constraints=(*assembly.constraints, asked),
+    )
+
+
+def with_slack(problem: GaitProblem) -> GaitProblem:
+    return problem.derived(name="dearer", variables=[SLACK], parameters=[PRICE], change=dearer)
+
+
+@pytest.fixture(scope="module")
+def walk() -> GaitProblem:
+    return load("walk12", intervals=4)
+
+
+def built(problem: GaitProblem) -> GaitProblem:
+    """The problem after its functions were built, which a changed copy must not find."""
+    exact_model(problem), nlp_model(problem), problem.dense(2)
+    return problem
+
+
+def doubled(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+    return replace(assembly, objective=2.0 * assembly.objective)
+
+
+@pytest.mark.parametrize("how", ["replace", "derived", "derived with other values"])
+def test_a_changed_problem_has_its_own_functions(how: str) -> None:
+    problem = built(toy(corner))
+    if how == "replace":
+        changed = replace(problem, assemble=lambda point, ops: doubled(problem.assemble(point, ops), point, ops))
+    else:
+        changed = problem.with_values(limit=0.25) if "values" in how else problem
+        changed = changed.derived(change=doubled)
+    x = [1.5, 0.0]
+    assert evaluated(problem, x).cost == 2.5 and evaluated(changed, x).cost == 5.0
+    assert nlp_model(changed) is not nlp_model(problem)
+    assert changed.values == ({"limit": 0.25} if "values" in how else {})
+    f, _ = nlp_gait.compile_objective(changed)(np.array([x]))
+    assert f[0] == pytest.approx(5.0)
+
+
+def test_what_is_derived_of_what_is_derived_has_its_own_functions() -> None:
+    once = built(toy(corner).derived(change=doubled))
+    twice = once.derived(change=doubled)
+    assert [evaluated(problem, [1.5, 0.0]).cost for problem in (once, twice)] == [5.0, 10.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "walk12", "stairs-plan", "stairs-track"])
+def test_time_histories_are_those_of_the_problem_below(name: str) -> None:
+    """With a parameter and a variable more, at the current values of both."""
+    problem = load(name)
+    changed = with_slack(problem).with_values(price_J_m=3.0)
+    x = (problem.lower + problem.upper) / 2
+    before, after = problem.signals(x), changed.signals([*x, 0.5])
+    assert before.arrays.keys() == after.arrays.keys()
+    for key, values in before.arrays.items():
+        np.testing.assert_array_equal(after.arrays[key], values, err_msg=key)
+
+
+def test_time_histories_follow_changed_values(walk: GaitProblem) -> None:
+    slower = with_slack(walk).with_values(step_time_s=2.0 * walk.value("step_time_s"))
+    assert slower.signals([*WALK_X, 0.5]).arrays["t"][-1] == 2.0 * walk.signals(WALK_X).arrays["t"][-1]
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "stairs-ideal"])
+def test_start_points_have_the_new_variable_within_its_current_bounds(name: str) -> None:
+    """Where the problem has start points of its own, and where it has none."""
+    options: dict[str, Any] = {"nao-cycle": {"objective": "power"}}.get(name, {})
+    problem = load(name, **options)
+    changed = with_slack(problem).with_values(**{"slack_m.lower": 0.6})
+    x = changed.start_point(np.random.default_rng(0))
+    assert x.shape == (len(problem.names) + 1,) and 0.6 <= x[-1] <= 1.0
+    if problem.start is not None:
+        np.testing.assert_array_equal(x[:-1], problem.start_point(np.random.default_rng(0)))
+
+
+def test_denser_grids_are_derived_too(walk: GaitProblem) -> None:
+    changed = with_slack(walk).with_values(price_J_m=3.0)
+    fine, plain = changed.dense(3), walk.dense(3)
+    assert fine is not None and plain is not None
+    assert (fine.name, fine.grid, fine.value("price_J_m")) == ("dearer", plain.grid, 3.0)
+    found, below = evaluated(fine, [*WALK_X, 0.5]), evaluated(plain, WALK_X)
+    assert walk.objective.sense == "maximise"
+    assert found.cost == pytest.approx(below.cost - 1.5, rel=1e-12)
+    assert found.rows["least_slack"] == 0.5 and len(found.rows) == len(below.rows) + 2
+
+
+def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
+    changed = with_slack(walk)
+    X: Array = np.column_stack([np.tile(WALK_X, (2, 1)), [0.1, 0.5]])
+    f, violation = nlp_gait.compile_objective(changed)(X)
+    verdicts = [evaluate(changed, x) for x in X]
+    assert (-f).tolist() == pytest.approx([verdict.objective["value"] for verdict in verdicts])
+    assert f[0] - f[1] == pytest.approx(2.0 * 0.4)  # what is maximised rises with the slack
+    assert violation.tolist() == pytest.approx([verdict.violation for verdict in verdicts])
+    assert violation[0] - violation[1] == pytest.approx((LEAST_SLACK - 0.1) / 0.1)
+    assert verdicts[0].problem == "dearer" and "least_slack" in [row.name for row in verdicts[0].violations]
+    assert verdicts[0].dense is not None
+
+
+def test_ipopt_solves_it() -> None:
+    """The slack costs, so that the least that is allowed is best; the rest is the problem below."""
+    solution = nlp_gait.solve(with_slack(toy(corner, limit=2.0)), starts=2)
+    assert solution.success
+    assert solution.x == pytest.approx({"x": 2.0, "y": 2.0, "slack_m": LEAST_SLACK}, abs=1e-6)
+    assert solution.objective == pytest.approx(3.0 + 2.0 * LEAST_SLACK, abs=1e-6)
+
+
+def test_another_objective_has_its_own_name_and_sense() -> None:
+    gain = Objective(name="gain", unit="J", sense="maximise")
+    flipped = toy(corner).derived(
+        objective=gain, change=lambda assembly, point, ops: replace(assembly, objective=-assembly.objective)
+    )
+    solution = nlp_gait.solve(flipped, starts=2)
+    assert (solution.objective_name, solution.objective) == ("gain", pytest.approx(0.0, abs=1e-6))
+
+
+@pytest.mark.parametrize(
+    ("more", "twice"),
+    [
+        ({"parameters": [replace(PRICE, name="limit")]}, "limit"),
+        ({"parameters": [PRICE, PRICE]}, "price_J_m"),
+        ({"parameters": [replace(PRICE, name="x.lower")]}, "x.lower"),
+        ({"parameters": [replace(PRICE, name="x")]}, "x"),
+        ({"variables": [replace(SLACK, name="x")]}, "x, x.lower, x.upper"),
+        ({"variables": [replace(SLACK, name="limit")]}, "limit"),
+    ],
+    ids=["a parameter", "two alike", "a bound", "a variable's name", "a variable", "a parameter's name"],
+)
+def test_names_that_stand_twice_are_refused(more: dict[str, Any], twice: str) -> None:
+    with pytest.raises(InputError, match=f"problem 'toy': these variables or parameters stand twice: {twice}$"):
+        toy(corner).derived(**more)
+
+
+def test_an_added_variable_is_nothing_to_the_parts_of_a_richer_motion() -> None:
+    """The swing foot halfway is a function of the phase's own variables alone."""
+    plain = load("nao-ssp", trajectory="quintic", samples_per_interval=1)
+    changed = with_slack(plain)
+    x = plain.start_point(np.random.default_rng(0))
+    assert evaluated(changed, np.append(x, 0.5)).cost == evaluated(plain, x).cost + 2.0 * 0.5
+
+
+def test_a_name_that_a_point_does_not_have_is_refused_with_those_that_it_has(walk: GaitProblem) -> None:
+    with pytest.raises(UnknownNameError, match="unknown variable or parameter 'lamda'; did you mean 'lambda'"):
+        walk.at(WALK_X)["lamda"]

@@ -1,0 +1,164 @@
+"""What every problem can do: parameters, bounds, fixed variables, names, and refusals in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import load, problem_names
+from tests.backends.toys import corner, toy
+
+SINGLE_SUPPORT_NAMES = (
+    "hip_height_m",
+    "hip_vz_start_m_s",
+    "hip_vz_end_m_s",
+    "hip_vx_start_m_s",
+    "hip_vx_end_m_s",
+    "hip_vy_start_m_s",
+    "hip_vy_end_m_s",
+    "swing_height_m",
+    "single_support_time_s",
+)
+
+
+def test_the_variables_of_single_support_have_the_papers_order_and_bounds() -> None:
+    problem = load("nao-ssp")
+    assert problem.names == SINGLE_SUPPORT_NAMES
+    assert problem.lower.tolist() == [0.25, -0.05, -0.05, 0.001, 0.001, -0.2, -0.2, 0.015, 0.4]
+    assert problem.upper.tolist() == [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0]
+
+
+def test_the_variables_of_double_support_have_the_papers_order_and_bounds() -> None:
+    problem = load("nao-dsp")
+    assert problem.names == (*SINGLE_SUPPORT_NAMES[:7], "double_support_time_s")
+    assert problem.lower.tolist() == [0.25, -0.05, -0.05, 0.001, 0.001, -0.2, -0.2, 0.2]
+    assert problem.upper.tolist() == [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [("nao-ssp", (1.2, 0.0, 0.0, 0.05, 0.02, 0.025)), ("nao-dsp", (1.2, 0.0, 0.0, 0.08, 0.08, 0.025))],
+)
+def test_limits_default_to_the_papers(name: str, limits: tuple[float, ...]) -> None:
+    problem = load(name)
+    margins = [f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy"]
+    got = [problem.value(key) for key in ("torque_change_limit_Nm", *margins, "heat_loss_W_per_Nm2")]
+    assert tuple(got) == limits
+
+
+def test_a_copy_with_other_values_shares_what_was_built_and_leaves_the_first_alone() -> None:
+    problem = toy(corner)
+    first = problem.built("thing", object)
+    other = problem.with_values(**{"limit": 0.75, "x.upper": 1.5})
+    assert other.built("thing", object) is first
+    assert (other.value("limit"), problem.value("limit")) == (0.75, 0.5)
+    assert (other.upper[0], problem.upper[0]) == (1.5, 2.0)
+    assert other.values == {"limit": 0.75, "x.upper": 1.5}
+    assert other.with_values(limit=0.25).upper[0] == 1.5  # values add up
+    assert toy(corner).built("thing", object) is not first
+
+
+def test_a_fixed_variable_has_equal_bounds() -> None:
+    fixed = toy(corner).fix(x=0.25)
+    assert (fixed.lower[0], fixed.upper[0]) == (0.25, 0.25)
+    assert fixed.start_point(np.random.default_rng(0))[0] == 0.25
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"limit": float("nan")}, r"parameter 'limit' must be a finite number \[m\], got nan"),
+        ({"limit": "1"}, r"parameter 'limit' must be a finite number \[m\], got '1'"),
+        ({"limit": -10.0}, r"parameter 'limit' must be within \[-9\.0, inf\] m, got -10\.0"),
+        ({"x.lower": 3.0}, r"bounds of 'x' are inverted: lower 3 is above upper 2; set x\.lower and x\.upper so that"),
+    ],
+)
+def test_values_that_are_not_allowed_are_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        toy(corner).with_values(**values)
+
+
+def test_inverted_joint_limits_are_refused() -> None:
+    with pytest.raises(InputError, match=r"bounds of 'LKneePitch_rad' are inverted: lower 2\.5 is above upper 2\.11"):
+        load("nao-ssp").with_values(**{"LKneePitch_rad.lower": 2.5})
+
+
+def test_both_ends_of_a_range_may_move_at_once() -> None:
+    moved = toy(corner).with_values(**{"x.lower": 3.0, "x.upper": 4.0})
+    assert (moved.lower[0], moved.upper[0]) == (3.0, 4.0)
+
+
+def test_unknown_names_get_the_nearest_ones() -> None:
+    problem = load("nao-ssp")
+    with pytest.raises(UnknownNameError, match=r"unknown problem 'nao-sp'; did you mean .*'nao-ssp'"):
+        load("nao-sp")
+    with pytest.raises(UnknownNameError, match="unknown option of nao-ssp 'robots'; did you mean 'robot'"):
+        load("nao-ssp", robots="nao-v5")
+    with pytest.raises(UnknownNameError, match="unknown option of nao-ssp 'torso_share'"):
+        load("nao-ssp", torso_share="lever")
+    with pytest.raises(
+        UnknownNameError, match="parameter of nao-ssp 'dbm_y_limit_m'; did you mean .*'dbm_y_min_limit_m'"
+    ):
+        problem.with_values(dbm_y_limit_m=0.1)
+    with pytest.raises(UnknownNameError, match="variable of nao-ssp 'swing_height'; did you mean 'swing_height_m'"):
+        problem.fix(swing_height=0.02)
+    with pytest.raises(UnknownNameError, match="variable of nao-ssp 'hip_height'; did you mean 'hip_height_m'"):
+        problem.variable_index("hip_height")
+
+
+@pytest.mark.parametrize(
+    ("x", "message"),
+    [
+        ([1.0], r"x of toy must have 2 values \(x, y\), got shape \(1,\)"),
+        ([[1.0, 2.0]], r"got shape \(1, 2\)"),
+        ([1.0, np.nan], "x of toy: y must be finite, got nan"),
+        ([np.inf, 1.0], "x of toy: x must be finite, got inf"),
+        (["a", "b"], "x of toy must be numbers, got list"),
+    ],
+)
+def test_points_that_are_none_are_refused(x: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        toy(corner).check_x(x)
+
+
+def test_a_point_may_be_given_by_name_in_any_order() -> None:
+    assert toy(corner).check_x({"y": 2.0, "x": 1.0}).tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("x", "message"),
+    [
+        ({"x": 1.0}, "x of toy must name every variable once; missing: y, unknown: none"),
+        ({"x": 1.0, "y": 2.0, "z": 3.0}, "missing: none, unknown: z"),
+        ({"x": 1.0, "Y": 2.0}, "missing: y, unknown: Y"),
+        ({}, "missing: x, y, unknown: none"),
+        ({"x": 1.0, "y": np.inf}, "x of toy: y must be finite, got inf"),
+        ({"x": 1.0, "y": "far"}, "x of toy must be numbers, got list"),
+    ],
+)
+def test_a_point_by_name_says_what_is_missing_or_unknown(x: dict[str, Any], message: str) -> None:
+    for read in (toy(corner).check_x, toy(corner).at):
+        with pytest.raises(InputError, match=message):
+            read(x)
+
+
+def test_start_points_lie_within_the_current_bounds() -> None:
+    problem = load("nao-ssp").with_values(**{"hip_height_m.lower": 0.30})
+    points = np.array([problem.start_point(np.random.default_rng(seed)) for seed in range(20)])
+    assert (points >= problem.lower).all()
+    assert (points <= problem.upper).all()
+    assert np.ptp(points, axis=0).min() > 0
+
+
+def test_parameter_arrays_cannot_be_written() -> None:
+    problem = toy(corner)
+    for array in (problem.p, problem.lower, problem.upper, problem.scale):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_both_nao_phases_can_be_loaded_by_name() -> None:
+    assert {"nao-ssp", "nao-dsp"} <= set(problem_names())

@@ -1,0 +1,152 @@
+"""A problem records the options that it was made with: they make the same problem again."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pytest
+
+from compare.judge import evaluate
+from compare.study.task import ProblemSpec, Task
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import load
+from nlp_gait.formulation.registry import PROBLEMS, problem_maker
+from tests.evaluation import evaluated
+
+# Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
+OTHER: dict[str, Any] = {
+    "robot": "nao-v6",
+    "intervals": 12,
+    "rotational_inertia": False,
+    "step_length_m": 0.07,
+    "samples_per_interval": 2,
+    "motors": "limits",
+    "drive_limits": False,
+    "load_degree": 3,
+    "duration_s": 3.0,
+    "instance": "walk12-w100",
+}
+QUICK = ("walk12", "nao-ssp")
+# What the first studies recorded; their records must stay valid.
+FIRST_OPTIONS = ["robot", "intervals", "derivatives", "rotational_inertia", "step_length_m"]
+
+
+def defaults(name: str) -> dict[str, Any]:
+    return {
+        option: parameter.default for option, parameter in inspect.signature(problem_maker(name)).parameters.items()
+    }
+
+
+def others(name: str) -> dict[str, Any]:
+    """A value that is not its default for every option; of a choice, the one after the default."""
+    hints, found = get_type_hints(problem_maker(name)), {}
+    for option, default in defaults(name).items():
+        choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
+        found[option] = choices[(choices.index(default) + 1) % len(choices)] if choices else OTHER[option]
+        assert found[option] != default
+    return found
+
+
+def task(name: str, options: Mapping[str, Any]) -> Task:
+    return Task(problem=ProblemSpec(name=name, options=options), algorithm="ipopt")
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "value"),
+    [
+        pytest.param(name, *case, id=f"{name} {case[0]}", marks=[] if name in QUICK else [pytest.mark.slow])
+        for name in PROBLEMS
+        for case in others(name).items()
+    ],
+)
+def test_every_option_is_recorded(name: str, option: str, value: Any) -> None:
+    """With all that was asked for; equal tasks of a study have equal definitions, and this one is not the default's."""
+    asked = task(name, {option: value})
+    problem = asked.problem.load()
+    recorded_values, wanted = defaults(name) | dict(problem.options), defaults(name) | {option: value}
+    if option != "samples_per_interval":  # which follows from the trajectory
+        recorded_values.pop("samples_per_interval", None), wanted.pop("samples_per_interval", None)
+    assert recorded_values == wanted
+    recorded = task(problem.name, problem.options)
+    assert recorded.definition() == asked.definition() != task(name, {}).definition()
+    again = recorded.problem.load()
+    assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_recorded_options_make_the_same_problem(name: str) -> None:
+    """With no option at its default: grid, rows, and every exact value at a point off the middle."""
+    problem = load(name, **others(name))
+    again = load(problem.name, **problem.options)
+    assert (again.options, again.grid) == (problem.options, problem.grid)
+    assert exact_model(again).row_names == exact_model(problem).row_names
+    x = problem.lower + 0.4 * (problem.upper - problem.lower)
+    here, there = evaluated(problem, x), evaluated(again, x)
+    for key in ("cost", "violation", "g", "lower", "upper"):
+        np.testing.assert_array_equal(getattr(there, key), getattr(here, key), err_msg=key)
+    np.testing.assert_equal(there.indexes, here.indexes)
+
+
+@pytest.mark.slow
+def test_the_judge_counts_the_intervals_of_its_grid() -> None:
+    """With three samples an interval it needs 34 times as many to have at least 1,000."""
+    problem = load("nao-cycle", samples_per_interval=3)
+    middle = (problem.lower + problem.upper) / 2
+    verdict = evaluate(load(problem.name, **problem.options), middle)
+    dense = problem.dense(34)
+    assert dense is not None
+    assert verdict.dense_intervals == 34 * 30
+    assert len(dense.signals(middle).arrays["t"]) == 2 * verdict.dense_intervals + 1  # of each phase
+    assert verdict.dense == evaluated(dense, middle).indexes
+
+
+def test_plain_problems_record_what_they_did_before_there_were_more_options() -> None:
+    """Names and their order, as they stand in records."""
+    assert list(load("nao-ssp").options) == FIRST_OPTIONS
+    assert list(load("nao-dsp").options) == [*FIRST_OPTIONS[:4], "torso_share", FIRST_OPTIONS[4]]
+    assert "samples_per_interval" not in load("nao-cycle").options
+
+
+def test_later_options_are_recorded_group_by_group() -> None:
+    richer, motors = ["trajectory", "objective", "samples_per_interval"], ["motors"]
+    assert list(load("nao-ssp", objective="jerk").options) == FIRST_OPTIONS + richer
+    assert list(load("nao-ssp", motors="heat").options) == FIRST_OPTIONS + motors
+    assert list(load("nao-ssp", motors="limits", trajectory="quintic").options) == FIRST_OPTIONS + richer + motors
+
+
+def test_what_was_chosen_for_a_trajectory_is_recorded() -> None:
+    """Zero samples leave the choice to the trajectory; asking for what a cubic gets anyway changes nothing."""
+    assert load("nao-ssp", trajectory="quintic").options["samples_per_interval"] == 4
+    assert load("nao-ssp", samples_per_interval=1).options == load("nao-ssp").options
+    assert load("nao-ssp", samples_per_interval=4).options["samples_per_interval"] == 4
+
+
+def test_numbers_of_numpy_mean_what_they_are() -> None:
+    plain = load("nao-ssp", intervals=10, step_length_m=0.07)
+    made = load("nao-ssp", intervals=np.int64(10), step_length_m=np.float64(0.07), robot=np.str_("nao-v5"))
+    assert made.options == plain.options
+    assert {type(value) for value in made.options.values()} == {type(value) for value in plain.options.values()}
+    single = load("nao-ssp", step_length_m=np.float32(0.0625))
+    assert single.options["step_length_m"] == 0.0625 and type(single.options["step_length_m"]) is float
+    for number in (np.float32(0.025), np.float16(0.025), Fraction(1, 40)):
+        moved = plain.fix(swing_height_m=number).with_values(**{"hip_height_m.lower": np.float32(0.25)})
+        assert moved.values == {
+            "swing_height_m.lower": float(number),
+            "swing_height_m.upper": float(number),
+            "hip_height_m.lower": 0.25,
+        }
+        assert all(type(value) is float for value in moved.values.values())
+
+
+@pytest.mark.parametrize("value", [True, np.bool_(True), np.float32("nan"), np.array([0.02]), 0.02 + 0j, "0.02", None])
+def test_what_is_no_number_stays_refused(value: Any) -> None:
+    with pytest.raises(InputError, match="must be a finite number"):
+        load("nao-ssp").with_values(**{"swing_height_m.lower": value})
+    with pytest.raises(InputError, match="option intervals must be a whole number"):
+        load("nao-ssp", intervals=value)

@@ -1,0 +1,247 @@
+"""Problems of one's own by name, and mistakes in them met as they are made, by the name of the row."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import pytest
+from casadi import MX
+
+import nlp_gait.references as references
+from compare.study.definition import key_of
+from compare.study.task import ProblemSpec, Task
+from nlp_gait import load, solve
+from nlp_gait.errors import GaitError, InputError, OwnCodeError, UnknownNameError
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable
+from nlp_gait.formulation.checks import check_mathematics
+from nlp_gait.formulation.result import load_result
+from nlp_gait.references import is_reference, source_sha256
+from tests.backends.toys import corner, toy
+from tests.robots.custom import humanoid
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "bring_your_own.py"
+THREE = MX.sym("three", 3)
+GOOD: dict[str, Any] = {"name": "knee", "unit": "m", "scale": 0.01, "value": MX.sym("v"), "lower": MX(0.0)}
+
+
+def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
+    problem = load(f"{EXAMPLE}:two_link", intervals=10)
+    assert problem.name == "two-link" and problem.address == f"{EXAMPLE}:two_link"
+    assert problem.options == {"intervals": 10, "lift_m": 0.05}
+    assert solve(problem, starts=2).success
+    with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
+        load(f"{EXAMPLE}:two_link", interval=10)
+
+
+def test_an_edited_file_and_another_folder_are_other_problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one process; within one second and of one length, where a compiled copy would be taken for the same."""
+    text = "from nlp_gait.formulation import load\nleg = load('walk12').with_values(**{'lambda': 0.25})\n"
+    for folder, value in (("a", "0.25"), ("b", "0.75")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "own.py").write_text(text.replace("0.25", value))
+    monkeypatch.chdir(tmp_path / "a")
+    spec = ProblemSpec(name="own.py:leg")
+    assert spec.load().value("lambda") == 0.25
+    Path("own.py").write_text(text.replace("0.25", "0.35"))
+    assert (load("own.py:leg").value("lambda"), spec.load().value("lambda")) == (0.35, 0.35)
+    monkeypatch.chdir(tmp_path / "b")
+    assert (load("own.py:leg").value("lambda"), spec.load().value("lambda")) == (0.75, 0.75)
+
+
+def test_a_robot_file_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    raw = humanoid()
+    Path("my.json").write_text(json.dumps(raw))
+    first = load("nao-ssp", robot="my.json").robot
+    raw["links"]["torso"]["mass_kg"] += 1.0
+    Path("my.json").write_text(json.dumps(raw))
+    second = load("nao-ssp", robot="my.json").robot
+    assert first is not None and second is not None and second.mass_kg == pytest.approx(first.mass_kg + 1.0)
+
+
+def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint(name="leg", value=f"{EXAMPLE}:two_link", group=references.GROUPS["problem"])
+    monkeypatch.setattr(references, "entry_points", lambda group: EntryPoints([point]).select(group=group))
+    monkeypatch.setattr(references, "_entry_points", references._entry_points.__wrapped__)
+    assert load("leg").name == "two-link" and ProblemSpec(name="leg").title == "leg"
+    with pytest.raises(UnknownNameError, match="did you mean 'leg'"):
+        load("lag")
+
+
+def test_a_study_takes_a_problem_itself() -> None:
+    spec = ProblemSpec(name=toy(corner), values={"limit": 0.25})
+    assert spec.load().value("limit") == 0.25 and spec.title == "toy"
+    task = Task(problem=spec, algorithm="pso")
+    assert key_of(task.definition()) != key_of(
+        Task(problem=ProblemSpec(name=toy(corner)), algorithm="pso").definition()
+    )
+    with pytest.raises(InputError, match="is built already, so it takes no options; got intervals"):
+        spec.with_options(intervals=3).load()
+
+
+def test_a_result_file_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
+    file = tmp_path / "other.py"
+    file.write_text("from nlp_gait.formulation import load\nleg = load('walk12')\n")
+    walk = load("walk12")
+    x = walk.by_name((walk.lower + walk.upper) / 2)
+    (tmp_path / "best.json").write_text(json.dumps({"problem": "elsewhere/other.py:leg", "x": x}))
+    with pytest.raises(
+        InputError, match="needs code of your own, 'elsewhere/other.py:leg', which runs only if you name it"
+    ):
+        load_result(tmp_path / "best.json")
+    load(f"{file}:leg")
+    assert load_result(tmp_path / "best.json").problem.address == f"{file}:leg"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def leg(): return 3", "must make a GaitProblem, it made int"),
+        ("leg = 3", "must be a GaitProblem or a function that makes one, got int"),
+        ("def leg(*, steps): ...", "option steps needs a default"),
+        ("import sys\nsys.exit(2)", "'.*:leg' fails at line 2, `sys.exit\\(2\\)`: SystemExit: 2"),
+        (
+            "import casadi as ca\ndef leg(): return ca.fmax(None, 'a')",
+            "at line 2, .*CasADi does not take these arguments",
+        ),
+        ("other = 1", "unknown name in .*own.py 'leg'; .*other"),
+    ],
+)
+def test_what_is_wrong_with_the_file_is_said(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(text)
+    with pytest.raises(GaitError, match=message) as said:
+        load(f"{tmp_path / 'own.py'}:leg")
+    assert "\n" not in str(said.value)
+    with pytest.raises(OwnCodeError, match="cannot be read: No such file"):
+        load(f"{tmp_path / 'none.py'}:leg")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"lower": 0.0}, "'knee': lower must be a CasADi MX, got float 0.0; write MX\\(0.0\\)"),
+        ({"upper": "1"}, "'knee': upper must be a CasADi MX, got str '1'"),
+        ({"value": None}, "'knee': value must be a CasADi MX, got NoneType"),
+        ({"value": THREE}, "'knee': its value has 3 rows, labels has 0: give one label for each row"),
+        ({"value": THREE, "labels": ("a", "b")}, "'knee': its value has 3 rows, labels has 2"),
+        ({"value": THREE.T}, "'knee': value must be a column, got shape \\(1, 3\\)"),
+        ({"lower": THREE}, "'knee': lower must have one row or as many as value, 1, got 3"),
+        ({"scale": 0.0}, "'knee': scale must be > 0"),
+        ({"scale": "big"}, "'knee': scale must be a finite number, got 'big'"),
+        ({"lower": None}, "'knee': it needs lower, upper or both"),
+    ],
+)
+def test_a_row_is_refused_by_its_name(change: dict[str, Any], message: str) -> None:
+    Constraint(**GOOD)
+    with pytest.raises(InputError, match=message):
+        Constraint(**{**GOOD, **change})
+
+
+def test_objectives_variables_and_parameters_are_refused_by_theirs() -> None:
+    with pytest.raises(InputError, match="objective must be a scalar MX, got shape \\(3, 1\\)"):
+        Assembly(objective=THREE, constraints=(), indexes={})
+    with pytest.raises(InputError, match="index 'power_W' must be a scalar MX, got float 1.0"):
+        Assembly(objective=MX.sym("f"), constraints=(), indexes={"power_W": 1.0})  # type: ignore[dict-item]
+    with pytest.raises(InputError, match="constraints must be Constraint, got int 3"):
+        Assembly(objective=MX.sym("f"), constraints=(3,), indexes={})  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="variable 'lift': lower must be below upper, got 1.0 and 1.0"):
+        Variable(name="lift", unit="m", lower=1.0, upper=1.0, description="")
+    with pytest.raises(InputError, match="parameter 'mass': default must be a finite number, got None"):
+        Parameter(name="mass", unit="kg", default=None, description="")  # type: ignore[arg-type]
+    x = Variable(name="x", unit="m", lower=0.0, upper=1.0, description="")
+    with pytest.raises(InputError, match="stand twice: x"):
+        GaitProblem(**{**vars_of(toy(corner)), "variables": (x, x)})
+
+
+def vars_of(problem: GaitProblem) -> dict[str, Any]:
+    return {name: getattr(problem, name) for name in ("name", "title", "own_parameters", "objective", "assemble")}
+
+
+@pytest.mark.parametrize(
+    ("mathematics", "message"),
+    [
+        (lambda x, y, p, ops: (x, (row(x, lower=y),)), "constraint 'knee': lower must depend on parameters only"),
+        (lambda x, y, p, ops: (x, (row(x), row(y))), "these rows stand twice: knee"),
+        (lambda x, y, p, ops: (x + MX.sym("mass"), ()), "objective holds 'mass', which is neither a variable nor"),
+        (lambda x, y, p, ops: (x, (row(MX.sym("q") * x),)), "constraint 'knee' holds 'q'"),
+        (lambda x, y, p, ops: (ca.vertcat(x, y), ()), "must be a scalar"),
+    ],
+)
+def test_mathematics_that_no_backend_could_use_is_refused(mathematics: Any, message: str) -> None:
+    check_mathematics(toy(corner))
+    with pytest.raises(InputError, match=message):
+        check_mathematics(toy(mathematics))
+
+
+def row(value: MX, lower: MX | None = None) -> Constraint:
+    return Constraint(name="knee", unit="m", scale=1.0, value=value, lower=MX(0.0) if lower is None else lower)
+
+
+def test_a_source_is_what_an_object_is_made_of(tmp_path: Path) -> None:
+    """Of one file, an edit changes the objects that use what was edited, and no others."""
+    text = (
+        '"""Own."""\nimport helper\nC, D = 1, 2\ndef used(): return C\ndef leg(): return used()\ndef arm(): return D\n'
+    )
+    (tmp_path / "helper.py").write_text("X = 1\n")
+
+    def hashes(changed: str) -> tuple[str, str]:
+        (tmp_path / "own.py").write_text(changed)
+        leg, arm = (source_sha256(f"{tmp_path / 'own.py'}:{name}", "problem") for name in ("leg", "arm"))
+        return leg, arm
+
+    leg, arm = hashes(text)
+    assert hashes(text.replace("def used(): return C", "def used():\n    # better\n    return C")) == (leg, arm)
+    assert hashes(text.replace('"""Own."""', '"""Mine."""')) == (leg, arm)
+    assert hashes(text.replace("return C", "return 3")) == (hashes(text.replace("return C", "return 3"))[0], arm)
+    assert hashes(text.replace("return C", "return 3"))[0] != leg
+    assert hashes(text.replace("def arm(): return D", "def arm(): return 4"))[0] == leg
+    patched = hashes(text + "helper.X = 2\n")  # binds no name, so it may change anything
+    assert patched[0] != leg and patched[1] != arm
+    uses = text.replace("return C", "return helper.X")
+    before = hashes(uses)
+    (tmp_path / "helper.py").write_text("X = 2\n")
+    after = hashes(uses)
+    assert after[0] != before[0] and after[1] == before[1] == arm
+
+
+@pytest.mark.parametrize(
+    ("text", "is_one"),
+    [
+        ("own.py:leg", True),
+        ("a/b c.py:leg", True),
+        ("pkg.mod:leg", True),
+        ("nao-ssp", False),
+        ("a b:leg", False),
+        ("own.py:", False),
+    ],
+)
+def test_references_have_a_form(text: str, is_one: bool) -> None:
+    assert is_reference(text) is is_one
+
+
+def test_a_files_path_is_made_absolute_and_a_modules_name_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert references.reference("own.py:leg", "problem") == (str(tmp_path / "own.py"), "leg")
+    assert references.reference("some.module:leg", "problem") == ("some.module", "leg")
+
+
+def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "own.py"
+    path.write_bytes(b"#" * 5 * 2**20)
+    with pytest.raises(OwnCodeError, match="it has more than 4194304 bytes"):
+        source_sha256(f"{path}:leg", "problem")
+
+
+def test_what_is_imported_with_a_star_may_be_any_name(tmp_path: Path) -> None:
+    """Then every statement of the file belongs to the source."""
+    path, hashes = tmp_path / "own.py", set()
+    for other in (1, 2):
+        path.write_text(f"from math import *\nleg = pi\nother = {other}\n")
+        hashes.add(source_sha256(f"{path}:leg", "problem"))
+    assert len(hashes) == 2

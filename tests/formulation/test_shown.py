@@ -1,0 +1,108 @@
+"""What results say of themselves: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from compare.study.record import RunRecord
+from compare.study.rows import HEADER, frame_of
+from compare.study.study import Study, keep_record
+from compare.study.task import ProblemSpec, Task
+from nlp_gait.errors import InputError, MissingExtraError, UnknownNameError
+from nlp_gait.formulation import Columns, Signals
+from nlp_gait.formulation.motion.skeleton import Skeleton, Sole, rectangle
+from tests.compare.records import record
+
+T = np.array([0.0, 0.5, 1.0])
+
+
+@pytest.fixture(scope="module")
+def solution() -> nlp_gait.Solution:
+    return nlp_gait.solve("nao-dsp", starts=1)
+
+
+@pytest.fixture
+def signals() -> Signals:
+    return Signals(
+        joints=("hip", "<knee>"),
+        arrays={"tau": np.array([[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]]), "share": T, "t": T},
+        columns={"share": Columns(unit="1")},
+    )
+
+
+def test_time_histories_by_name_and_as_a_data_frame(signals: Signals) -> None:
+    pandas = pytest.importorskip("pandas")
+    np.testing.assert_array_equal(signals["tau <knee>"], [1.0, 3.0, 5.0])
+    assert signals["tau"] is signals.arrays["tau"]
+    with pytest.raises(UnknownNameError, match="time history 'torque'"):
+        signals["torque"]
+    frame = signals.to_frame()
+    assert isinstance(frame, pandas.DataFrame) and frame.index.name == "t [s]"
+    assert list(frame.columns) == ["tau hip", "tau <knee>", "share"] and frame.attrs["units"]["tau hip"] == "Nm"
+    assert frame["tau hip"][0.5] == 2.0
+    assert repr(signals) == "<Signals over 1 s in 3 samples: tau, share, t>"
+    assert "&lt;knee&gt;" in signals._repr_html_() and "<knee>" not in signals._repr_html_()
+
+
+def test_without_pandas_a_sentence_says_how_to_get_it(signals: Signals, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingExtraError, match="pip install pandas"):
+        signals.to_frame()
+
+
+def test_a_solution_shows_itself_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
+    shown = solution._repr_html_()
+    assert "hip_height_m" in shown and "W per m" in shown and len(shown) < 5000
+    problem = nlp_gait.load("nao-dsp")
+    np.testing.assert_array_equal(solution.signals()["tau"], problem.signals(solution.x)["tau"])
+    figure = solution.plot(problem)
+    assert figure._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+    power = next(axes for axes in figure.axes if axes.get_ylabel() == "mechanical power [W]").lines[0].get_ydata()
+    arrays = solution.signals().arrays
+    assert power[0] == pytest.approx(np.abs(arrays["tau"] * arrays["qd"])[0].sum())
+
+
+def test_records_and_studies_are_one_line_a_table_and_a_frame(tmp_path: Path) -> None:
+    run: RunRecord = record("swarm", 0, [(100, None), (500, 10.05)])
+    assert repr(run) == "<RunRecord of swarm on walk, run 0: power 10.05 W>"
+    assert "<td>b</td><td>1</td>" in run._repr_html_()
+    pytest.importorskip("pandas")
+    frame = frame_of([run, record("colony", 0, [(500, None)], feasible=False)])
+    assert tuple(frame.columns) == (*HEADER, "x.a", "x.b") and list(frame["feasible"]) == [True, False]
+    tasks = tuple(Task(problem=ProblemSpec(name="nao-dsp"), algorithm="pso", run=k) for k in range(2))
+    study = Study(tasks=tasks, folder=tmp_path)
+    assert repr(study) == f"<Study of nao-dsp by pso: 2 runs, kept in {str(tmp_path)!r}>"
+    assert "<td>nao-dsp</td><td>pso</td><td>2</td>" in study._repr_html_()
+    keep_record(RunRecord.failed(tasks[1], "it broke"), tmp_path)
+    assert list(study.to_frame()["status"]) == ["it broke"]
+    with pytest.raises(InputError, match="keeps no runs"):
+        Study(tasks=tasks).to_frame()
+
+
+def walker(zmp: list[tuple[float, float]], half_width: float = 0.05) -> Skeleton:
+    """Two soles of 0.2 m length at x = 0 and x = 1; the first bears load at all times, the second at the first instant only."""
+    corners = np.stack([rectangle(-0.1, 0.1, -half_width, half_width)] * len(zmp))
+    always, first = np.ones(len(zmp), bool), np.arange(len(zmp)) == 0
+    soles = (
+        Sole(side="left", corners=corners, supports=always),
+        Sole(side="right", corners=corners + [1.0, 0.0, 0.0], supports=first),
+    )
+    points = np.array([(x, y, 0.0) for x, y in zmp])
+    return Skeleton(t=np.arange(len(zmp)), limbs=(), soles=soles, ground=np.zeros((2, 2)), com=None, zmp=points)
+
+
+def test_balance_margin_by_hand() -> None:
+    """Inside: to the nearest edge; outside: to the edge or the corner, negative; a foot that only touches does not count."""
+    margin = walker([(0.5, 0.0), (0.0, 0.0), (0.08, 0.01), (0.3, 0.0), (0.13, 0.09)]).margin()
+    np.testing.assert_allclose(margin, [-0.4, 0.05, 0.02, -0.2, -0.05], atol=1e-12)
+
+
+def test_balance_margin_of_a_planar_model_is_along_its_soles() -> None:
+    np.testing.assert_allclose(
+        walker([(0.0, 0.0), (0.09, 0.0), (0.15, 0.0)], half_width=0.0).margin(), [0.1, 0.01, -0.05]
+    )

@@ -1,0 +1,53 @@
+"""Time histories say what each of their columns is, or they are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Columns, Signals, in_space
+from tests.backends.toys import corner, toy
+
+T = np.array([0.0, 0.5, 1.0])
+
+
+def test_every_column_has_its_name_and_unit() -> None:
+    """Joints' units are known; a single column needs no label; time stands first, wherever it is given."""
+    signals = Signals(
+        joints=("hip", "knee"),
+        arrays={"tau": np.ones((3, 2)), "zmp": np.zeros((3, 2)), "share": T, "t": T},
+        columns={"zmp": in_space("m", "xy"), "share": Columns(unit="1")},
+    )
+    assert [(name, unit) for name, unit, _ in signals.named_columns()] == [
+        ("t", "s"),
+        ("tau hip", "Nm"),
+        ("tau knee", "Nm"),
+        ("zmp x", "m"),
+        ("zmp y", "m"),
+        ("share", "1"),
+    ]
+    np.testing.assert_array_equal(list(signals.named_columns())[-1][2], T)
+
+
+def test_a_time_history_without_a_unit_is_refused() -> None:
+    with pytest.raises(InputError, match="time history 'mood' has no unit"):
+        Signals(joints=(), arrays={"t": T, "mood": T}, columns={})
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "message"),
+    [
+        ("zmp", {"zmp": in_space("m")}, "'zmp' has 2 columns, but 3 are described"),
+        ("zmp", {"zmp": Columns(unit="m")}, "'zmp' has 2 columns, but 1 are described"),
+        ("q", {}, "'q' has 2 columns, but 1 are described"),
+    ],
+)
+def test_a_wrong_number_of_columns_is_refused(name: str, columns: dict[str, Columns], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Signals(joints=("hip",), arrays={"t": T, name: np.zeros((3, 2))}, columns=columns)
+
+
+def test_a_problem_without_time_histories_says_so() -> None:
+    with pytest.raises(InputError, match="problem 'toy' has no time histories"):
+        toy(corner).signals([0.0, 0.0])

@@ -1,0 +1,176 @@
+"""Richer motions of the NAO phases: what they contain, what they keep, what limits them, and what they save."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, load
+from nlp_gait.gaits.biped.curves import SPANS
+from nlp_gait.symbolic.splines import finer
+from tests.backends.toys import row_violations
+from tests.evaluation import evaluated
+
+GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
+NAMES = ("nao-ssp", "nao-dsp")
+OWN = {"nao-ssp": 9, "nao-dsp": 8}
+CURVES = {"nao-ssp": 9, "nao-dsp": 7}
+# The same sums in another order.
+ROUNDING = 1e-12
+# Central differences on a grid of 4,000 intervals.
+DIFFERENCE_TOLERANCE = 1e-5
+RICH = [order for order in SPANS if order != "cubic"]
+
+
+def golden(name: str) -> dict[str, Any]:
+    return next(row for row in GOLDEN["rows"] if row["problem"] == name)
+
+
+def padded(problem: GaitProblem, coefficients: float | Array = 0.0) -> Array:
+    x = np.zeros(len(problem.names))
+    own = OWN[problem.name]
+    x[:own], x[own:] = golden(problem.name)["x"], coefficients
+    return x
+
+
+def some(problem: GaitProblem, seed: int = 0) -> Array:
+    """Coefficients of a few millimetres and centiradians."""
+    units = np.array([0.005 if v.unit == "m" else 0.05 for v in problem.variables[OWN[problem.name] :]])
+    return units * np.random.default_rng(seed).normal(size=len(units))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("order", ["quintic", "spline-4"])
+def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) -> None:
+    problem = load(name, trajectory=order, samples_per_interval=1)
+    rich, plain = evaluated(problem, padded(problem)), evaluated(load(name), golden(name)["x"])
+    assert rich.indexes == pytest.approx(plain.indexes, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_papers_motion_has_no_new_options_and_a_richer_one_names_all(name: str) -> None:
+    assert not {"trajectory", "objective", "samples_per_interval"} & set(load(name).options)
+    rich = load(name, trajectory="quintic")
+    assert rich.options["samples_per_interval"] == 4
+    assert load(name, **rich.options).options == rich.options
+    assert load(name, samples_per_interval=4).options["samples_per_interval"] == 4
+    dense = rich.dense(5)
+    assert dense is not None and dense.options["samples_per_interval"] == 20
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("order", RICH)
+def test_coefficients_are_counted_by_curves_and_spans(name: str, order: str) -> None:
+    problem = load(name, trajectory=order)
+    assert len(problem.names) == OWN[name] + CURVES[name] * (SPANS[order] + 1)
+    assert problem.names[OWN[name]] == "hip_x_m[0]"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_each_order_contains_the_one_before(name: str) -> None:
+    coarse, fine = (load(name, trajectory=order, samples_per_interval=2) for order in ("spline-2", "spline-4"))
+    coefficients = some(coarse)
+    more = finer(coefficients.reshape(CURVES[name], -1).T, 4).T.ravel()
+    same = [evaluated(problem, padded(problem, c)).indexes for problem, c in ((coarse, coefficients), (fine, more))]
+    assert same[0] == pytest.approx(same[1], rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
+    problem = load(name, trajectory="spline-2").dense(100)
+    assert problem is not None
+    moved, paper = (problem.signals(padded(problem, c)).arrays for c in (some(problem), 0.0))
+    for row in (0, -1):
+        for signal in ("q", "qd", "hip", "left_foot", "right_foot"):
+            np.testing.assert_allclose(moved[signal][row], paper[signal][row], rtol=0, atol=ROUNDING)
+    assert np.abs(moved["hip"] - paper["hip"]).max() > 1e-3
+    step = moved["t"][2:, None] - moved["t"][:-2, None]
+    for value, rate in (("q", "qd"), ("qd", "qdd")):
+        found = (moved[value][2:] - moved[value][:-2]) / step
+        np.testing.assert_allclose(found, moved[rate][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("curve", "value", "row"),
+    [
+        ("foot_x_m", 0.02, "foot_middle"),
+        ("foot_z_m", -0.2, "foot_height["),
+        ("foot_z_m", -0.01, "foot_lift"),
+        ("LElbowRoll_rad", 3.0, "arm_angle[LElbowRoll"),
+    ],
+)
+def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: str) -> None:
+    problem = load("nao-ssp", trajectory="quintic")
+    x = padded(problem)
+    assert not row_violations(problem, x)
+    x[[problem.variable_index(f"{curve}[{k}]") for k in range(2)]] = value
+    assert any(found.name.startswith(row) for found in row_violations(problem, x))
+
+
+@pytest.mark.slow
+def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
+    cubic, quintic = (
+        load("nao-dsp", trajectory=order, intervals=5, samples_per_interval=2) for order in ("cubic", "quintic")
+    )
+    first = solve(cubic, starts=1, seed=1)
+    second = solve(quintic, starts=1, x0=np.array([*first.x.values(), *np.zeros(14)]))
+    assert first.success and second.success
+    assert second.objective < 0.9 * first.objective
+
+
+@pytest.mark.slow
+def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
+    power, jerk = (load("nao-dsp", objective=name) for name in ("power", "jerk"))
+    assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
+    cheap, smooth = (np.array(list(solve(problem, starts=1, seed=1).x.values())) for problem in (power, jerk))
+    at = [evaluated(jerk, x).indexes for x in (cheap, smooth)]
+    assert at[1]["joint_jerk"] < 0.9 * at[0]["joint_jerk"]
+    assert at[1]["power_W"] > 1.01 * at[0]["power_W"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "signal"), [("jerk", "qdd"), ("torque-smoothness", "tau")])
+def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, signal: str) -> None:
+    problem = load("nao-ssp", objective=name)
+    arrays = problem.signals(padded(problem)).arrays
+    rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
+    cost = evaluated(problem, padded(problem)).cost
+    assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)
+
+
+def test_starts_have_coefficients_near_zero() -> None:
+    problem = load("nao-ssp", trajectory="spline-2")
+    x = problem.start_point(np.random.default_rng(0))
+    assert 0.0 < np.abs(x[9:] / problem.upper[9:]).max() <= 0.05
+    assert ((problem.lower <= x) & (x <= problem.upper)).all()
+
+
+@pytest.mark.slow
+def test_squared_torques_are_their_mean_over_time() -> None:
+    problem = load("nao-ssp", objective="torque")
+    arrays = problem.signals(padded(problem)).arrays
+    mean = np.trapezoid((arrays["tau"] ** 2).sum(axis=1), arrays["t"]) / arrays["t"][-1]
+    assert evaluated(problem, padded(problem)).cost == pytest.approx(mean, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"trajectory": "septic"}, "trajectory must be one of cubic, quintic, spline-2, .* got 'septic'"),
+        ({"objective": "speed"}, "objective must be one of power, jerk, torque, torque-smoothness, got 'speed'"),
+    ],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_unknown_motions_are_refused(name: str, options: dict[str, str], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load(name, **options)

@@ -1,0 +1,252 @@
+"""The walking cycle: continuous over both switches, periodic after mirroring, with the loads of the published phases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.gaits.biped.double_support import LOAD_DEGREE
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.nao.body import GRAVITY, nao
+from nlp_gait.gaits.nao.cycle.problem import walking_cycle
+from nlp_gait.gaits.nao.double_support import standing
+from nlp_gait.gaits.nao.motors import nao_motors
+from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
+from tests.pinocchio_oracle import Standing, floating_model, stand
+from tests.properties.mirror import JOINT_SIGNS, partner
+
+# Asked for at both switches; it holds to rounding, for every x.
+CONTINUITY = 1e-8
+# Two double-precision algorithms on torques of some Nm; the ZMP divides a moment by a ground force.
+TORQUE_TOLERANCE_NM = ZMP_TOLERANCE_M = 1e-8
+# The same sums in another order.
+ROUNDING = 1e-12
+# Joint rates are compared with differences on a grid of 1,000 intervals.
+DIFFERENCE_TOLERANCE = 1e-4
+SEEDS = range(3)
+# Least power at 0.03 m/s.
+OPTIMUM = {
+    "hip_x_lift_off_m": 0.0062,
+    "hip_y_lift_off_m": 0.02935,
+    "hip_z_lift_off_m": 0.31,
+    "hip_vx_lift_off_m_s": 0.01532,
+    "hip_vy_lift_off_m_s": 0.04658,
+    "hip_vz_lift_off_m_s": -0.00991,
+    "arm_swing_lift_off_rad": 0.1,
+    "arm_rate_lift_off_rad_s": -0.2,
+    "hip_x_touch_down_m": 0.03394,
+    "hip_y_touch_down_m": 0.02915,
+    "hip_z_touch_down_m": 0.30871,
+    "hip_vx_touch_down_m_s": 0.01054,
+    "hip_vy_touch_down_m_s": -0.0462,
+    "hip_vz_touch_down_m_s": 0.00856,
+    "arm_swing_touch_down_rad": 0.05,
+    "arm_rate_touch_down_rad_s": 0.1,
+    "swing_height_m": 0.015,
+    "single_support_time_s": 0.4,
+    "double_support_time_s": 2.0,
+}
+
+
+@pytest.fixture(scope="module")
+def at_speed() -> GaitProblem:
+    return load("nao-cycle", objective="power")
+
+
+def candidates(problem: GaitProblem) -> list[Array]:
+    known = OPTIMUM | {"step_length_m": 0.072}
+    return [
+        np.array([known[name] for name in problem.names]),
+        *(np.random.default_rng(seed).uniform(problem.lower, problem.upper) for seed in SEEDS),
+    ]
+
+
+Sampled = tuple[Array, Signals, Signals]
+
+
+@pytest.fixture(scope="module")
+def sampled(at_speed: GaitProblem) -> list[Sampled]:
+    """Candidates with single and double support, both with their samples at the switch."""
+    return [(x, *phases(at_speed, x)) for x in candidates(at_speed)]
+
+
+def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
+    """Single and double support, both with their samples at the switch."""
+    real = nao_motors("", nao("nao-v5", rotational_inertia=True))
+    sharing = standing(real.model).sharing(problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
+    assert problem.grid is not None
+    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
+    found = cycle.signals(problem.at(x))
+    return found["ssp"], found["dsp"]
+
+
+def mirrored_row(signals: Signals, name: str, row: int) -> Array:
+    """Joint values with left and right exchanged."""
+    columns = {joint: i for i, joint in enumerate(signals.joints)}
+    values = signals.arrays[name][row]
+    return np.array([JOINT_SIGNS[joint] * values[columns[partner(joint)]] for joint in signals.joints])
+
+
+@pytest.mark.slow
+def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
+    for _, single, double in sampled:
+        assert double.arrays["t"][0] == single.arrays["t"][-1]
+        for name in ("q", "qd", "hip", "com", "left_foot", "right_foot"):
+            np.testing.assert_allclose(double.arrays[name][0], single.arrays[name][-1], rtol=0, atol=CONTINUITY)
+
+
+@pytest.mark.slow
+def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
+    at_speed: GaitProblem, sampled: list[Sampled]
+) -> None:
+    for x, single, double in sampled:
+        step = evaluated(at_speed, x).indexes["step_length_m"]
+        for name in ("q", "qd"):
+            np.testing.assert_allclose(double.arrays[name][-1], mirrored_row(single, name, 0), rtol=0, atol=CONTINUITY)
+        for end, start in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
+            image = single.arrays[start][0] * (1, -1, 1) + (step, 0, 0)
+            np.testing.assert_allclose(double.arrays[end][-1], image, rtol=0, atol=CONTINUITY)
+
+
+@pytest.mark.slow
+def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed: GaitProblem) -> None:
+    """By one-sided differences of second order on a dense grid, for the time histories hold no such velocities."""
+    dense = at_speed.dense(100)
+    assert dense is not None
+    x = candidates(at_speed)[0]
+    single, double = phases(dense, x)
+
+    def rate(signals: Signals, name: str, end: int) -> Array:
+        t, y = signals.arrays["t"], signals.arrays[name]
+        a, b, c = (0, 1, 2) if end == 0 else (-1, -2, -3)
+        return np.asarray((-3 * y[a] + 4 * y[b] - y[c]) / (t[c] - t[a]))
+
+    mirror = np.array([1, -1, 1])
+    for name, image in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
+        np.testing.assert_allclose(rate(double, name, 0), rate(single, name, -1), rtol=0, atol=DIFFERENCE_TOLERANCE)
+        np.testing.assert_allclose(
+            rate(double, name, -1), mirror * rate(single, image, 0), rtol=0, atol=DIFFERENCE_TOLERANCE
+        )
+    expected = [x[at_speed.variable_index(f"hip_v{axis}_touch_down_m_s")] for axis in "xyz"]
+    np.testing.assert_allclose(rate(single, "hip", -1), expected, rtol=0, atol=DIFFERENCE_TOLERANCE)
+
+
+@pytest.mark.slow
+def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
+    x = candidates(at_speed)[0]
+    signals = at_speed.signals(x)
+    assert (np.diff(signals.arrays["t"]) > 0.0).all()
+    assert all(len(array) == 21 for array in signals.arrays.values())
+    assert signals.arrays["t"][-1] == pytest.approx(2.4)
+
+
+@pytest.mark.slow
+def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]) -> None:
+    robot = load_robot("nao-v5")
+    model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
+    for _, single, _ in sampled:
+        for sample in range(11):
+            oracle = stand(model, "LAnkleRoll", ankle, *_state(single, sample), GRAVITY)
+            expected = [oracle.torques[joint] for joint in single.joints]
+            np.testing.assert_allclose(single.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+            np.testing.assert_allclose(single.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", ["printed", "lever"])
+def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> None:
+    problem, robot = load("nao-cycle", torso_share=rule), load_robot("nao-v5")
+    for x in candidates(problem)[:2]:
+        _, double = phases(problem, x)
+        step = x[problem.variable_index("step_length_m")]
+        for sample in range(11):
+            near_left = (double.arrays["hip"][sample, 1] + 0.05) / 0.1
+            if not 0.0 < near_left < 1.0:
+                continue  # no body has a negative mass
+            left_share = near_left if rule == "lever" else 1.0 - near_left
+            halves: dict[str, Standing] = {}
+            for side, share, xy in (("L", left_share, (0.0, 0.05)), ("R", 1.0 - left_share, (step, -0.05))):
+                ankle = np.array([*xy, robot.feet["left"].ankle_height_m])
+                model = floating_model(robot, share, prefix=side)
+                halves[side] = stand(model, f"{side}AnkleRoll", ankle, *_state(double, sample), GRAVITY)
+            expected = [halves[joint[0]].torques[joint] for joint in double.joints]
+            np.testing.assert_allclose(double.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+            loads = np.array([half.ground_load for half in halves.values()])
+            if (loads > 1.0).all():  # below a thousandth of the weight the model takes that share
+                zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
+                np.testing.assert_allclose(double.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+
+
+def _state(signals: Signals, sample: int) -> tuple[dict[str, float], ...]:
+    return tuple(
+        dict(zip(signals.joints, map(float, signals.arrays[name][sample]), strict=True)) for name in ("q", "qd", "qdd")
+    )
+
+
+@pytest.mark.slow
+def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
+    free = load("nao-cycle")
+    for x, *halves in sampled:
+        times = [x[at_speed.variable_index(f"{phase}_support_time_s")] for phase in ("single", "double")]
+        energy, step = 0.0, 0.03 * sum(times)
+        for signals in halves:
+            tau, qd, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
+            energy += float(np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
+        power = evaluated(at_speed, x).cost
+        assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
+        per_metre = evaluated(free, np.append(x, step)).cost
+        assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
+        figures = evaluated(at_speed, x).indexes
+        assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
+        assert figures["energy_J_per_m"] == pytest.approx(energy / step, rel=ROUNDING)
+        weight = load_robot("nao-v5").mass_kg * GRAVITY
+        assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
+
+
+@pytest.mark.slow
+def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
+    x, single, double = sampled[0]
+    figures = evaluated(at_speed, x).indexes
+    touch_down = double.arrays["tau"][0] - single.arrays["tau"][-1]
+    lift_off = mirrored_row(single, "tau", 0) - double.arrays["tau"][-1]
+    assert figures["touch_down_torque_jump_Nm"] == pytest.approx(np.abs(touch_down).max(), rel=ROUNDING)
+    assert figures["lift_off_torque_jump_Nm"] == pytest.approx(np.abs(lift_off).max(), rel=ROUNDING)
+
+
+def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
+    x = candidates(at_speed)[0]
+    fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
+    found = evaluated(fast, x)
+    row = found.row_names.index("step_length")
+    assert found.g[row] == pytest.approx(0.144) and found.upper[row] == pytest.approx(0.122)
+
+
+def test_the_published_limits_are_the_defaults() -> None:
+    problem = load("nao-cycle")
+    means = [problem.value(f"{phase}_dbm_{axis}_mean_limit_m") for phase in ("ssp", "dsp") for axis in "xy"]
+    assert means == [0.05, 0.02, 0.08, 0.08]
+    assert problem.value("torque_change_limit_Nm") == 1.2
+
+
+def test_the_hip_and_the_step_range_over_shares_of_the_legs_length() -> None:
+    """Which is 0.2029 m."""
+    problem = load("nao-cycle")
+    ranges = {"hip_x_lift_off_m": (-0.051, 0.051), "hip_x_touch_down_m": (-0.02, 0.101), "step_length_m": (0.02, 0.122)}
+    for name, bounds in ranges.items():
+        k = problem.variable_index(name)
+        assert (problem.lower[k], problem.upper[k]) == bounds
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("objective", "speed", "objective must be one of energy-per-metre, power"),
+        ("torso_share", "half", "printed, lever, free"),
+    ],
+)
+def test_unknown_options_are_refused(option: str, value: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load("nao-cycle", **{option: value})

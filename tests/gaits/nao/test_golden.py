@@ -1,0 +1,175 @@
+"""The NAO problems against numbers computed elsewhere, and what their options change."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from casadi import SX
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import load
+from nlp_gait.gaits.biped.double_support import TorsoShare, torso_shares
+from tests.evaluation import evaluated
+
+GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
+LABELS = [row["label"] for row in GOLDEN["rows"]]
+# The golden numbers are printed with six digits after the point: half a unit of the last one, twice for safety.
+GOLDEN_TOLERANCE = 2e-6
+# Finite differences over a tenth of the phase: the paper's own setting, 1 to 3 % off in power.
+FINITE_DIFFERENCE_SHARE = 0.035
+# The size up to which IPOPT's callbacks stay fast without compiling.
+MOST_INSTRUCTIONS = 5000
+
+NAMES = ("nao-ssp", "nao-dsp")
+
+
+@pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
+def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
+    got = evaluated(load(row["problem"]), row["x"]).indexes
+    assert list(got) == GOLDEN["indexes"]
+    assert list(got.values()) == pytest.approx(row["values"], rel=0, abs=GOLDEN_TOLERANCE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
+def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> None:
+    solution = solve(load(optimum["problem"], **optimum["options"]), starts=2, seed=1)
+    assert [start.success for start in solution.starts] == [True, True]
+    for start in solution.starts:
+        assert start.objective == pytest.approx(optimum["power_W"], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", GOLDEN["rows"], ids=LABELS)
+def test_finite_differences_change_the_power_by_little_and_not_by_nothing(row: dict[str, Any]) -> None:
+    power = evaluated(load(row["problem"], derivatives="finite-difference"), row["x"]).indexes["power_W"]
+    analytic = row["values"][0]
+    assert 1e-4 < abs(power / analytic - 1) < FINITE_DIFFERENCE_SHARE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", GOLDEN["rows"][::2], ids=LABELS[::2])
+def test_with_many_intervals_finite_differences_become_the_derivatives(row: dict[str, Any]) -> None:
+    """One-sided differences at the ends err by the first power of the step: 1,000 intervals leave less than 1e-3."""
+    powers = [
+        evaluated(load(row["problem"], derivatives=kind, intervals=1000), row["x"]).indexes["power_W"]
+        for kind in ("analytic", "finite-difference")
+    ]
+    assert powers[0] == pytest.approx(powers[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_function_of_one_sample_stays_small(name: str) -> None:
+    functions = {f.name(): f for f in exact_model(load(name)).function.find_functions()}
+    assert functions["sample"].n_instructions() < MOST_INSTRUCTIONS
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
+def test_other_versions_of_the_robot_give_a_similar_but_other_gait(name: str, robot: str) -> None:
+    row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
+    power = evaluated(load(name, robot=robot), row["x"]).indexes["power_W"]
+    assert 1e-5 < abs(power / row["values"][0] - 1) < 0.1  # masses differ by at most 2 %
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_point_masses_change_torques_a_little(name: str) -> None:
+    row = next(row for row in GOLDEN["rows"] if row["problem"] == name)
+    power = evaluated(load(name, rotational_inertia=False), row["x"]).indexes["power_W"]
+    assert 1e-6 < abs(power / row["values"][0] - 1) < 0.02  # the gaits are slow: gravity rules
+
+
+@pytest.mark.parametrize(
+    ("hip_y", "printed_left", "lever_left"), [(0.05, 0.0, 1.0), (0.025, 0.25, 0.75), (0.0, 0.5, 0.5), (-0.05, 1.0, 0.0)]
+)
+def test_the_leg_under_the_hip_carries_nothing_as_printed_and_all_by_the_lever_rule(
+    hip_y: float, printed_left: float, lever_left: float
+) -> None:
+    rules: dict[TorsoShare, float] = {"printed": printed_left, "lever": lever_left}
+    for rule, left in rules.items():
+        shares = torso_shares(SX(hip_y), rule)
+        assert (float(shares["L"]), float(shares["R"])) == pytest.approx((left, 1 - left))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_only_single_support_smooths_its_jump(name: str) -> None:
+    assert nlp_model(load(name)).smoothed == (name == "nao-ssp")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
+    x = next(row["x"] for row in GOLDEN["rows"] if row["problem"] == name)
+    coarse = load(name).with_values(torque_change_limit_Nm=0.9)
+    dense = coarse.dense(100)
+    assert dense is not None
+    assert dense.value("torque_change_limit_Nm") == 0.9
+    few, many = evaluated(coarse, x).indexes, evaluated(dense, x).indexes
+    assert many["power_W"] == pytest.approx(few["power_W"], rel=0.02)
+    assert many["dbm_y_min_m"] <= few["dbm_y_min_m"] + 1e-12  # the dense grid contains the coarse one
+    assert many["torque_change_Nm"] >= few["torque_change_Nm"] - 1e-12  # still over a tenth of the phase
+
+
+@pytest.mark.parametrize("kind", ["analytic", "finite-difference"])
+@pytest.mark.parametrize("name", NAMES)
+def test_the_exact_functions_are_finite_where_a_motion_degenerates(name: str, kind: str) -> None:
+    """Random points: ``tests/properties/test_every_problem.py``."""
+    problem = load(name, derivatives=kind)
+    no_time = [0.31, 0, 0, 0.01, 0.01, 0, 0, 0.02, 0.0]
+    hip_joints_at_ankle_height = [0.04519 + 0.085, 0, 0, 0, 0, 0, 0, 0.02, 1.0]
+    for x in ([0.0] * 9, no_time, hip_joints_at_ankle_height, [1e6] * 9):
+        duration = x[-1:]
+        found = evaluated(problem, [*x[: len(problem.names) - 1], *duration])
+        assert np.isfinite([found.cost, found.violation, *found.g]).all()
+
+
+def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
+    problem = load("nao-ssp")
+    found = evaluated(problem, [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
+    assert np.isfinite(found.cost)
+    assert found.violation > 0
+    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in found.broken)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"intervals": 0}, "intervals must be a whole number >= 1, got 0"),
+        ({"intervals": 2.5}, r"intervals must be a whole number, got 2\.5"),
+        ({"samples_per_interval": -1}, "samples_per_interval must be a whole number >= 1, got -1"),
+        ({"derivatives": "exact"}, "derivatives must be one of analytic, finite-difference, got 'exact'"),
+    ],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_options_that_make_no_problem_are_refused(name: str, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load(name, **options)
+
+
+def test_an_unknown_torso_share_is_refused() -> None:
+    with pytest.raises(InputError, match="torso_share must be one of printed, lever, free, got 'half'"):
+        load("nao-dsp", torso_share="half")
+
+
+def test_a_robot_without_arms_does_not_suit_the_problems(tmp_path: Path) -> None:
+    inertia = [1e-3, 1e-3, 1e-3, 0, 0, 0]
+    foot = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04, "link": "torso"}
+    raw = {
+        "schema": 1,
+        "name": "stump",
+        "root": "torso",
+        "links": {"torso": {"mass_kg": 1.0, "com_m": [0, 0, 0], "inertia_com_kgm2": inertia}},
+        "joints": {},
+        "feet": {"left": foot, "right": foot},
+    }
+    path = tmp_path / "stump.json"
+    path.write_text(json.dumps(raw), encoding="utf-8")
+    with pytest.raises(InputError, match="robot 'stump' does not suit the NAO problems: unknown joint"):
+        load("nao-ssp", robot=str(path))

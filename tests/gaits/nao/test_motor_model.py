@@ -1,0 +1,181 @@
+"""Formulas of real motors at made-up samples, against NumPy: what they draw, what limits them, which joints share one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import DM, MX
+
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import Array, Constraint
+from nlp_gait.gaits.biped.motors import SUPPLY, Motors
+from nlp_gait.gaits.biped.parts import Part
+from nlp_gait.gaits.biped.samples import Samples
+from nlp_gait.gaits.nao.body import JOINTS
+from nlp_gait.gaits.nao.motors import ANKLE_ROLL, SHARED, nao_motors
+from nlp_gait.robots import load_robot
+from nlp_gait.symbolic.nonsmooth import Exact
+
+ROBOT = load_robot("nao-v5")
+MOTORS = tuple(joint for joint in JOINTS if joint != "RHipYawPitch")
+MOVING = tuple(joint for joint in reversed(MOTORS) if "Hip" in joint or "Knee" in joint or "Ankle" in joint)
+COUNT = 4  # of samples
+AT: Mapping[str, MX] = {"supply_share": MX(0.8), "heat_loss_W_per_Nm2": MX(0.03)}
+RNG = np.random.default_rng(5)
+TORQUE = RNG.normal(size=(len(JOINTS), COUNT))
+POWER, Q, QD = (RNG.normal(size=(len(MOVING), COUNT)) for _ in range(3))
+Q[:, 0], Q[:, 1] = -1.5, 1.2  # beyond both ends of the ankles' table
+SAMPLES = Samples(
+    joints=JOINTS,
+    moving=MOVING,
+    per_interval=1,
+    duration=MX(1.0),
+    planned=MX(0, COUNT),
+    reach=MX(0, COUNT),
+    torque=MX(DM(TORQUE)),
+    power=MX(DM(POWER)),
+    zmp=MX(2, COUNT),
+    motion=(MX(DM(Q)), MX(DM(QD)), MX(DM(QD))),
+    traces={},
+)
+
+
+def number(value: MX | None) -> Array | None:
+    return None if value is None else np.array(ca.evalf(value)).T.ravel()
+
+
+def mean(samples: Array) -> Array:
+    """By the trapezoidal rule over the last axis."""
+    return np.asarray((samples[..., :-1] + samples[..., 1:]).sum(axis=-1) / 2 / (COUNT - 1))
+
+
+def at_motors() -> Array:
+    """Torques with those of both hip yaw-pitch joints at the left one's motor."""
+    found = TORQUE.copy()
+    found[JOINTS.index("LHipYawPitch")] += found[JOINTS.index("RHipYawPitch")]
+    return np.delete(found, JOINTS.index("RHipYawPitch"), axis=0)
+
+
+def ratings(name: str) -> Array:
+    return np.array([getattr(ROBOT.joint(joint).motor, name) for joint in MOTORS])
+
+
+def contributed(part: Part) -> dict[str, Constraint]:
+    return {row.name: row for row in part.contribute(AT, SAMPLES, Exact()).rows}  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("heat", ["", "heat"])
+@pytest.mark.parametrize("braking", ["", "free-braking", "regeneration"])
+def test_power(braking: str, heat: str) -> None:
+    draw = nao_motors(f" {braking} ,{heat}, limits", ROBOT).draw
+    if not braking and not heat:
+        assert draw is None  # the paper's way
+        return
+    assert draw is not None
+    driven = {"": np.abs, "free-braking": lambda p: np.maximum(p, 0.0), "regeneration": np.asarray}[braking](POWER)
+    warm = 0.03 * (TORQUE**2).sum(axis=0)
+    if heat:
+        warm = ratings("heat_W_per_Nm2") @ at_motors() ** 2
+    (found,) = number(draw(AT, SAMPLES, Exact()))  # type: ignore[arg-type]
+    np.testing.assert_allclose(found, mean(driven.sum(axis=0) + warm), rtol=1e-12)
+
+
+def test_limits() -> None:
+    (part,) = nao_motors("limits, rotor", ROBOT).parts
+    assert part.reads_motion and part.parameters == (SUPPLY,)
+    assert (SUPPLY.default, SUPPLY.minimum, SUPPLY.maximum) == (1.0, 0.05, 2.0)
+    found = contributed(part)
+    assert list(found) == ["joint_speed", "torque_forwards", "torque_backwards", "continuous_torque"]
+    instants = [str(k) for k in range(COUNT)]
+    for name, joints, unit in (("joint_speed", MOVING, "rad/s"), ("torque_forwards", MOTORS, "Nm")):
+        assert found[name].labels == tuple(f"{joint}, {k}" for k in instants for joint in joints)
+        assert (found[name].unit, found[name].over) == (unit, "instant")
+
+    speed = np.array([ROBOT.joint(joint).velocity_limit_rad_s for joint in MOVING])
+    np.testing.assert_array_equal(number(found["joint_speed"].value), QD.T.ravel())
+    for bound, sign in ((found["joint_speed"].lower, -1.0), (found["joint_speed"].upper, 1.0)):
+        np.testing.assert_allclose(number(bound), sign * np.tile(speed, COUNT), rtol=1e-15)
+
+    rate = np.zeros((len(MOTORS), COUNT))
+    rate[[MOTORS.index(joint) for joint in MOVING]] = QD
+    stall = ratings("stall_torque_Nm")
+    drop = (stall / ratings("no_load_rad_s"))[:, None] * rate
+    for name, sign in (("torque_forwards", 1.0), ("torque_backwards", -1.0)):
+        value = at_motors() + sign * drop
+        np.testing.assert_allclose(number(found[name].value), value.T.ravel(), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(number(found[name].upper), 0.8 * np.tile(stall, COUNT), rtol=1e-14)
+        np.testing.assert_allclose(number(found[name].lower), -0.8 * np.tile(stall, COUNT), rtol=1e-14)
+
+    warm = found["continuous_torque"]
+    assert (warm.labels, warm.lower, warm.over) == (MOTORS, None, "root-mean-square")
+    np.testing.assert_allclose(number(warm.value), np.sqrt(mean(at_motors() ** 2)), rtol=1e-12)
+    np.testing.assert_allclose(number(warm.upper), ratings("continuous_torque_Nm"), rtol=1e-15)
+
+
+def test_ankles() -> None:
+    (part,) = nao_motors("ankle", ROBOT).parts
+    assert part.reads_motion
+    found, corners = contributed(part), np.array(ANKLE_ROLL)
+    assert len(found) == 4
+    for side, sign, least, greatest in (("L", 1.0, 1, 2), ("R", -1.0, 2, 1)):
+        pitch, roll = (Q[MOVING.index(f"{side}Ankle{axis}")] for axis in ("Pitch", "Roll"))
+        for name, column in (("least", least), ("greatest", greatest)):
+            row = found[f"{side}AnkleRoll_{name}"]
+            assert (row.unit, row.labels, row.over) == ("rad", tuple(str(k) for k in range(COUNT)), "instant")
+            line = sign * np.interp(pitch, corners[:, 0], corners[:, column])
+            np.testing.assert_allclose(number(row.value), roll - line, rtol=0, atol=1e-14)
+            lower, upper = number(row.lower), number(row.upper)
+            assert (lower, upper) == ((0.0, None) if name == "least" else (None, 0.0))
+
+
+def test_the_ankles_table_is_round_in_degrees() -> None:
+    """Pitch, least and greatest roll, once more in the unit in which somebody chose them."""
+    table = [
+        *((-68.15, -2.86, 4.30), (-48.13, -10.31, 9.74), (-40.11, -22.80, 12.61), (-25.78, -22.80, 44.06)),
+        *((5.73, -22.80, 44.06), (20.05, -22.80, 31.54), (52.87, 0.0, 2.86)),
+    ]
+    np.testing.assert_allclose(np.degrees(ANKLE_ROLL), table, rtol=0, atol=5e-5)
+
+
+def test_features() -> None:
+    both = nao_motors("ankle, limits", ROBOT)
+    assert both.features == ("ankle", "limits") and len(both.parts) == 2
+    none = nao_motors("", ROBOT)
+    assert none.features == () and none.parts == () and none.draw is None and none.model is ROBOT
+    heavy = nao_motors("rotor", ROBOT)
+    assert heavy.parts == () and heavy.draw is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
+    with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
+        Motors.parsed("ankle", ROBOT, JOINTS)
+    with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
+        nao_motors("ankles", ROBOT)
+    with pytest.raises(InputError, match="either draws nothing"):
+        nao_motors("regeneration, free-braking", ROBOT)
+
+
+def test_joints_that_share_a_motor() -> None:
+    torque: Any = MX(DM(TORQUE))
+    assert Motors.parsed("heat", ROBOT, JOINTS).by_motor(torque) is torque
+    shared = np.array(ca.evalf(Motors.parsed("heat", ROBOT, JOINTS, SHARED).by_motor(torque)))
+    np.testing.assert_allclose(np.delete(shared, JOINTS.index("RHipYawPitch"), axis=0), at_motors(), rtol=1e-15)
+    assert not shared[JOINTS.index("RHipYawPitch")].any()
+    inertia = {
+        name: motors.model.armatures_kgm2["LHipYawPitch"]
+        for name, motors in (
+            ("one each", Motors.parsed("rotor", ROBOT, JOINTS)),
+            ("one for two", nao_motors("rotor", ROBOT)),
+        )
+    }
+    assert inertia["one each"] == 2 * inertia["one for two"] > 0.0
+
+
+def test_a_robot_without_motors_is_refused() -> None:
+    knee = ROBOT.joint("LKneePitch")
+    bare = replace(ROBOT, joints={**ROBOT.joints, "LKneePitch": replace(knee, motor=None)})
+    assert nao_motors("", bare).model is bare and nao_motors("ankle", ROBOT).model is ROBOT
+    with pytest.raises(InputError, match="'LKneePitch' has no motor data"):
+        nao_motors("limits", bare)

@@ -1,0 +1,170 @@
+"""Real motors in the NAO problems, against numbers by hand from the time histories."""
+
+from __future__ import annotations
+
+import json
+import math
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+from casadi import MX, Function
+from scipy.integrate import trapezoid
+
+from nlp_gait import load, solve
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.gaits.nao.motors import ANKLE_ROLL, ankle_roll
+from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
+
+X = np.array([0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0])
+
+
+def mean(samples: np.ndarray) -> np.ndarray:
+    return trapezoid(samples, axis=0) / (len(samples) - 1)
+
+
+def test_without_features_it_is_the_same_problem() -> None:
+    plain, empty = load("nao-ssp"), load("nao-ssp", motors="")
+    assert plain.options == empty.options and "motors" not in plain.options
+    one, other = evaluated(plain, X), evaluated(empty, X)
+    assert (one.cost, one.rows) == (other.cost, other.rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("features", ["free-braking", "regeneration", "heat", "heat,free-braking"])
+def test_power_is_that_of_the_time_histories(features: str) -> None:
+    problem = load("nao-ssp", motors=features)
+    signals = problem.signals(X)
+    torque, rate = signals.arrays["tau"], signals.arrays["qd"]
+    driven = torque * rate
+    if "free-braking" in features:
+        driven = np.maximum(driven, 0.0)
+    elif "regeneration" not in features:
+        driven = np.abs(driven)
+    if "heat" in features:
+        robot = load_robot("nao-v5")
+        heat = np.zeros(len(torque))
+        shared = torque[:, signals.joints.index("LHipYawPitch")] + torque[:, signals.joints.index("RHipYawPitch")]
+        for k, joint in enumerate(signals.joints):
+            motor = robot.joint(joint).motor
+            assert motor is not None
+            at_motor = {"LHipYawPitch": shared, "RHipYawPitch": 0.0 * shared}.get(
+                joint, torque[:, k]
+            ) / motor.gear_ratio
+            # R I^2 with I = torque / k_t, k_t = V / no-load speed and R = k_t V / stall torque, at any voltage.
+            voltage = 21.6
+            k_t = voltage / (motor.no_load_rpm * math.tau / 60.0)
+            resistance = k_t * voltage / (motor.stall_torque_mNm / 1000.0)
+            heat += resistance * (at_motor / k_t) ** 2
+    else:
+        heat = 0.025 * (torque**2).sum(axis=1)
+    assert evaluated(problem, X).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_limits_are_those_of_the_data_sheet() -> None:
+    problem = load("nao-ssp", motors="limits")
+    signals = problem.signals(X)
+    knee = signals.joints.index("LKneePitch")
+    torque, rate = signals.arrays["tau"][:, knee], signals.arrays["qd"][:, knee]
+    motor = load_robot("nao-v5").joint("LKneePitch").motor
+    assert motor is not None
+    assert motor.stall_torque_Nm == pytest.approx(8.5053, abs=1e-4)
+    assert motor.no_load_rad_s == pytest.approx(6.9626, abs=1e-4)
+    rows = evaluated(problem, X).rows
+    slope = motor.stall_torque_Nm / motor.no_load_rad_s
+    for k in (0, 5, 10):
+        assert rows[f"joint_speed[LKneePitch, {k}]"] == pytest.approx(rate[k], abs=1e-12)
+        assert rows[f"torque_forwards[LKneePitch, {k}]"] == pytest.approx(torque[k] + slope * rate[k])
+        assert rows[f"torque_backwards[LKneePitch, {k}]"] == pytest.approx(torque[k] - slope * rate[k])
+    assert rows["continuous_torque[LKneePitch]"] == pytest.approx(math.sqrt(mean(torque**2)))
+
+
+@pytest.mark.slow
+def test_a_flat_battery_binds() -> None:
+    """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
+    problem = load("nao-dsp", motors="limits")
+    weak = solve(problem.with_values(supply_share=0.18))
+    assert weak.success
+    assert any(a.name.startswith("torque_") and "[" in a.name for a in weak.active_constraints)
+    assert weak.objective > solve(problem).objective + 1e-4
+
+
+def test_the_ankles_roll_follows_the_table() -> None:
+    pitch = MX.sym("pitch")
+    for column in (1, 2):
+        line = Function("line", [pitch], [ankle_roll(pitch, column)])
+        for row in ANKLE_ROLL:
+            assert float(line(row[0])) == pytest.approx(row[column], abs=1e-9)
+        middle = (ANKLE_ROLL[2][0] + ANKLE_ROLL[3][0]) / 2
+        expected = (ANKLE_ROLL[2][column] + ANKLE_ROLL[3][column]) / 2
+        assert float(line(middle)) == pytest.approx(expected, abs=1e-9)
+        assert float(line(-3.0)) == pytest.approx(ANKLE_ROLL[0][column])
+
+
+def test_ankle_rows_mirror() -> None:
+    rows = evaluated(load("nao-ssp", motors="ankle"), X).rows
+    for side in "LR":
+        assert all(rows[f"{side}AnkleRoll_least[{k}]"] > 0.0 for k in range(11))
+        assert all(rows[f"{side}AnkleRoll_greatest[{k}]"] < 0.0 for k in range(11))
+
+
+def test_an_index_keeps_the_papers_power() -> None:
+    problem = load("nao-ssp", motors="heat")
+    found = evaluated(problem, X)
+    assert found.indexes["paper_power_W"] == pytest.approx(evaluated(load("nao-ssp"), X).cost)
+    assert found.indexes["power_W"] == found.cost
+
+
+@pytest.mark.parametrize(
+    ("features", "error", "said"),
+    [
+        ("limit", UnknownNameError, "limits"),
+        ("regeneration,free-braking", InputError, "either"),
+    ],
+)
+def test_nonsense_is_refused(features: str, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        load("nao-ssp", motors=features)
+
+
+def test_both_are_played_with_the_rotors_that_the_gait_was_planned_with() -> None:
+    for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
+        plain, heavy = load(name).playback, load(name, motors="rotor").playback
+        assert plain is not None and not plain.robot.armatures_kgm2
+        assert heavy is not None and heavy.robot.armatures_kgm2["LKneePitch"] == pytest.approx(4.2e-7 * 130.85**2)
+        assert heavy.robot.armatures_kgm2["RAnkleRoll"] == pytest.approx(4.2e-7 * 201.3**2)
+        assert heavy.robot.armatures_kgm2["LHipYawPitch"] == pytest.approx(4.2e-7 * 201.3**2 / 2)  # one motor for two
+
+
+def test_a_robot_whose_rotors_are_unknown_is_refused(tmp_path: Path) -> None:
+    data = json.loads((resources.files("nlp_gait.robots") / "data" / "nao-v5.json").read_text())
+    del data["joints"]["LKneePitch"]["motor"]["rotor_inertia_gcm2"]
+    path = tmp_path / "unknown.json"
+    path.write_text(json.dumps(data))
+    load("nao-ssp", robot=str(path), motors="limits")
+    with pytest.raises(InputError, match="'LKneePitch' has no rotor_inertia_gcm2"):
+        load("nao-ssp", robot=str(path), motors="rotor")
+
+
+@pytest.mark.slow
+def test_a_cycle_pays_for_its_rotors_and_real_motors() -> None:
+    """Energy of the cycle from its time histories: with free braking and rotors, phase by phase."""
+    problem = load("nao-cycle", motors="rotor,free-braking")
+    x = (problem.lower + problem.upper) / 2
+    x[problem.names.index("single_support_time_s")] = 0.4  # accelerations large enough for rotors to matter
+    signals = problem.signals(x)
+    torque, rate, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
+    power = (np.maximum(torque * rate, 0.0) + 0.025 * torque**2).sum(axis=1)
+    single = evaluated(problem, x).indexes["ssp_power_W"]
+    assert single == pytest.approx(float(mean(power[:11])), rel=1e-9)
+    assert t[10] == pytest.approx(0.4)
+    light = evaluated(load("nao-cycle", motors="free-braking"), x).indexes["ssp_power_W"]
+    assert abs(single / light - 1.0) > 0.01
+
+
+def test_another_objective_has_no_power_to_change() -> None:
+    with pytest.raises(InputError, match="objective is joint_jerk"):
+        load("nao-dsp", objective="jerk", motors="heat")

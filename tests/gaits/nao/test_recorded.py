@@ -1,0 +1,173 @@
+"""Motions from elsewhere: judged as planned ones are, mirrored if need be, against Pinocchio and against our own optima."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.judge import Evaluation, evaluate
+from nlp_gait import load
+from nlp_gait.errors import GaitError
+from nlp_gait.export.formats import write_as
+from nlp_gait.export.motions import read_gait
+from nlp_gait.formulation import Result
+from nlp_gait.gaits.nao.body import GRAVITY, JOINTS
+from nlp_gait.gaits.nao.recorded.motion import JointAngles
+from nlp_gait.gaits.nao.recorded.problem import Recorded, recorded
+from nlp_gait.robots import load_robot
+from nlp_gait.robots.mirror import mirror_sign, partner
+from tests.pinocchio_oracle import floating_model, stand
+
+ROBOT = load_robot("nao-v5")
+# Feasible points of the planned problems; a spline through samples 10 or 20 ms apart is this near to a cubic hip.
+GAITS = {
+    "nao-ssp": (0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.02, 2.0),
+    "nao-dsp": (0.30, 0.0, 0.0, 0.05, 0.05, -0.05, -0.05, 1.0),
+}
+SHARE = 1e-4
+
+
+@cache
+def planned(name: str) -> Result:
+    problem = load(name)
+    if name in GAITS:
+        return Result(problem=problem, x=problem.check_x(GAITS[name]))
+    x = 0.5 * (problem.lower + problem.upper)
+    x[problem.names.index("hip_vy_lift_off_m_s")] = 0.0
+    return Result(problem=problem, x=x)
+
+
+def written(folder: Path, name: str, period_ms: int = 10) -> Path:
+    path = folder / f"{name}.csv"
+    write_as("csv", path, planned(name), period_ms)
+    return path
+
+
+def judged(gait: Recorded) -> Evaluation:
+    return evaluate(gait.problem, np.array(gait.x))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-cycle"])
+def test_a_planned_gait_that_comes_back_is_judged_as_it_was(name: str, tmp_path: Path) -> None:
+    gait = recorded(read_gait(written(tmp_path, name, 5 if name == "nao-cycle" else 10), ROBOT))
+    assert gait.gait == name and not gait.motion.mirrored and gait.lean_deg < 1e-4
+    own, before = judged(gait), evaluate(planned(name).problem, planned(name).x)
+    share = 20 * SHARE if name == "nao-cycle" else SHARE
+    for index, value in before.indexes.items():
+        assert own.indexes[index] == pytest.approx(value, rel=share, abs=share), index
+    rows = {row.name: row.value for row in own.constraints}
+    for row in before.constraints:
+        if row.name.split("[")[0] in ("joint_angle", "torque_change", "dbm_x", "dbm_y", "dbm_x_mean", "dbm_y_mean"):
+            assert rows[row.name] == pytest.approx(row.value, rel=share, abs=share), row.name
+
+
+def test_its_own_limits_are_found_broken(tmp_path: Path) -> None:
+    """Faster and lower than the phase allows: its time, the hip's velocities and height, and the swing height."""
+    problem = load("nao-ssp")
+    low = problem.with_values(
+        **{"hip_height_m.lower": 0.2, "swing_height_m.lower": 0.0, "single_support_time_s.lower": 0.1}
+    )
+    x = low.check_x((0.24, 0.0, 0.0, 0.3, 0.0025, 0.0, 0.0, 0.01, 0.3))
+    path = tmp_path / "fast.csv"
+    write_as("csv", path, Result(problem=low, x=x), 5)
+    broken = {row.name for row in judged(recorded(read_gait(path, ROBOT))).violations}
+    assert {"hip_z_start", "hip_z_end", "hip_vx_start", "swing_height", "bounds[single_support_time_s]"} <= broken
+    assert not any(name.startswith(("foot_stands", "feet_apart", "hip_vx_end")) for name in broken)
+
+
+def angles_of(path: Path) -> JointAngles:
+    return read_gait(path, ROBOT)
+
+
+@pytest.mark.slow
+def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
+    angles = angles_of(written(tmp_path, "nao-ssp"))
+    columns = [angles.joints.index(partner(name)) for name in angles.joints]
+    signs = np.array([mirror_sign(ROBOT, name) for name in angles.joints])
+    turned = JointAngles(owner="turned", joints=angles.joints, t=angles.t + 3.0, q=signs * angles.q[:, columns])
+    gait, straight = recorded(turned), recorded(angles)
+    assert gait.motion.mirrored and gait.gait == "nao-ssp"
+    assert judged(gait).indexes["power_W"] == pytest.approx(judged(straight).indexes["power_W"], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
+    """Every joint moves, the torso leans; nothing of it is planned."""
+    rng, t = np.random.default_rng(3), np.linspace(0.0, 1.2, 60)
+    base = angles_of_stance()
+    waves = 0.1 * np.sin(np.outer(t, rng.uniform(2.0, 5.0, len(JOINTS))) + rng.uniform(0, 6, len(JOINTS)))
+    gait = recorded(JointAngles(owner="waves", joints=JOINTS, t=t, q=base + waves), gait="nao-ssp")
+    assert gait.lean_deg > 1.0
+    signals, model = gait.problem.signals(gait.x), floating_model(ROBOT)
+    ankle = np.array(gait.motion.stance.support)
+    for sample in range(0, 11, 2):
+        motion = [dict(zip(JOINTS, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")]
+        oracle = stand(model, "LAnkleRoll", ankle, *motion, GRAVITY)
+        expected = [oracle.torques[joint] for joint in JOINTS]
+        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(signals.arrays["hip"][sample], oracle.torso, rtol=0, atol=1e-12)
+
+
+def angles_of_stance() -> np.ndarray:
+    standing = planned("nao-ssp").problem.signals(planned("nao-ssp").x)
+    return np.asarray(standing.arrays["q"][0][[standing.joints.index(name) for name in JOINTS]])
+
+
+def test_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
+    """The hip's velocity comes from the joints' rates through the chain of links."""
+    gait = recorded(angles_of(written(tmp_path, "nao-ssp")))
+    x = planned("nao-ssp").x
+    rows = {row.name: row.value for row in judged(gait).constraints}
+    for row, variable in (("hip_vx_start", 3), ("hip_vx_end", 4), ("hip_vy_start", 5), ("hip_vz_end", 2)):
+        assert rows[row] == pytest.approx(x[variable], abs=2e-5)
+    assert rows["hip_z_start"] == pytest.approx(x[0], abs=1e-9) and rows["swing_height"] == pytest.approx(
+        0.02, abs=1e-6
+    )
+
+
+def test_arms_may_be_left_out_and_degrees_are_read(tmp_path: Path) -> None:
+    angles = angles_of(written(tmp_path, "nao-ssp"))
+    legs = [name for name in angles.joints if "Hip" in name or "Knee" in name or "Ankle" in name]
+    lines = ["time," + ",".join(f"{name} [deg]" for name in legs)]
+    for t, row in zip(angles.t, np.degrees(angles.q[:, [angles.joints.index(n) for n in legs]]), strict=True):
+        lines.append(",".join(map(repr, [float(t), *row.tolist()])))
+    (tmp_path / "legs.csv").write_text("\n".join(lines))
+    gait = recorded(angles_of(tmp_path / "legs.csv"))
+    assert len(gait.motion.held) == 10 and gait.motion.duration_s == pytest.approx(2.0)
+    knee = JOINTS.index("LKneePitch")
+    np.testing.assert_allclose(gait.motion.q[:, knee], angles.q[:, angles.joints.index("LKneePitch")], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,LKneePitch\n0,1\n", "has no angles of"),
+        ("LKneePitch\n1\n", "needs a header with a column t of times"),
+        ("t,LKneePich\n0,1\n", "unknown joint in motion .*did you mean .*'LKneePitch'"),
+        ("t,LKneePitch [grad]\n0,1\n", "LKneePitch must be in rad or deg, got \\[grad\\]"),
+        ("t [ms],LKneePitch\n0,1\n", "times must be in s"),
+        ("t\n0\n1\n", "has no angles of"),
+    ],
+)
+def test_a_file_that_is_no_motion_is_refused(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(GaitError, match=message):
+        recorded(angles_of(tmp_path / "m.csv"))
+
+
+def test_a_gait_that_it_is_not_is_refused(tmp_path: Path) -> None:
+    angles = angles_of(written(tmp_path, "nao-ssp"))
+    with pytest.raises(GaitError, match="shows nao-ssp, not nao-cycle"):
+        recorded(angles, gait="nao-cycle")
+    with pytest.raises(GaitError, match="limits of nao-ssp, nao-dsp, nao-cycle, got 'walk12'"):
+        recorded(angles, gait="walk12")
+    with pytest.raises(GaitError, match="touch-down must be within"):
+        recorded(angles, touch_down_s=9.0)
+    short = JointAngles(owner="short", joints=angles.joints, t=angles.t[:3], q=angles.q[:3])
+    with pytest.raises(GaitError, match="has 3 rows; a motion needs 5"):
+        recorded(short)

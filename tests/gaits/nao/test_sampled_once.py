@@ -1,0 +1,63 @@
+"""A phase is evaluated once at its samples, whatever is asked of it: the exact graph has one mapped call for each phase."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import pytest
+
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.formulation import GaitProblem, load
+
+
+def mapped(problem: GaitProblem) -> list[str]:
+    """Names of the functions that are called over the samples."""
+    function = exact_model(problem).function
+    called = [
+        function.instruction_MX(k).which_function()
+        for k in range(function.n_instructions())
+        if function.instruction_id(k) == ca.OP_CALL
+    ]
+    assert called  # the count sees calls
+    return [inner.name() for inner in called if inner.class_name() == "Map"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"motors": "limits"},
+        {"motors": "limits,ankle,heat,free-braking"},
+        {"objective": "torque-smoothness"},
+        {"objective": "jerk"},
+        {"objective": "torque-smoothness", "motors": "limits"},
+        {"objective": "jerk", "motors": "limits,ankle", "trajectory": "quintic", "samples_per_interval": 1},
+    ],
+    ids=lambda options: (
+        " ".join(options.values()) if isinstance(options, dict) and "trajectory" not in options else None
+    ),
+)
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_one_call_for_a_phase(name: str, options: dict[str, Any]) -> None:
+    assert mapped(load(name, **options)) == ["map11_sample"]
+
+
+def test_two_calls_for_a_cycle() -> None:
+    assert mapped(load("nao-cycle")) == ["map11_sample"] * 2
+
+
+def test_a_derived_problem_does_not_evaluate_its_phase_again() -> None:
+    problem = load("nao-ssp", motors="limits").derived(
+        change=lambda gait, point, ops: replace(gait, objective=gait.objective + point["single_support_time_s"])
+    )
+    assert mapped(problem) == ["map11_sample"]
+
+
+def test_finite_differences_need_two() -> None:
+    """Angles at all samples come first, then torques from their differences."""
+    assert mapped(load("nao-ssp", derivatives="finite-difference", motors="limits")) == [
+        "map11_kinematics",
+        "map11_dynamics",
+    ]

@@ -1,0 +1,141 @@
+"""Torques, ZMP and centre of mass of the NAO problems against Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.gaits.nao.body import GRAVITY
+from nlp_gait.robots import load_robot
+from tests.evaluation import evaluated
+from tests.pinocchio_oracle import Standing, floating_model, stand
+
+# Two double-precision algorithms on torques of up to some hundred Nm.
+TORQUE_TOLERANCE_NM = 1e-8
+# The ZMP divides a moment by a ground force that may be small for an infeasible gait.
+ZMP_TOLERANCE_M = 1e-8
+COM_TOLERANCE_M = 1e-12
+# A reachable pose puts the torso where the plan wants it.
+TORSO_TOLERANCE_M = 1e-12
+# Central differences on a grid of 10,000 intervals err by 2e-7 rad/s and rad/s^2 here.
+DIFFERENCE_TOLERANCE = 1e-6
+
+FEASIBLE = {
+    "nao-ssp": (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0),
+    "nao-dsp": (0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0),
+}
+SEEDS = range(6)
+SOLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}  # section 4.2 [m]
+
+
+def motions(problem: GaitProblem) -> list[Array]:
+    """A feasible gait and random ones, most of them infeasible."""
+    return [
+        np.array(FEASIBLE[problem.name]),
+        *(np.random.default_rng(seed).uniform(problem.lower, problem.upper) for seed in SEEDS),
+    ]
+
+
+def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    q, qd, qdd = (
+        dict(zip(signals.joints, map(float, signals.arrays[name][sample]), strict=True)) for name in ("q", "qd", "qdd")
+    )
+    return q, qd, qdd
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
+def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: str) -> None:
+    problem, data = load("nao-ssp", robot=robot), load_robot(robot)
+    model = floating_model(data)
+    ankle = np.array([0.06, 0.05, data.feet["left"].ankle_height_m])
+    for x in motions(problem):
+        signals = problem.signals(x)
+        for sample in range(11):
+            oracle = stand(model, "LAnkleRoll", ankle, *at(signals, sample), GRAVITY)
+            expected = [oracle.torques[joint] for joint in signals.joints]
+            np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+            np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+            np.testing.assert_allclose(signals.arrays["com"][sample], oracle.com, rtol=0, atol=COM_TOLERANCE_M)
+
+
+@pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
+def test_rotors_add_what_pinocchios_armature_adds(robot: str) -> None:
+    problem, data = load("nao-ssp", robot=robot, motors="rotor"), load_robot(robot)
+    model = floating_model(data)
+    for name in model.names[2:]:
+        motor, at_v = data.joint(name).motor, model.joints[model.getJointId(name)].idx_v
+        assert motor is not None and motor.rotor_inertia_gcm2 is not None
+        rotor = motor.rotor_inertia_gcm2 * 1e-7 * motor.gear_ratio**2
+        model.armature[at_v] = rotor / 2 if name.endswith("HipYawPitch") else rotor  # one motor for both of these
+    ankle = np.array([0.06, 0.05, data.feet["left"].ankle_height_m])
+    x = np.array([*FEASIBLE["nao-ssp"][:-1], 0.5])  # accelerations 64 times as large
+    signals = problem.signals(x)
+    without = load("nao-ssp", robot=robot).signals(x)
+    for sample in (0, 3, 10):
+        oracle = stand(model, "LAnkleRoll", ankle, *at(signals, sample), GRAVITY)
+        expected = [oracle.torques[joint] for joint in signals.joints]
+        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+    np.testing.assert_array_equal(signals.arrays["zmp"], without.arrays["zmp"])  # the ground does not feel them
+    assert np.abs(signals.arrays["tau"] - without.arrays["tau"]).max() > 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", ["printed", "lever"])
+def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
+    problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
+    for x in motions(problem):
+        signals = problem.signals(x)
+        for sample in range(11):
+            y = signals.arrays["hip"][sample, 1]
+            near_left = (y + 0.05) / 0.1  # 1 above the left foot, 0 above the right one
+            left_share = near_left if rule == "lever" else 1.0 - near_left
+            halves: dict[str, Standing] = {}
+            for side, share in (("L", left_share), ("R", 1.0 - left_share)):
+                ankle = np.array([*SOLES_XY[side], data.feet["left"].ankle_height_m])
+                model = floating_model(data, share, prefix=side)
+                halves[side] = stand(model, f"{side}AnkleRoll", ankle, *at(signals, sample), GRAVITY)
+            expected = [halves[joint[0]].torques[joint] for joint in signals.joints]
+            loads = np.array([half.ground_load for half in halves.values()])
+            zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
+            np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+            np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_a_feasible_gait_puts_the_torso_where_it_is_planned(name: str) -> None:
+    problem, data = load(name), load_robot("nao-v5")
+    signals = problem.signals(np.array(FEASIBLE[name]))
+    for sample in range(11):
+        for side, foot in (("L", "left"), ("R", "right")):
+            height = np.array([0.0, 0.0, data.feet[foot].ankle_height_m])
+            ankle = signals.arrays[f"{foot}_foot"][sample] + height
+            torso = stand(floating_model(data), f"{side}AnkleRoll", ankle, *at(signals, sample), GRAVITY).torso
+            np.testing.assert_allclose(torso, signals.arrays["hip"][sample], rtol=0, atol=TORSO_TOLERANCE_M)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
+    x = np.array(FEASIBLE[name])
+    problem = load(name).dense(1000)
+    assert problem is not None
+    signals = problem.signals(x)
+    q, qd, qdd, t = (signals.arrays[key] for key in ("q", "qd", "qdd", "t"))
+    step = t[2:, None] - t[:-2, None]
+    np.testing.assert_allclose((q[2:] - q[:-2]) / step, qd[1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
+    np.testing.assert_allclose((qd[2:] - qd[:-2]) / step, qdd[1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
+    assert np.abs(qdd).max() > 0.1  # there is something to compare
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_power_of_the_signals_is_the_objective(name: str) -> None:
+    problem = load(name)
+    for x in motions(problem):
+        signals = problem.signals(x)
+        tau, qd, t = (signals.arrays[key] for key in ("tau", "qd", "t"))
+        power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
+        cost = evaluated(problem, x).cost
+        assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order

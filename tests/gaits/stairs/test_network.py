@@ -1,0 +1,78 @@
+"""The paper's network learns every pose of a step; with the printed rule it does not."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.formulas.leg_network import leg_rates, leg_vector
+from nlp_gait.gaits.stairs.network import NetworkSettings, network_angles
+
+THIGH = SHANK = 0.4
+# A millimetre at the ankle, on a knee bent by at least 0.5 rad.
+ANGLE_TOLERANCE = 6e-3
+
+
+@pytest.fixture
+def path() -> tuple[Array, Array]:
+    """Angles (351, 2) of a swinging leg and where its ankle is."""
+    t = np.linspace(0.0, 1.0, 351)
+    hip = 1.6 - 0.9 * np.sin(np.pi * t) ** 2
+    knee = 0.5 + 1.0 * np.sin(np.pi * t)
+    both = hip + knee
+    ankle = np.column_stack([np.cos(hip) + np.cos(both), -np.sin(hip) - np.sin(both)]) * THIGH
+    return np.column_stack([hip, both]), ankle
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", [NetworkSettings(), NetworkSettings(rule="gradient", rate=0.3)])
+def test_every_pose_is_learned(path: tuple[Array, Array], settings: NetworkSettings) -> None:
+    angles, ankle = path
+    found = network_angles(ankle, THIGH, SHANK, settings)
+    assert (found.error_m2 <= settings.tolerance_m2).all()
+    assert np.abs(found.angles - angles).max() < ANGLE_TOLERANCE
+    assert found.iterations[0] > found.iterations[1:].mean()  # the first pose takes longest
+
+
+def test_the_printed_rate_does_not_converge(path: tuple[Array, Array]) -> None:
+    found = network_angles(path[1][:5], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-4, iterations=500))
+    assert (found.error_m2 > 1e-6).sum() >= 4
+
+
+def test_gradients_by_weights_are_those_of_the_error() -> None:
+    """Against CasADi's derivatives, through one gradient step."""
+    rate, target = 1e-3, np.array([0.1, -0.6])
+    before = network_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-12, iterations=1))
+    after = network_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=rate, iterations=1))
+    rng = np.random.default_rng(0)
+    inner, outer = ca.MX.sym("inner", 10, 2), ca.MX.sym("outer", 2, 10)
+    hip, knee = ca.vertsplit(outer @ (1 / (1 + ca.exp(-(inner @ ca.DM(target))))))
+    x = THIGH * ca.cos(hip) + SHANK * ca.cos(hip + knee)
+    z = -THIGH * ca.sin(hip) - SHANK * ca.sin(hip + knee)
+    error = (x - target[0]) ** 2 + (z - target[1]) ** 2
+    weights = [inner, outer]
+    moved = [w - rate * ca.gradient(error, w) for w in weights]
+    step = ca.Function("step", weights, [error, ca.graph_substitute([error], weights, moved)[0]])
+    start = [rng.standard_normal((10, 2)), rng.standard_normal((2, 10))]
+    expected_before, expected_after = (float(value) for value in step(*start))
+    assert before.error_m2[0] == pytest.approx(expected_before, rel=1e-6)
+    assert after.error_m2[0] == pytest.approx(expected_after, rel=1e-9)
+
+
+def test_rates_of_the_leg_move_its_ankle_as_asked() -> None:
+    angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
+    rates = leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
+    moved = ca.jtimes(leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
+    at = ca.Function("moved", [angles, velocity], [moved, rates])
+    assert at([1.2, 2.0], [0.3, -0.7])[0].full().ravel() == pytest.approx([0.3, -0.7], rel=1e-5)
+    assert np.isfinite(at([1.2, 1.2], [0.3, -0.7])[1].full()).all()  # a straight knee
+
+
+@pytest.mark.parametrize("bad", [{"rule": "newton"}, {"rate": 0.0}, {"hidden": 0}, {"tolerance_m2": -1.0}])
+def test_settings_that_are_not_allowed(bad: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="must be"):
+        NetworkSettings(**bad)

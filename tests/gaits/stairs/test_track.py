@@ -1,0 +1,130 @@
+"""The closed loop: finite at every gain, honest about standing still, and one optimum for search and multiple shooting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from metaheuristics import AntColony, minimize
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+
+# Stiff gains follow the plan of case 2 within 0.05 rad.
+FOLLOWED_RAD = 0.05
+# Power of a falling, whipping robot without damping, mean over the rollout [W]; a robot that walks takes about 50 W.
+LARGEST_COST = 1e6
+# A millimetre at the ankle, on knees bent by at least 0.5 rad; and what it changes of the cost (relative).
+NETWORK_ANGLE_RAD, NETWORK_COST = 6e-3, 0.01
+# The archive of ants and IPOPT end within this of each other (relative).
+AGREEMENT = 1e-5
+# To compile the derivatives takes longer than a short rollout's solve.
+INTERPRETED = nlp_gait.IpoptSettings(compiled=False)
+
+
+@pytest.fixture(scope="module")
+def problem() -> GaitProblem:
+    return nlp_gait.load("stairs-track")
+
+
+def values(problem: GaitProblem, x: list[float]) -> tuple[float, float, dict[str, float]]:
+    """Cost, violation and indexes."""
+    at = exact_model(problem).at(x, problem.p)
+    return at.cost, at.violation, at.indexes
+
+
+def test_stiff_gains_follow_the_plan(problem: GaitProblem) -> None:
+    _, violation, indexes = values(problem, [100.0, 100.0, 1.45])
+    assert violation == 0.0
+    assert indexes["largest_error_rad"] < FOLLOWED_RAD
+    assert indexes["zmp_margin_min_m"] > 0.0
+
+
+def test_doing_nothing_is_rejected_by_the_tolerance(problem: GaitProblem) -> None:
+    _, violation, indexes = values(problem, [0.0, 0.0, 1.45])
+    assert violation > 1.0
+    assert indexes["largest_error_rad"] > 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
+    """However little holds the robot up; what falls undamped costs more than any robot could spend, and is infeasible."""
+    gains = np.linspace(0.0, 100.0, 21)
+    X = np.array([[kp, kd, torso] for kp in gains for kd in gains for torso in (0.8, 1.2, 1.45, 1.75)])
+    f, violation = nlp_gait.compile_objective(problem.with_values(gravity_compensation=share))(X)
+    assert f.max() < LARGEST_COST
+    assert np.isfinite(violation).all()
+    assert (violation[X[:, 1] == 0.0] > 0.0).all()
+
+
+def test_the_printed_explicit_scheme_diverges_and_says_when(problem: GaitProblem) -> None:
+    printed = nlp_gait.load("stairs-track", scheme="explicit").with_values(gravity_compensation=0.0)
+    survived = values(printed, [23.3027, 86.2633, 1.25847])[2]["quanta_before_divergence"]
+    assert 1 <= survived < 20
+    assert values(problem, [23.3027, 86.2633, 1.25847])[2]["quanta_before_divergence"] == 350
+
+
+@pytest.mark.slow
+def test_multiple_shooting_meets_the_ants() -> None:
+    """On the first 0.08 s, which solve in seconds."""
+    short = nlp_gait.load("stairs-track", duration_s=0.08)
+    solution = nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED)
+    assert solution.success, solution.status
+    found = minimize(nlp_gait.compile_objective(short), AntColony(), evaluations=2_000, seed=0)
+    assert found.feasible
+    assert found.objective == pytest.approx(solution.objective, rel=AGREEMENT)
+
+
+def test_signals(problem: GaitProblem) -> None:
+    arrays: dict[str, Array] = dict(problem.signals(np.array([100.0, 100.0, 1.45])).arrays)
+    assert arrays["t"][[0, -1]] == pytest.approx([0.01, 3.5])
+    assert arrays["q"].shape == arrays["qd"].shape == arrays["tau"].shape == (350, 9)
+    error = np.abs(arrays["q"] - arrays["q_desired"]).max()
+    assert error == pytest.approx(values(problem, [100.0, 100.0, 1.45])[2]["largest_error_rad"])
+
+
+@pytest.mark.slow
+def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
+    learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
+    (cost, *_), (known, *_) = values(learned, x), values(problem, x)
+    assert 0.0 < abs(cost - known) < NETWORK_COST * known
+    angles, expected = (p.signals(np.array(x)).arrays["q_desired"] for p in (learned, problem))
+    error = np.abs(angles - expected).max(axis=0)
+    legs = np.isin(LINKS, ("HK", "KA", "HK'", "K'A'"))
+    assert (error[legs] > 0.0).all()
+    assert error.max() < NETWORK_ANGLE_RAD
+    assert error[~legs].max() == 0.0
+
+
+@pytest.mark.slow
+def test_ipopt_solves_with_the_network() -> None:
+    short = nlp_gait.load("stairs-track", duration_s=0.04, inverse_kinematics="network")
+    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).success
+
+
+def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        kp, kd, torso = problem.start_point(rng)
+        assert 30.0 < min(kp, kd) <= max(kp, kd) < 90.0
+        assert 1.1 < torso < 1.7
+
+
+@pytest.mark.slow
+def test_one_gain_for_each_link() -> None:
+    each = nlp_gait.load("stairs-track", gains="per-link")
+    assert len(each.names) == 19
+    same = values(each, [80.0] * 9 + [60.0] * 9 + [1.45])
+    scalar = values(nlp_gait.load("stairs-track"), [80.0, 60.0, 1.45])
+    assert same[0] == pytest.approx(scalar[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options", [{"gains": "both"}, {"scheme": "midpoint"}, {"inverse_kinematics": "newton"}, {"duration_s": 0.0}]
+)
+def test_options_that_are_not_allowed(options: dict[str, str | float]) -> None:
+    with pytest.raises(InputError, match="must be"):
+        nlp_gait.load("stairs-track", **options)

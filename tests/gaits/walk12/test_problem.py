@@ -1,0 +1,180 @@
+"""The 12-joint walk: model, objective, constraints and options."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nlp_gait
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.walk12.locomotion import locomotion
+from nlp_gait.gaits.walk12.robot import point_mass_biped
+from tests.gaits.walk12 import oracle
+
+TABLE_TOLERANCE = 2e-4  # the reference values have four digits
+MOMENT_TOLERANCE = 1e-6  # [Nm]; the difference stencil alone is good to 1e-8
+ANGLE_TOLERANCE = 1e-7  # [rad]; the arccosine of the printed (2) loses half the digits near its end
+DEFAULT = nlp_gait.load("walk12")
+
+
+def random_gaits(count: int, seed: int) -> list[Any]:
+    """Reachable gaits, all over the bounds."""
+    model, rng = exact_model(DEFAULT), np.random.default_rng(seed)
+    found: list[Any] = []
+    while len(found) < count:
+        x = rng.uniform(DEFAULT.lower, DEFAULT.upper)
+        if model.at(x, DEFAULT.p).violation == 0.0:
+            found.append(x)
+    return found
+
+
+def values(problem: GaitProblem, x: Any) -> tuple[float, float, dict[str, float]]:
+    """f, violation and indexes."""
+    at = exact_model(problem).at(x, problem.p)
+    return -at.cost, at.violation, at.indexes
+
+
+@pytest.mark.parametrize("row", oracle.TABLE_3, ids=lambda row: f"lambda={row[0]}")
+def test_objective_at_the_papers_rows(row: tuple[float, ...]) -> None:
+    weight, *x, _, expected, _ = row
+    problem = nlp_gait.load("walk12", intervals=400).with_values(**{"lambda": weight})
+    assert values(problem, x)[0] == pytest.approx(expected, abs=TABLE_TOLERANCE)
+
+
+def test_angles_equal_the_printed_inverse_kinematics() -> None:
+    robot = point_mass_biped()
+    for x in random_gaits(10, seed=1):
+        arrays = locomotion(robot, x, steps=1, intervals=20).arrays
+        for t, q in zip(arrays["t"], arrays["q"], strict=True):
+            stance, swing = oracle.legs(x, t)
+            for leg, columns in ((stance, [0, 1, 2, 4, 5]), (swing, [11, 10, 9, 7, 6])):
+                if np.linalg.norm(leg.hip - leg.ankle) ** 2 > robot.thigh_m**2 - robot.shank_m**2:
+                    assert q[columns] == pytest.approx(leg.theta, abs=ANGLE_TOLERANCE)
+
+
+def test_a_deeply_bent_leg_closes_where_the_printed_one_does_not() -> None:
+    x = np.array([0.13, 0.13, 0.13, 0.13])  # the corner that (2) turns into a local maximum
+    swing = oracle.legs(x, 0.5)[1]
+    assert np.linalg.norm(oracle.hip_by_forward_kinematics(swing) - swing.hip) > 0.01
+    arrays = locomotion(point_mass_biped(), x, steps=1, intervals=2).arrays
+    closed = oracle.Leg(swing.ankle, swing.hip, arrays["q"][1, [11, 10, 9, 7, 6]])
+    assert oracle.hip_by_forward_kinematics(closed) == pytest.approx(swing.hip, abs=1e-12)
+
+
+def test_moment_of_gravity_and_inertia_vanishes_about_the_moment_free_point() -> None:
+    for x in random_gaits(10, seed=2):
+        free = locomotion(point_mass_biped(), x, steps=1, intervals=20, zmp="moment-free").arrays
+        printed = locomotion(point_mass_biped(), x, steps=1, intervals=20, zmp="exact").arrays
+        for k, t in enumerate(free["t"]):
+            assert oracle.moment(x, t, free["zmp"][k])[:2] == pytest.approx(0.0, abs=MOMENT_TOLERANCE)
+            # (14) divides by the weight, not by the load: what remains is the vertical inertia force about the ankle.
+            lift = oracle.MASSES @ oracle.accelerations(x, t)[:, 2]
+            left = oracle.moment(x, t, printed["zmp"][k])[:2]
+            x_zmp, y_zmp = printed["zmp"][k]
+            assert left == pytest.approx([y_zmp * lift, -x_zmp * lift], abs=MOMENT_TOLERANCE)
+
+
+@pytest.mark.parametrize(("reading", "misprinted"), [("appendix", False), ("appendix-as-printed", True)])
+def test_appendix_against_its_print(reading: Any, misprinted: bool) -> None:
+    for x in random_gaits(5, seed=3):
+        for t, zmp in zip(
+            *(locomotion(point_mass_biped(), x, steps=1, zmp=reading).arrays[k] for k in ("t", "zmp")), strict=True
+        ):
+            stance, swing = oracle.legs(x, t)
+            if np.linalg.norm(swing.hip - swing.ankle) ** 2 < oracle.D1**2 - oracle.D2**2:
+                continue
+            p, a = (
+                oracle.points(x, t, shank=oracle.appendix_shank),
+                oracle.accelerations(x, t, shank=oracle.appendix_shank),
+            )
+            sums = p.copy()
+            if misprinted:
+                sums[[6, 5], 0] = swing.ankle[0] - swing.hip[0] + p[[0, 1], 0]
+                sums[[6, 5], 1] = -oracle.W - p[[0, 1], 1]
+            inertia = oracle.MASSES @ (p[:, :2] * a[:, 2:] - p[:, 2:] * a[:, :2]) / oracle.GRAVITY
+            expected = (oracle.MASSES @ sums[:, :2] + inertia) / oracle.MASSES.sum()
+            assert zmp == pytest.approx(expected, abs=MOMENT_TOLERANCE)
+
+
+def test_appendix_changes_f1_by_less_than_two_per_mille() -> None:
+    exact, appendix = (nlp_gait.load("walk12", intervals=400, zmp=z) for z in ("exact", "appendix"))
+    for _, *x, _, _, _ in oracle.TABLE_3:
+        f1 = values(exact, x)[2]["f1_per_m2s"]
+        assert values(appendix, x)[2]["f1_per_m2s"] == pytest.approx(f1, rel=2e-3)
+
+
+def test_horizon_of_one_second() -> None:
+    step, second = nlp_gait.load("walk12", intervals=400), nlp_gait.load("walk12", intervals=400, horizon="1s")
+    x = [0.13, 0.109, 0.014, 0.02]
+    assert values(second, x)[0] == pytest.approx(values(step, x)[0], rel=1e-12)
+    half = {"step_time_s": 0.5}
+    Q = values(step.with_values(**half), x)[2]["Q_m2s"]
+    assert values(second.with_values(**half), x)[2]["Q_m2s"] == pytest.approx(2 * Q, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("step_time", "x", "per_step", "per_second"),
+    [
+        (2.0, [0.126, 0.12, 0.014, 0.0215], 203, 1107),
+        (1.5, [0.130, 0.11, 0.014, 0.0220], 253, 801),
+        (0.8, [0.130, 0.12, 0.014, 0.0200], 373, 335),
+        (0.5, [0.129, 0.11, 0.014, 0.0210], 296, 148),
+    ],
+)
+def test_f1_at_the_rows_of_table_4(step_time: float, x: list[float], per_step: float, per_second: float) -> None:
+    for horizon, expected in (("step", per_step), ("1s", per_second)):
+        problem = nlp_gait.load("walk12", intervals=400, horizon=horizon).with_values(step_time_s=step_time)
+        assert values(problem, x)[2]["f1_per_m2s"] == pytest.approx(expected, abs=0.6)
+
+
+def test_stability_condition_at_the_papers_most_stable_gait() -> None:
+    _, *x, _, _, _ = oracle.TABLE_3[-1]
+    arrays = locomotion(point_mass_biped(), x, steps=1, intervals=1000).arrays
+    zmp_x, zmp_y = arrays["zmp_foot"].T
+    stable = (-0.03 <= zmp_x) & (zmp_x <= 0.07) & (np.abs(zmp_y) <= 0.0275)
+    inside = arrays["t"][stable]
+    assert (inside.min(), inside.max()) == pytest.approx((0.09, 0.53), abs=0.01)
+    share = values(nlp_gait.load("walk12", intervals=1000), x)[2]["stable_share"]
+    assert share == pytest.approx(stable.mean(), abs=2e-3)
+
+
+@given(x=st.lists(st.floats(-1e3, 1e3), min_size=4, max_size=4))
+def test_every_point_has_finite_values(x: list[float]) -> None:
+    f, violation, _ = values(DEFAULT, x)
+    assert math.isfinite(f)
+    assert math.isfinite(violation)
+
+
+def test_unreachable_gait_says_which_leg_and_when() -> None:
+    from compare.judge import evaluate
+
+    verdict = evaluate(DEFAULT, [0.13, 0.13, 0.001, 0.001])
+    assert not verdict.feasible
+    assert verdict.violations[0].name.startswith("reach[")
+    assert "leg, " in verdict.violations[0].name
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"intervals": 21}, "even whole number >= 2"),
+        ({"intervals": 0}, "even whole number >= 2"),
+        ({"horizon": "2s"}, "horizon must be one of step, 1s"),
+        ({"zmp": "best"}, "zmp must be one of exact, appendix"),
+    ],
+)
+def test_options_that_are_not_allowed(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        nlp_gait.load("walk12", **options)
+
+
+def test_a_turn_is_at_most_eight_degrees() -> None:
+    with pytest.raises(InputError, match="turn_rad"):
+        DEFAULT.with_values(turn_rad=math.radians(8.1))

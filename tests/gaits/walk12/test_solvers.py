@@ -1,0 +1,67 @@
+"""Solvers on the 12-joint walk: IPOPT's optimum from any start, the paper's GA within its time."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+import metaheuristics
+import nlp_gait
+from nlp_gait.backends.solve import solve
+from tests.gaits.walk12.oracle import TABLE_3
+
+OPTIMUM_TOLERANCE = 2e-4  # the reference values have four digits
+STARTS, LEAST_AGREEING = 20, 18
+START_ITERATIONS = 100  # median; another processor's load changes times, not this
+GA_TIME_S = 0.05  # of the processor
+F1MAX = 470.7
+PROBLEM = nlp_gait.load("walk12")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", TABLE_3, ids=lambda row: f"lambda={row[0]}")
+def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
+    solution = solve(PROBLEM.with_values(**{"lambda": row[0]}), starts=STARTS, seed=1)
+    ends = [start.objective for start in solution.starts if start.success]
+    assert sum(abs(f - row[-1]) < OPTIMUM_TOLERANCE for f in ends) >= LEAST_AGREEING
+    assert solution.objective == pytest.approx(row[-1], abs=OPTIMUM_TOLERANCE)
+    assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
+
+
+def test_between_the_plateaus() -> None:
+    solution = solve(PROBLEM.with_values(**{"lambda": 0.7}), starts=3)
+    assert solution.objective == pytest.approx(0.8686, abs=OPTIMUM_TOLERANCE)
+    assert solution.x["step_length_m"] == pytest.approx(0.0849, abs=OPTIMUM_TOLERANCE)
+
+
+@pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
+def test_the_corner_is_no_trap(hessian: str) -> None:
+    settings = nlp_gait.IpoptSettings(hessian=hessian)
+    solution = solve(PROBLEM.with_values(**{"lambda": 0.15}), x0=[0.13] * 4, solver=settings)
+    assert solution.objective == pytest.approx(0.9708, abs=OPTIMUM_TOLERANCE)
+
+
+@pytest.mark.slow
+def test_largest_f1_of_the_model() -> None:
+    """Whatever the normalisation that the problem carries."""
+    for f1max in (PROBLEM.value("f1max"), 300.0):
+        most_stable = solve(PROBLEM.with_values(**{"lambda": 1.0, "f1max": f1max}), starts=5, seed=1)
+        assert most_stable.objective * f1max == pytest.approx(F1MAX, rel=1e-3)
+
+
+def test_the_papers_ga_on_the_compiled_objective() -> None:
+    objective = nlp_gait.compile_objective(PROBLEM)
+    if objective.backend != "compiled":
+        pytest.skip("no compiler")
+    times = []
+    for seed in range(5):
+        started = time.process_time()
+        result = metaheuristics.minimize(
+            objective, metaheuristics.GeneticAlgorithm.goswami2008(), evaluations=930, seed=seed
+        )
+        times.append(time.process_time() - started)
+        assert result.feasible
+        assert 0.9 < -result.objective < 0.9708 + OPTIMUM_TOLERANCE
+    assert min(times) < GA_TIME_S

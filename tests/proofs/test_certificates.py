@@ -1,0 +1,208 @@
+"""Proofs keep what is feasible, go on where they were killed, and can be checked; a wrong one is never closed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from benchmarks.gaitbench.known import certified
+from benchmarks.guarantees.between_samples import feasible_gaits
+from benchmarks.guarantees.boxes import lost
+from benchmarks.guarantees.nao import around as box_around
+from benchmarks.guarantees.nao import within
+from compare.analysis.proven import CERTIFICATES
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError, OwnCodeError
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaitbench.known import known
+from nlp_gait.proofs import branch_and_bound, certificate, power_form
+from nlp_gait.proofs.branch_and_bound import certify
+from nlp_gait.proofs.certificate import certificate_file, check, read_certificate
+from tests.backends.toys import toy
+from tests.compare.questions.test_certainty import two_valleys
+
+SEED = 2
+PROBLEM = toy(two_valleys, limit=-9.0)
+BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
+
+
+def walk() -> tuple[GaitProblem, np.ndarray]:
+    return nlp_gait.load("walk12"), np.array(known()["walk12-w015"].best_x)
+
+
+GAITS = {"walk12": "walk12-w015", "nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
+PHASES = ("nao-dsp", "nao-ssp")
+
+
+def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
+    """A phase with bounds this part of the ranges around the best known gait, and that gait."""
+    problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
+    return box_around(problem, best, part), best
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
+    best = np.array(known()[GAITS[name]].best_x)
+    assert lost(nlp_gait.load(name), best, 200, np.random.default_rng(SEED)) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PHASES)
+def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: str) -> None:
+    problem, best = around(name, 0.07)
+    proof = certify(problem, best, tolerance=0.01, time_limit_s=120.0)
+    assert proof.closed and proof.gap == pytest.approx(0.01) and proof.boxes > 10
+    if name == "nao-dsp":
+        assert check(certificate_file(problem, proof), paths=5).paths == 5
+
+
+@pytest.mark.slow
+def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
+    problem, best = nlp_gait.load("nao-dsp"), np.array(known()[GAITS["nao-dsp"]].best_x)
+    gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
+    costs = [exact_model(problem).at(x, problem.p).cost for x in gaits]
+    wrong = gaits[int(np.argmin(np.abs(np.array(costs) / costs[0] - 1.03)))]
+    cost = exact_model(problem).at(wrong, problem.p).cost
+    assert 1.02 * costs[0] < cost < 1.04 * costs[0]
+    half = 2.0**-7 * (problem.upper - problem.lower)
+    ends = (
+        np.maximum(problem.lower, np.minimum(best, wrong) - half),
+        np.minimum(problem.upper, np.maximum(best, wrong) + half),
+    )
+    narrow = within(problem, *ends)
+    assert certify(narrow, best, tolerance=0.01, time_limit_s=120.0).closed
+    proof = certify(narrow, wrong, tolerance=0.01, time_limit_s=0.5)
+    assert not proof.closed and proof.bound <= costs[0]
+
+
+def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
+    problem, best = around("nao-dsp", 2.0**-4)
+    cheat = best.copy()
+    cheat[5] *= 0.9  # less sway: too small a margin
+    at = exact_model(problem).at(cheat, problem.p)
+    assert at.violation > 1e-5
+    with pytest.raises(InputError, match="infeasible"):
+        certify(problem, cheat)
+
+
+def test_formulas_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nlp_gait.proofs.power_instants.GRAVITY", 9.80001)
+    with pytest.raises(InputError, match="where the exact functions have"):
+        power_form.power_form(nlp_gait.load("nao-dsp", intervals=2))
+    with pytest.raises(InputError, match="has no form"):
+        power_form.power_form(nlp_gait.load("nao-dsp", trajectory="quintic"))
+
+
+@pytest.mark.slow
+def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
+    problem, best = walk()
+    proof = certify(problem, best, tolerance=0.02, time_limit_s=120.0)
+    assert proof.closed and proof.gap == pytest.approx(0.02)
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(certificate_file(problem, proof).to_json()))
+    found = check(read_certificate(path), paths=40)
+    assert found.paths == 40 and found.same_code
+    assert 0.2 * proof.boxes < found.boxes < 5 * proof.boxes  # an estimate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dsp-v5-1-percent", "ssp-v5-1-percent", "walk12-lambda-1-0.1-percent"])
+def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
+    assert check(read_certificate(CERTIFICATES / f"{name}.json"), paths=3).paths == 3
+
+
+def test_evidence_is_what_certificates_prove() -> None:
+    for id, entry in known().items():
+        gap = certified(id, entry.best_known)
+        assert gap is None or gap == entry.evidence.proven_gap
+
+
+def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(branch_and_bound, "BATCH", 4)
+    monkeypatch.setattr(branch_and_bound, "CHECKPOINT_S", 0.0)
+    whole = certify(PROBLEM, BEST, tolerance=1e-4)
+    file, told = tmp_path / "open.npz", list[str]()
+
+    def kill(note: str) -> None:
+        told.append(note)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        certify(PROBLEM, BEST, tolerance=1e-4, progress=kill, checkpoint=file)
+    resumed = certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=file)
+    assert resumed.closed and (resumed.boxes, resumed.bound) == (whole.boxes, whole.bound)
+    with pytest.raises(InputError, match="of another proof"):
+        certify(PROBLEM, BEST, tolerance=1e-3, checkpoint=file)
+    file.write_bytes(b"torn")
+    with pytest.raises(InputError, match="damaged"):
+        certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=file)
+
+
+def test_a_wrong_incumbent_is_never_certified() -> None:
+    problem, best = walk()
+    wrong = best + 0.03 * (np.array([0.05, 0.05, 0.05, 0.05]) - best)
+    costs = [exact_model(problem).at(x, problem.p).cost for x in (best, wrong)]
+    assert costs[1] > costs[0] + 0.01 * abs(costs[0])  # worse than the tolerance allows
+    found = certify(problem, wrong, tolerance=1e-3, time_limit_s=0.5)
+    assert not found.closed and -found.bound <= costs[0]
+
+
+def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certificate, "_problem", lambda description: PROBLEM)
+    honest = certify(PROBLEM, BEST, tolerance=1e-3)
+    file = certificate_file(PROBLEM, honest)
+    assert check(file, paths=20).paths == 20
+    valley = np.array([0.987, 0.0])  # the worse one
+    at = exact_model(PROBLEM).at(valley, PROBLEM.p).cost
+    forged = replace(honest, objective=at, bound=at * (1 - 1e-3), x=tuple(valley.tolist()))
+    with pytest.raises(InputError, match="do not end"):
+        check(replace(file, certificate=forged), paths=20)
+    for change, message in (
+        ({"objective": at}, "but its incumbent has"),
+        ({"bound": honest.objective}, "says more than its tolerance"),
+        ({"closed": False}, "has not ended"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check(replace(file, certificate=replace(honest, **change)))
+
+
+def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text("raise SystemExit('it ran')\n")
+    raw = json.loads((CERTIFICATES / "walk12-lambda-1-1-percent.json").read_text())
+    raw["problem"]["name"] = f"{tmp_path / 'own.py'}:problem"
+    (tmp_path / "certificate.json").write_text(json.dumps(raw))
+    with pytest.raises(OwnCodeError, match="certificate needs code of your own.*--code"):
+        check(read_certificate(tmp_path / "certificate.json"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"problem": {"parameters": 0}}, r"problem\.parameters must be an object, got 0"),
+        ({"problem": {"options": None}}, r"problem\.options must be an object"),
+        ({"certificate": {"x": [0.05, 0.1]}}, "walk12 must have 4 values"),
+        ({"certificate": {"x": [-1.0, 0.1, 0.001, 0.008]}}, "outside the bounds"),
+    ],
+    ids=["parameters", "options", "too short", "outside"],
+)
+def test_a_damaged_certificate_is_refused(change: dict[str, dict[str, object]], message: str, tmp_path: Path) -> None:
+    raw = json.loads((CERTIFICATES / "walk12-lambda-1-1-percent.json").read_text())
+    for part, values in change.items():
+        raw[part] |= values
+    (tmp_path / "certificate.json").write_text(json.dumps(raw))
+    with pytest.raises(InputError, match=message):
+        check(read_certificate(tmp_path / "certificate.json"))
+
+
+def test_a_certificate_of_another_problem_is_refused() -> None:
+    problem, _ = walk()
+    honest = certify(PROBLEM, BEST, tolerance=1e-3)
+    part = {**certificate_file(problem, honest).problem, "sha256": "0" * 64}
+    with pytest.raises(InputError, match="another one today"):
+        check(replace(certificate_file(problem, honest), problem=part))

@@ -1,0 +1,224 @@
+"""What is proven between samples: true where a fine grid is, with the violation's bounds where it is not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import MX
+
+import nlp_gait
+from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
+from compare.judge import evaluate
+from nlp_gait.errors import CompilerError
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, Stretch
+from nlp_gait.gaitbench.known import known
+from nlp_gait.proofs import affine
+from nlp_gait.proofs.guarantee import guarantee
+from nlp_gait.proofs.time_functions import time_functions
+from nlp_gait.proofs.time_search import beyond
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import row, toy
+
+SEED = 3
+PEAK = 0.8  # of the toy's row, at half the time
+
+
+def best(instance: str) -> np.ndarray:
+    return np.array(known()[instance].best_x)
+
+
+def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
+    """A toy over two seconds whose row is x sin(pi s) <= limit, sampled where it is zero."""
+
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        wave = point.x[0] * ca.sin(math.pi * phases)
+        names = tuple(f"wave, {k}" for k in range(phases.shape[1]))
+        value, labels = (ca.sum2(wave) / phases.shape[1], ()) if over == "mean" else (wave.T, names)
+        if over == "interval":
+            value, labels = (wave[1:] - wave[:-1]).T, names[1:]
+        rows = Constraint(name="wave", labels=labels, unit="m", scale=1.0, value=value, upper=MX(limit), over=over)
+        return Assembly(objective=MX(0), constraints=(rows,), indexes={"mean_m": ca.sum2(wave) / phases.shape[1]})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (1.0, 3.0), intervals=4, means=("mean_m",))
+    base = toy(lambda x, y, lim, ops: (x, (row(0 * y, lower=MX(0.0)),)))
+    return replace(base, stretches=(stretch,))
+
+
+def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -> None:
+    found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
+    assert found.holds is False
+    (breach,) = found.breaches
+    assert breach.row == "wave[wave]"
+    assert breach.least <= PEAK - 0.5 <= breach.most <= 1.05 * (PEAK - 0.5)
+    begins = 1.0 + 2.0 * math.asin(0.5 / PEAK) / math.pi
+    assert breach.from_s <= begins <= breach.to_s <= begins + 0.01
+    low, high = found.means["mean_m"]
+    assert low <= 2 / math.pi * PEAK <= high <= 1.01 * low
+    assert found.pieces > 4  # intervals
+    assert "wave[wave] fails by 0.299 to 0.3 m" in str(found) and found.word == "no"
+
+
+def test_a_row_that_touches_its_limit_holds() -> None:
+    found = guarantee(waving(PEAK), np.array([PEAK, 0.0]))
+    assert found.holds and not found.breaches and str(found) == "all limits hold at all times"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "values", "most", "least"),
+    [
+        ((0.0, math.inf), (-0.25, 0.5), 0.25, -0.5),
+        ((-math.inf, 1.0), (0.5, 1.25), 0.25, -0.5),
+        ((0.0, 1.0), (-0.5, -0.25), 0.5, 0.25),
+        ((0.0, 1.0), (1.25, 1.5), 0.5, 0.25),
+        ((-math.inf, math.inf), (-5.0, 5.0), -math.inf, -math.inf),
+        ((0.0, math.inf), (-math.inf, 0.5), math.inf, -0.5),
+        ((-math.inf, 1.0), (0.5, math.inf), math.inf, -0.5),
+    ],
+)
+def test_values_are_outside_their_bounds_by_this_at_most_and_at_least(
+    bounds: tuple[float, float], values: tuple[float, float], most: float, least: float
+) -> None:
+    found = beyond(*(np.array([end]) for end in (*bounds, *values)))
+    assert [part.item() for part in found] == [most, least]
+
+
+def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:
+    """At a jump of which nothing is known, the two terms of 5 and 4.8 would not cancel."""
+
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        after = 0.5 <= phases  # noqa: SIM300  as splines ask
+        value = 5 * after - 6 * point.x[0] * after
+        labels = tuple(f"jump, {k}" for k in range(phases.shape[1]))
+        rows = Constraint(name="jump", labels=labels, unit="m", scale=1.0, value=value.T, upper=MX(0.3), over="instant")
+        return Assembly(objective=MX(0), constraints=(rows,), indexes={})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
+    kinked = replace(waving(0.5), stretches=(stretch,))
+    assert guarantee(kinked, np.array([PEAK, 0.0])).holds
+    assert not guarantee(replace(kinked, stretches=(replace(stretch, kinks=()),)), np.array([PEAK, 0.0])).holds
+
+
+def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
+    largest = PEAK * math.sin(math.pi / 4)  # from zero to a quarter
+    assert guarantee(waving(largest + 1e-5, "interval"), np.array([PEAK, 0.0])).holds
+    found = guarantee(waving(largest - 1e-2, "interval"), np.array([PEAK, 0.0]))
+    assert found.breaches[0].least <= 1e-2 <= found.breaches[0].most and found.breaches[0].from_s == 1.0
+
+
+def test_a_mean_is_that_over_time() -> None:
+    mean = 2 / math.pi * PEAK
+    assert guarantee(waving(mean + 1e-3, "mean"), np.array([PEAK, 0.0])).holds
+    found = guarantee(waving(mean - 1e-3, "mean"), np.array([PEAK, 0.0]))
+    (breach,) = found.breaches
+    assert found.holds is False and (breach.from_s, breach.to_s) == (1.0, 3.0)
+    assert 0.0 < breach.least <= 1e-3 <= breach.most
+
+
+def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
+    problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
+    rows = time_functions(problem, problem.stretches[0]).instants
+    assert rows.values is not None
+    groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.values.groups)}
+    assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
+    part = rows.values.alone(groups["reach"])
+    assert part.work < 0.1
+    given = np.concatenate([x, problem.p, [0.0]])
+    boxes = np.stack([given, given], axis=-1)[None]
+    boxes[:, -1] = 0.3, 0.31
+    symbols = np.where(np.arange(len(given)) == len(given) - 1, 0, -1)
+    alone, whole = (function(boxes, symbols) for function in (part.function, rows.values.whole))
+    columns = rows.values.groups[groups["reach"]]
+    for ends, all_ends in ((alone.lower, whole.lower), (alone.upper, whole.upper)):
+        np.testing.assert_allclose(ends[:, part.columns], all_ends[:, columns], rtol=1e-9)
+
+
+def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
+    found = guarantee(waving(0.5, None), np.array([PEAK, 0.0]))
+    assert found.holds and found.sampled == ("wave",) and "on samples alone" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("name", "instance"), [pytest.param("nao-ssp", "ssp-v5", marks=pytest.mark.slow), ("walk12", "walk12-w015")]
+)
+def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str, instance: str) -> None:
+    problem, x = nlp_gait.load(name), best(instance)
+    assert guarantee(problem, x).holds
+    gaits = [x, *feasible_gaits(problem, x, 2, np.random.default_rng(SEED))]
+    against, _, holding = contradictions(problem, gaits, 1001)
+    assert not against and holding > 0
+
+
+@pytest.mark.slow
+def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_grid_shows() -> None:
+    problem, x = nlp_gait.load("stairs-plan"), best("stairs-energy")
+    judged = evaluate(problem, x)
+    proven = judged.guaranteed
+    assert judged.feasible and proven is not None
+    worst: dict[str, float] = {}
+    for broken in judged.dense_violations:
+        name = broken.name.rpartition(",")[0] + "]"
+        worst[name] = max(worst.get(name, 0.0), broken.violation)
+    most = {breach.row: breach.most for breach in proven.breaches}
+    for name, violation in worst.items():
+        assert violation <= most[name] <= violation + 1e-3
+    low, high = proven.means["energy_J"]
+    assert low <= evaluate(problem, x).dense["energy_J"] * (1 + 1e-3) and high >= low > 0.0
+
+
+@pytest.mark.slow
+def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() -> None:
+    problem = nlp_gait.load("nao-dsp", trajectory="spline-4")
+    x = np.concatenate([best("dsp-v5"), np.zeros(len(problem.names) - len(best("dsp-v5")))])
+    found = guarantee(problem, x)
+    assert found.holds
+    cubic = guarantee(nlp_gait.load("nao-dsp"), best("dsp-v5"))
+    for name, (low, high) in found.means.items():
+        assert low <= cubic.means[name][1] and cubic.means[name][0] <= high
+
+
+def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> None:
+    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        pole = 1 / (phases - math.sqrt(0.5))
+        names = tuple(f"pole, {k}" for k in range(phases.shape[1]))
+        rows = Constraint(
+            name="pole", labels=names, unit="m", scale=1.0, value=-(pole**2).T, upper=MX(0.0), over="instant"
+        )
+        wild = Constraint(name="wild", labels=names, unit="m", scale=1.0, value=pole.T, upper=MX(1e6), over="instant")
+        mean = Constraint(name="mean", unit="m", scale=1.0, value=ca.sum2(pole), upper=MX(0.0), over="mean")
+        return Assembly(objective=MX(0), constraints=(rows, wild, mean), indexes={"mean_m": ca.sum2(pole)})
+
+    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
+    found = guarantee(replace(waving(PEAK), stretches=(stretch,)), np.array([PEAK, 0.0]))
+    assert found.holds is not True
+    assert {b.row: b.most for b in found.breaches}["wild[pole]"] is None
+    assert "mean_m" not in found.means and "any amount" in str(found)
+
+
+def test_finite_differences_are_sampled_by_definition() -> None:
+    found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best("ssp-v5"))
+    assert found.holds is None and found.reason.startswith("sampled by definition") and found.word == "?"
+
+
+def test_a_change_of_the_mathematics_takes_the_guarantee_away_and_new_values_do_not() -> None:
+    problem = nlp_gait.load("walk12")
+    assert problem.with_values(step_time_s=0.9).stretches
+    assert not problem.derived(change=lambda assembly, point, ops: assembly).stretches
+
+
+def test_without_a_compiler_the_verdict_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise CompilerError("no C++ compiler")
+
+    affine._library.cache_clear()
+    monkeypatch.setattr(affine, "find_compiler", missing)
+    found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
+    assert found.holds is None and "no C++ compiler" in str(found)
+
+
+def test_an_infeasible_point_has_no_guarantee() -> None:
+    problem = nlp_gait.load("walk12")
+    assert evaluate(problem, [0.13, 0.13, 0.001, 0.001]).guaranteed is None

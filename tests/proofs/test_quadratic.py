@@ -1,0 +1,154 @@
+"""Forms of degree two hold every value of gaits at sampled points; of single operations see ``test_affine``."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+import nlp_gait
+from nlp_gait.backends.exact import exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.gaitbench.known import known
+from nlp_gait.proofs import power_form as power_form_module
+from nlp_gait.proofs.power_form import power_form, to_z
+from nlp_gait.proofs.quadratic import PowerRows, QuadraticForms, QuadraticFunction
+
+SEED = 7
+POINTS = 200
+# Of values as computed in double precision, relative: they err themselves.
+ROUNDING = 1e-9
+
+
+def at(forms: QuadraticForms, e: np.ndarray) -> np.ndarray:
+    """(K, M) what the forms of one box give at symbols (K, n), without their errors."""
+    pairs = np.stack([e[:, i] * e[:, j] for j in range(e.shape[1]) for i in range(j + 1)])
+    return np.asarray(forms.middle[0] + e @ forms.slopes[0].T + pairs.T @ forms.bends[0].T)
+
+
+@pytest.mark.parametrize(("name", "instance"), [("nao-dsp", "dsp-v5"), ("nao-ssp", "ssp-v5")])
+def test_gaits_are_held_at_sampled_points_of_boxes_around_the_best(
+    name: str, instance: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[ca.Function] = []
+
+    def reading(function: ca.Function) -> QuadraticFunction:
+        read.append(function)
+        return QuadraticFunction(function)
+
+    monkeypatch.setattr(power_form_module, "QuadraticFunction", reading)
+    problem = nlp_gait.load(name, intervals=2)
+    form, rng = power_form(problem), np.random.default_rng(SEED)
+    poses, everything = sorted(read, key=lambda function: function.numel_out(0))
+    z = to_z(np.array(known()[instance].best_x))
+    low, high = form.root.T
+    for width in (0.3, 0.03, 1e-4):
+        half = width * (high - low) / 2
+        box = np.stack([np.maximum(low, z - half), np.minimum(high, z + half)], -1)
+        forms = form.function(box[None])
+        Z = rng.uniform(box[:, 0], box[:, 1], (POINTS, len(z)))
+        values, posed = (evaluated(function, Z) for function in (everything, poses))
+        reached = np.all((form.early_lower <= posed) & (posed <= form.early_upper), axis=1)
+        e = (Z - box.mean(axis=-1)) / (np.ptp(box, axis=-1) / 2)
+        slack = ROUNDING * (1 + np.abs(values))
+        inside = (forms.lower <= values + slack) & (values - slack <= forms.upper)
+        off = np.abs(at(forms, e) - values) <= forms.error + slack
+        assert reached.sum() > POINTS / 10
+        assert inside[reached].all() and off[reached].all()
+        assert width > 0.1 or np.isfinite(forms.error).all()
+
+
+def evaluated(function: ca.Function, Z: np.ndarray) -> np.ndarray:
+    """(K, M) values at points."""
+    return np.array(function.map(len(Z))(Z.T).full().T)
+
+
+def test_mixed_products_are_kept_and_cancel() -> None:
+    x = SX.sym("x", 2)
+    function = QuadraticFunction(ca.Function("f", [x], [(x[0] + x[1]) ** 2 - (x[0] - x[1]) ** 2 - 4 * x[0] * x[1]]))
+    forms = function(np.array([[[1.0, 2.0], [-3.0, 5.0]]]))
+    assert max(abs(forms.lower[0, 0]), abs(forms.upper[0, 0])) < 1e-12
+
+
+def test_what_is_undefined_on_part_of_a_box_has_no_form() -> None:
+    x = SX.sym("x")
+    forms = QuadraticFunction(ca.Function("f", [x], [ca.vertcat(1 / x, ca.sqrt(x))]))(np.array([[[-1.0, 1.0]]]))
+    assert np.isinf(forms.error).all() and np.isinf(forms.lower).all() and np.isinf(forms.upper).all()
+
+
+def test_an_operation_without_a_form_is_refused() -> None:
+    x = SX.sym("x")
+    with pytest.raises(InputError, match="has no quadratic form"):
+        QuadraticFunction(ca.Function("f", [x], [ca.sin(x)]))
+    with pytest.raises(InputError, match="boxes of 1 inputs expected"):
+        QuadraticFunction(ca.Function("f", [x], [x * x]))(np.zeros((3, 2, 2)))
+
+
+def least_power(rng: np.random.Generator) -> tuple[ca.Function, PowerRows]:
+    """A made-up problem of four terms in three variables and a duration, with powers of known, vague and unknown signs."""
+    z = SX.sym("z", 4)
+    a = 1.0 + z[:3].T @ rng.uniform(-0.3, 0.3, 3)
+    nothing = (a * a * a) * (a * a * a) - (a * a) * (a * a) * (a * a)  # but its form has an error
+
+    def quantity() -> SX:
+        bent = z[:3].T @ rng.uniform(-1.0, 1.0, (3, 3)) @ z[:3]
+        plain = rng.uniform(-3, 3) + z[:3].T @ rng.uniform(-1, 1, 3)
+        return plain + 10.0 ** rng.uniform(-1, 0.5) * bent + 10.0 ** rng.uniform(-1, 1) * nothing
+
+    torques, rates = ([quantity() for _ in range(4)] for _ in range(2))
+    powers = [torque * rate for torque, rate in zip(torques, rates, strict=True)]
+    heats = [torque**2 for torque in torques[:2]]
+    limited = quantity()
+    outputs = ca.vertcat(*powers, *torques, *rates, *heats, limited)
+    first, second, third, fourth = (np.arange(4 * k, 4 * k + 4, dtype=np.int32) for k in range(4))
+    rows = PowerRows(
+        row=np.array([14], dtype=np.int32),
+        lower=np.array([-2.0]),
+        upper=np.array([2.0]),
+        power=first,
+        torque=second,
+        rate=third,
+        weight=10.0 ** rng.uniform(-1.0, 0.0, 4),
+        heat=fourth[:2],
+        loss=10.0 ** rng.uniform(-1.0, 1.0, 2),
+        duration=3,
+        ranges=np.ones(4),
+    )
+    return ca.Function("least_power", [z], [outputs]), rows
+
+
+@pytest.mark.slow
+def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() -> None:
+    rng, tight = np.random.default_rng(SEED), 0
+    for _ in range(250):
+        function, rows = least_power(rng)
+        centre, half = rng.uniform(-0.5, 0.5, 4) + [0, 0, 0, 2.0], 10.0 ** rng.uniform(-2.0, -0.2, 4)
+        box = np.stack([centre - half, centre + half], axis=-1)
+        corners = rng.choice([-1.0, 1.0], (100, 4))
+        Z = centre + half * np.concatenate([corners, rng.uniform(-1.0, 1.0, (400, 4))])
+        values = evaluated(function, Z)
+        cost = np.abs(values[:, rows.power]) @ rows.weight / Z[:, 3] + values[:, rows.heat] @ rows.loss
+        feasible = np.abs(values[:, 14]) <= 2.0
+        if not feasible.any():
+            continue
+        least = cost[feasible].min()
+        for target in (100.0, np.quantile(cost[feasible], 0.3)):
+            found = QuadraticFunction(function).assess(box[None], target, rows)
+            kept = Z[feasible & (cost < target * (1.0 - ROUNDING))]
+            if len(kept):
+                assert found.left[0] and found.lowest[0] <= least * (1.0 + ROUNDING)
+                assert ((found.boxes[0, :, 0] <= kept) & (kept <= found.boxes[0, :, 1])).all()
+        tight += bool(found.lowest[0] > 0.7 * least)
+    assert tight > 20  # bounds that are far off would hide an error
+
+
+def test_boxes_that_hold_the_best_gait_keep_it_and_have_bounds_that_end_in_its_cost() -> None:
+    problem, x = nlp_gait.load("nao-ssp"), np.array(known()["ssp-v5"].best_x)
+    cost, form, z = exact_model(problem).at(x, problem.p).cost, power_form(problem), to_z(x)
+    half = np.diff(form.root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
+    boxes = np.stack([np.maximum(form.root[:, 0], z - half), np.minimum(form.root[:, 1], z + half)], -1)
+    found = form.assess(boxes, cost * (1 + 1e-6))
+    assert found.left.all()
+    assert np.all(np.diff(found.lowest[2:]) > 0.0) and cost * (1 - 1e-5) < found.lowest[-1] <= cost
+    assert np.all((found.boxes[..., 0] <= z) & (z <= found.boxes[..., 1]))
