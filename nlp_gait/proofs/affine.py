@@ -24,6 +24,7 @@ from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
+from nlp_gait.symbolic.tape import read_tape
 
 SYMBOLS = ("nlp_gait_affine", "nlp_gait_affine_doubles")
 _INTEGER, _LONG, _POINTER = ctypes.c_int, ctypes.c_longlong, ctypes.c_void_p
@@ -82,10 +83,8 @@ class AffineFunction:
         """
         self._library = _library()
         scalar = function if function.is_a("SXFunction") else function.expand()
-        starts = np.cumsum([0, *(scalar.numel_in(i) for i in range(scalar.n_in()))])
-        ends = np.cumsum([0, *(scalar.numel_out(i) for i in range(scalar.n_out()))])
-        self.inputs, self.outputs = int(starts[-1]), int(ends[-1])
-        self._code, self._constants = _instructions(scalar, starts.tolist(), ends.tolist(), frozenset(half_open))
+        self.inputs, self.outputs = scalar.numel_in(), scalar.numel_out()
+        self._code, self._constants = _encode(scalar, half_open)
         self._slots = max(int(self._code[:, 1:].max(initial=0)), scalar.sz_w()) + 1
 
     def __call__(self, boxes: Array, symbols: Array) -> Forms:
@@ -136,40 +135,24 @@ def _library() -> ctypes.CDLL:
     return library
 
 
-def _instructions(
-    function: ca.Function, starts: list[int], ends: list[int], half_open: frozenset[int]
-) -> tuple[Any, Array]:
-    """Instructions (count, 4) of operation, result and arguments, and constants (count,)."""
-    count = function.n_instructions()
-    code = np.full((count, 4), -1, dtype=np.int32)
-    constants = np.zeros(count)
-    open_places: set[int] = set()  # of the work vector, that hold a half-open input now
-    for k in range(count):
-        operation, out, arguments = (
-            function.instruction_id(k),
-            function.instruction_output(k),
-            function.instruction_input(k),
-        )
+def _encode(function: ca.Function, half_open: Collection[int]) -> tuple[Any, Array]:
+    """Return the instructions (count, 4), as operation, result and arguments, and the constants (count,)."""
+    tape = list(read_tape(function))
+    code = np.full((len(tape), 4), -1, dtype=np.int32)
+    inputs_below = {k for k, each in enumerate(tape) if each.operation == ca.OP_INPUT and each.place in half_open}
+    for k, each in enumerate(tape):
+        operation, places = each.operation, [tape[j].register for j in each.arguments]
         if operation == ca.OP_OUTPUT:
-            code[k, :3] = operation, ends[out[0]] + out[1], arguments[0]
+            code[k, :3] = operation, each.place, places[0]
             continue
-        first, second = -1, -1
-        if operation == ca.OP_CONST:
-            constants[k] = function.instruction_constant(k)
-        elif operation == ca.OP_INPUT:
-            first = starts[arguments[0]] + arguments[1]
-        elif operation in UNARY:
-            first = arguments[0]
+        if operation == ca.OP_INPUT:
+            places = [each.place]
         elif operation in BINARY:
-            first, second = arguments
-            if operation == ca.OP_LE and second in open_places:
+            if operation == ca.OP_LE and each.arguments[1] in inputs_below:
                 operation = HALF_OPEN_LE
-            elif operation == ca.OP_LT and first in open_places:
+            elif operation == ca.OP_LT and each.arguments[0] in inputs_below:
                 operation = HALF_OPEN_LT
-        else:
+        elif operation not in (*UNARY, ca.OP_CONST):
             raise InputError(f"function {function.name()!r}: CasADi's operation number {operation} cannot be enclosed")
-        code[k] = operation, out[0], first, second
-        open_places.discard(out[0])
-        if operation == ca.OP_INPUT and first in half_open:
-            open_places.add(out[0])
-    return code, constants
+        code[k, : 2 + len(places)] = operation, each.register, *places
+    return code, np.array([each.constant for each in tape])

@@ -11,6 +11,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
+from nlp_gait.symbolic.tape import read_tape
 
 # Operations of a tape, as in native/quadratic.hpp.
 INPUT, NUMBER, OUTPUT, SUM, DIFFERENCE, SHIFT, SCALE, PRODUCT, INVERSE, ROOT, ABSOLUTE, LARGER, BELOW, WHERE_BELOW = (
@@ -118,27 +119,20 @@ def tape_of(function: ca.Function) -> tuple[Integers, Array]:
     Raises:
         InputError: an operation that cannot be enclosed.
     """
-    function = function if function.is_a("SXFunction") else function.expand()
     graph, outputs = _Graph(function), dict[int, int]()
-    places: dict[
-        int, int | float | _Condition
-    ] = {}  # what stands there now: a quantity by its number, a number, a condition
-    for k in range(function.n_instructions()):
-        operation, out, arguments = (
-            function.instruction_id(k),
-            function.instruction_output(k),
-            function.instruction_input(k),
-        )
-        if operation == ca.OP_OUTPUT:
-            found = places[arguments[0]]
-            assert not isinstance(found, _Condition)  # conditions are outputs of no problem; for the type checker
-            outputs[out[1]] = graph.add(NUMBER, value=found) if isinstance(found, float) else found
-        elif operation == ca.OP_CONST:
-            places[out[0]] = float(function.instruction_constant(k))
-        elif operation == ca.OP_INPUT:
-            places[out[0]] = graph.add(INPUT, value=float(arguments[1]))
+    results: list[int | float | _Condition] = []  # of each instruction: number of a quantity, a number, or a condition
+    for each in read_tape(function):
+        given = [results[k] for k in each.arguments]
+        if each.operation == ca.OP_CONST:
+            results.append(each.constant)
+        elif each.operation == ca.OP_INPUT:
+            results.append(graph.add(INPUT, value=float(each.place)))
+        elif each.operation == ca.OP_OUTPUT:
+            results += given
+            assert not isinstance(given[0], _Condition)  # conditions are outputs of no problem; for the type checker
+            outputs[each.place] = graph.add(NUMBER, value=given[0]) if isinstance(given[0], float) else given[0]
         else:
-            places[out[0]] = _found(graph, operation, [places[place] for place in arguments])
+            results.append(_found(graph, each.operation, given))
     return _laid_out(graph, [outputs[k] for k in range(len(outputs))])
 
 

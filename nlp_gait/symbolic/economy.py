@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from itertools import count
 
 import casadi as ca
 from casadi import DM, SX
+
+from nlp_gait.symbolic.tape import Instruction, read_tape
 
 # Squared length below which a vector has no direction; keeps its cosine and sine finite.
 LEAST_SQUARE = 1e-200
@@ -22,12 +24,9 @@ def economical(outputs: Sequence[SX]) -> list[SX]:
     """
     shared = ca.cse(list(outputs))
     symbols = ca.symvar(ca.veccat(*shared))
-    function = ca.Function("shared", symbols, shared)
-    rewriter = _Rewriter(symbols, [SX(output) for output in shared])
-    for node in _nodes(function):
-        rewriter.take(node)
-    with _unsimplified():
-        return list(ca.cse(rewriter.results))
+    rewritten = _Rewriter(symbols, list(read_tape(ca.Function("shared", symbols, shared)))).rewrite(shared)
+    with _without_simplification():
+        return list(ca.cse(rewritten))
 
 
 def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
@@ -41,7 +40,7 @@ def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
         The function with a vector (k,) in place of its last input, and that vector's values (k, n).
     """
     *others, last = function.sx_in()
-    with _unsimplified():
+    with _without_simplification():
         outputs = function.call([*others, last])
         remaining, symbols, extracted = ca.extract_parametric(outputs, last, {"extract_trivial": True})
     table = ca.Function("table", [last], [ca.vertcat(*extracted)]).map(values.shape[1])
@@ -49,98 +48,64 @@ def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
     return ca.Function(function.name(), [*others, ca.vertcat(*symbols)], remaining, *names), table(values)
 
 
-class _Node(NamedTuple):
-    """An instruction of a function: an operation on the results of earlier ones.
-
-    Attributes:
-        operation: CasADi's number of it.
-        arguments: indices of the nodes that it works on; for inputs and outputs (number, nonzero).
-        target: for an output (number, nonzero).
-        constant: value of a constant.
-        divisions: number of divisions by this node.
-    """
-
-    operation: int
-    arguments: tuple[int, ...]
-    target: tuple[int, ...]
-    constant: float
-    divisions: int
-
-
-def _nodes(function: ca.Function) -> list[_Node]:
-    """Instructions of an SX function, with work-vector places replaced by indices of the nodes that last wrote them."""
-    nodes: list[_Node] = []
-    writer: dict[int, int] = {}
-    divisions: Counter[int] = Counter()
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        arguments, target = tuple(function.instruction_input(k)), tuple(function.instruction_output(k))
-        if operation != ca.OP_INPUT:
-            arguments = tuple(writer[place] for place in arguments[: 1 if operation == ca.OP_OUTPUT else None])
-        if operation != ca.OP_OUTPUT:
-            writer[target[0]] = k
-        if operation == ca.OP_DIV:
-            divisions[arguments[1]] += 1
-        constant = function.instruction_constant(k) if operation == ca.OP_CONST else 0.0
-        nodes.append(_Node(operation, arguments, target, constant, 0))
-    return [node._replace(divisions=divisions[k]) for k, node in enumerate(nodes)]
-
-
 class _Rewriter:
-    """Builds expressions anew, node by node.
+    """Rebuilds expressions from the tape of a function of scalar symbols."""
 
-    Attributes:
-        results: outputs, filled as the nodes are taken.
-    """
-
-    def __init__(self, symbols: Sequence[SX], results: list[SX]) -> None:
-        self.results = results
+    def __init__(self, symbols: Sequence[SX], tape: Sequence[Instruction]) -> None:
         self._symbols = symbols
-        self._nodes: list[_Node] = []
+        self._tape = tape
+        self._divisions = Counter(each.arguments[1] for each in tape if each.operation == ca.OP_DIV)  # by each divisor
         self._values: list[SX] = []
         self._reciprocals: dict[int, SX] = {}
 
-    def take(self, node: _Node) -> None:
-        """Build one more node."""
-        self._nodes.append(node)
-        self._values.append(self._built(node))
-        if node.operation == ca.OP_OUTPUT:
-            number, place = node.target
-            self.results[number].nz[place] = self._values[-1]
+    def rewrite(self, outputs: Sequence[SX]) -> list[SX]:
+        """Return the function's outputs, which have the sparsity of ``outputs``."""
+        nonzeros: dict[int, SX] = {}
+        for instruction in self._tape:
+            self._values.append(self._build(instruction))
+            if instruction.operation == ca.OP_OUTPUT:
+                nonzeros[instruction.place] = self._values[-1]
+        results = [SX(output) for output in outputs]
+        places = count()
+        for result in results:
+            for k in range(result.nnz()):
+                result.nz[k] = nonzeros[next(places)]
+        return results
 
-    def _built(self, node: _Node) -> SX:
-        if node.operation == ca.OP_INPUT:
-            return self._symbols[node.arguments[0]]
-        if node.operation == ca.OP_CONST:
-            return SX(node.constant)
-        arguments = [self._values[i] for i in node.arguments]
-        if node.operation == ca.OP_OUTPUT:
+    def _build(self, instruction: Instruction) -> SX:
+        operation = instruction.operation
+        if operation == ca.OP_INPUT:
+            return self._symbols[instruction.place]
+        if operation == ca.OP_CONST:
+            return SX(instruction.constant)
+        arguments = [self._values[i] for i in instruction.arguments]
+        if operation == ca.OP_OUTPUT:
             return arguments[0]
-        if node.operation == ca.OP_DIV:
-            return self._quotient(*node.arguments)
-        if node.operation in (ca.OP_SIN, ca.OP_COS):
-            cos, sin = self._turn(node.arguments[0])
-            return sin if node.operation == ca.OP_SIN else cos
+        if operation == ca.OP_DIV:
+            return self._divide(*instruction.arguments)
+        if operation in (ca.OP_SIN, ca.OP_COS):
+            cos, sin = self._cos_sin(instruction.arguments[0])
+            return sin if operation == ca.OP_SIN else cos
         build = SX.unary if len(arguments) == 1 else SX.binary
-        return build(node.operation, *arguments)
+        return build(operation, *arguments)
 
-    def _quotient(self, dividend: int, divisor: int) -> SX:
-        node = self._nodes[divisor]
+    def _divide(self, dividend: int, divisor: int) -> SX:
+        node = self._tape[divisor]
         if node.operation == ca.OP_CONST:
             return self._values[dividend] * (1.0 / node.constant)
-        if node.divisions < 2:
+        if self._divisions[divisor] < 2:
             return self._values[dividend] / self._values[divisor]
         if divisor not in self._reciprocals:
             self._reciprocals[divisor] = 1.0 / self._values[divisor]
-        return _product(self._values[dividend], self._reciprocals[divisor])
+        return _multiply(self._values[dividend], self._reciprocals[divisor])
 
-    def _turn(self, angle: int) -> tuple[SX, SX]:
+    def _cos_sin(self, angle: int) -> tuple[SX, SX]:
         """Cosine and sine of an angle, in closed form where that is possible."""
-        node = self._nodes[angle]
+        node = self._tape[angle]
         if node.operation == ca.OP_NEG:
-            cos, sin = self._turn(node.arguments[0])
+            cos, sin = self._cos_sin(node.arguments[0])
             return cos, -sin
-        if not self._closed(angle):
+        if not self._has_closed_form(angle):
             return ca.cos(self._values[angle]), ca.sin(self._values[angle])
         if node.operation == ca.OP_ACOS:
             cos = self._values[node.arguments[0]]
@@ -149,34 +114,34 @@ class _Rewriter:
             y, x = (self._values[i] for i in node.arguments)
             square = self._square(node.arguments[1]) + self._square(node.arguments[0])
             scale = 1.0 / ca.sqrt(ca.fmax(square, LEAST_SQUARE))
-            return _product(x, scale), _product(y, scale)
-        (cos_a, sin_a), (cos_b, sin_b) = (self._turn(i) for i in node.arguments)
+            return _multiply(x, scale), _multiply(y, scale)
+        (cos_a, sin_a), (cos_b, sin_b) = (self._cos_sin(i) for i in node.arguments)
         if node.operation == ca.OP_SUB:
             sin_b = -sin_b
         return cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b
 
-    def _closed(self, angle: int) -> bool:
+    def _has_closed_form(self, angle: int) -> bool:
         """Whether an angle is acos, atan2, or a sum, difference or negative of such angles."""
-        node = self._nodes[angle]
+        node = self._tape[angle]
         if node.operation in (ca.OP_ADD, ca.OP_SUB, ca.OP_NEG):
-            return all(self._closed(i) for i in node.arguments)
+            return all(self._has_closed_form(i) for i in node.arguments)
         return node.operation in (ca.OP_ACOS, ca.OP_ATAN2)
 
     def _square(self, number: int) -> SX:
         """Square of a node, without a detour over a sign or a root."""
-        node = self._nodes[number]
+        node = self._tape[number]
         if node.operation == ca.OP_NEG:
             return self._square(node.arguments[0])
         return self._values[node.arguments[0]] if node.operation == ca.OP_SQRT else self._values[number] ** 2
 
 
-def _product(factor: SX, reciprocal: SX) -> SX:
-    with _unsimplified():
+def _multiply(factor: SX, reciprocal: SX) -> SX:
+    with _without_simplification():
         return factor * reciprocal
 
 
 @contextmanager
-def _unsimplified() -> Iterator[None]:
+def _without_simplification() -> Iterator[None]:
     """Keeps CasADi from turning a product with a reciprocal back into a division."""
     before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(False)

@@ -10,6 +10,7 @@ from casadi import SX
 
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Integers, Plan, Row
 from nlp_gait.backends.derivatives.structure import Structure, scalars
+from nlp_gait.symbolic.tape import read_tape
 
 
 class Glue(NamedTuple):
@@ -80,11 +81,8 @@ class Assembler:
     def _used(self) -> Integers:
         """(y,) whether any glue reads it."""
         rows = ca.vertcat(*(stage.inputs for stage in self.structure.stages), self.structure.rows)
-        function = ca.Function("all", [self.y, self.structure.p], [rows])
-        found = np.zeros(self.y.shape[0], bool)
-        for k in range(function.n_instructions()):
-            if function.instruction_id(k) == ca.OP_INPUT:
-                which, place = function.instruction_input(k)[:2]
-                if which == 0:
-                    found[place] = True
-        return found
+        found = np.zeros(self.y.shape[0] + self.structure.p.shape[0], bool)
+        for each in read_tape(ca.Function("all", [self.y, self.structure.p], [rows])):
+            if each.operation == ca.OP_INPUT:
+                found[each.place] = True
+        return found[: self.y.shape[0]]

@@ -1,13 +1,13 @@
-"""CasADi's scalar operations as C++, for lanes and for single numbers, and the instructions of a function in their order."""
+"""CasADi's scalar operations as C++, for lanes and for single numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import casadi as ca
 
 from nlp_gait.backends.derivatives.structure import NotMapped
+from nlp_gait.symbolic.tape import Instruction, read_tape
 
 # {f} is the prefix of functions: of lanes or of numbers (``native/nlp.hpp``).
 EXPRESSIONS = {
@@ -68,50 +68,13 @@ EXPRESSIONS = {
 CODES = {operation: code for code, operation in enumerate(EXPRESSIONS)}
 
 
-class Instruction(NamedTuple):
-    """An operation on the results of earlier instructions.
-
-    Attributes:
-        operation: CasADi's number of it.
-        arguments: indices of instructions; of an input, its place in all inputs one after the other.
-        place: of an output, its place in all outputs.
-        constant: value of a constant.
-        register: number of the place that CasADi keeps the result at until it is no longer needed.
-    """
-
-    operation: int
-    arguments: tuple[int, ...]
-    place: int = -1
-    constant: float = 0.0
-    register: int = -1
-
-
-def instructions(function: ca.Function) -> Iterator[Instruction]:
-    """Instructions of a function of scalar operations.
+def read_operations(function: ca.Function) -> Iterator[Instruction]:
+    """Yield the instructions of a function of scalar operations.
 
     Raises:
-        NotMapped: an operation that has no C++ here.
+        NotMapped: an operation has no C++ here.
     """
-    starts = [0]
-    for i in range(function.n_in()):
-        starts.append(starts[-1] + function.nnz_in(i))
-    ends = [0]
-    for i in range(function.n_out()):
-        ends.append(ends[-1] + function.nnz_out(i))
-    writer: dict[int, int] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            yield Instruction(operation, (writer[inputs[0]],), place=ends[outputs[0]] + outputs[1])
-            continue
-        register = outputs[0]
-        if operation == ca.OP_INPUT:
-            yield Instruction(operation, (starts[inputs[0]] + inputs[1],), register=register)
-        elif operation == ca.OP_CONST:
-            yield Instruction(operation, (), constant=function.instruction_constant(k), register=register)
-        elif operation in EXPRESSIONS:
-            yield Instruction(operation, tuple(writer[place] for place in inputs), register=register)
-        else:
-            raise NotMapped(f"operation {operation} of function {function.name()}")
-        writer[register] = k
+    for instruction in read_tape(function):
+        if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
+            raise NotMapped(f"operation {instruction.operation} of function {function.name()}")
+        yield instruction

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.operations import CODES, instructions
+from nlp_gait.backends.derivatives.operations import CODES, read_operations
 
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 ONE = 0  # place of the number 1
@@ -130,10 +130,10 @@ class Plan:
         begin = len(self.tape)
         at: list[int] = []
         registers: dict[int, int] = {}
-        for each in instructions(function):
-            arguments = [at[k] for k in each.arguments] if each.operation != ca.OP_INPUT else []
+        for each in read_operations(function):
+            arguments = [at[k] for k in each.arguments]
             if each.operation == ca.OP_INPUT:
-                at.append(int(source[each.arguments[0]]))
+                at.append(int(source[each.place]))
                 continue
             if each.operation == ca.OP_CONST:
                 at.append(self.constant(each.constant))

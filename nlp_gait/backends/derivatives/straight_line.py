@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from nlp_gait.backends.derivatives.operations import EXPRESSIONS, instructions
+from nlp_gait.backends.derivatives.operations import EXPRESSIONS, read_operations
 
 # Operations of one piece: longer ones take the compiler longer for each operation, shorter ones pass more values by memory.
 PIECE = 500
@@ -14,9 +14,9 @@ PIECE = 500
 
 def straight_line(name: str, function: ca.Function) -> str:
     """C++ of ``void name(const Vector* in, Vector* out)``, with all inputs one after the other, and all outputs."""
-    listed = list(instructions(function))
+    listed = list(read_operations(function))
     free = {
-        k: f"in[{each.arguments[0]}]" if each.operation == ca.OP_INPUT else literal(each.constant)
+        k: f"in[{each.place}]" if each.operation == ca.OP_INPUT else literal(each.constant)
         for k, each in enumerate(listed)
         if each.operation in (ca.OP_INPUT, ca.OP_CONST)
     }
