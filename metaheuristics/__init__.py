@@ -6,7 +6,6 @@ Independent of any problem and of CasADi: an objective is anything that follows 
     result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
 """
 
-from metaheuristics.adapters.function import PlainFunction
 from metaheuristics.algorithms.ant_colony import AntColony
 from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
@@ -17,10 +16,10 @@ from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonL
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
 from metaheuristics.minimize import minimize
-from metaheuristics.own import as_algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms
 from metaheuristics.result import History, Interrupted, Result
+from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 
 __all__ = [
     "ADAPTERS",

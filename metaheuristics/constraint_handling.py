@@ -93,7 +93,7 @@ class ConstraintHandling(Protocol):
 
     @property
     def name(self) -> str:
-        """What to print in a report."""
+        """Name in reports."""
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
         """Give the rule in force.

@@ -1,13 +1,13 @@
-"""The root of the errors that this package raises on purpose."""
+"""Errors of this package."""
 
 from __future__ import annotations
 
 
 class SearchError(Exception):
-    """A setting, a problem or an answer of the objective that no search can work with.
+    """A setting, a problem or a result of the objective that no search can use.
 
     The message says what is wrong, the value, what is allowed and what to do. Poor convergence and failed evaluations
-    are not errors: they are data in `Result`. The message is one line, whatever the values in it are.
+    are not errors: they are data in `Result`. The message is always one line.
     """
 
     def __init__(self, *arguments: object) -> None:
@@ -17,10 +17,10 @@ class SearchError(Exception):
 LONGEST_VALUE = 80  # characters of a value in a message
 
 
-def shown(value: object) -> str:
-    """A value in a message: short, and whatever it is."""
+def abbreviate(value: object) -> str:
+    """Return a short text of any value for a message."""
     try:
         text = repr(value)
-    except Exception:  # somebody else's class; or a whole number too long to print
+    except Exception:  # a class with a broken repr, or a whole number too long to print
         text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."

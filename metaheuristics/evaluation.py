@@ -13,7 +13,7 @@ from metaheuristics.errors import SearchError
 from metaheuristics.interface import BatchObjective
 from metaheuristics.result import History
 
-Observer = Callable[[Array, Array, Array], object]
+Callback = Callable[[Array, Array, Array], object]
 """Receives X (P, n), f (P,) and violation (P,) of a generation; f and violation are infinite where failed."""
 
 
@@ -30,16 +30,16 @@ class Evaluator:
         generations: So far.
     """
 
-    def __init__(self, objective: BatchObjective, observe: Observer | None, thinned: bool = False) -> None:
+    def __init__(self, objective: BatchObjective, callback: Callback | None, thinned: bool = False) -> None:
         """Start the clock.
 
         Args:
             objective: What to evaluate.
-            observe: Called after each generation; None for nothing.
+            callback: Called after each generation; None for nothing.
             thinned: Keep one entry of the history for each better point, and the last one.
         """
         self._objective = objective
-        self._observe = observe
+        self._callback = callback
         self._thinned = thinned
         self._started = perf_counter()
         self._history: list[tuple[int, float, float, float]] = []
@@ -57,7 +57,7 @@ class Evaluator:
         return perf_counter() - self._started
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Evaluate a generation, record it and show it to the observer.
+        """Evaluate a generation, record it and call the callback.
 
         Args:
             X: (P, n) points, P >= 1.
@@ -73,7 +73,7 @@ class Evaluator:
         before = perf_counter()
         answer = self._objective(shown)
         self.objective_time_s += perf_counter() - before
-        f, violation, failed = mark_failed(*_checked_answer(answer, len(X)))
+        f, violation, failed = mark_failed(*_read_answer(answer, len(X)))
 
         self.evaluations += len(X)
         self.failed += int(np.count_nonzero(failed))
@@ -86,12 +86,12 @@ class Evaluator:
         if self._thinned and self.stagnation > 1:
             self._history.pop()
         self._history.append((self.evaluations, self.best[1], self.best[0], self.elapsed_s))
-        if self._observe is not None:
-            self._observe(shown, f, violation)
+        if self._callback is not None:
+            self._callback(shown, f, violation)
         return f, violation
 
     def history(self) -> History:
-        """Give the record so far as arrays."""
+        """Return the history so far as arrays."""
         columns = [np.array(column) for column in zip(*self._history, strict=True)]
         for column in columns:
             column.setflags(write=False)
@@ -99,7 +99,7 @@ class Evaluator:
         return History(evaluations=evaluations, objective=objective, violation=violation, elapsed_s=elapsed_s)
 
 
-def _checked_answer(answer: object, count: int) -> tuple[Array, Array]:
+def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
     """Turn what the objective returned into f and violation, or say what is wrong with it."""
     wanted = f"the objective must return (f, violation), two arrays of shape ({count},) for {count} points"
     if not isinstance(answer, tuple) or len(answer) != 2:

@@ -1,4 +1,4 @@
-"""What the loop in `minimize.py` needs of an objective and of an algorithm.
+"""Protocols of objectives and algorithms for the loop in `minimize.py`.
 
 The loop owns everything that must be equal for all algorithms: the starting points, the count of evaluations, the
 marking of failed evaluations, the constraint handling and the record. An algorithm only proposes points (`ask`) and
@@ -7,6 +7,7 @@ learns from them (`tell`), so an adapter to another package is a small class wit
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
@@ -52,32 +53,32 @@ class BatchObjective(Bounded, Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Constraints:
-    """The constraints of an objective one by one, where it can tell them apart; see `Start`.
+    """Separate constraints of an objective that provides them; see `Start`.
 
-    An objective has them if it has the attributes `excess` and `groups`, as here.
+    An objective provides them by the attributes `inequalities` and `groups`, as here.
 
     Attributes:
-        excess: Of points (P, n) within the bounds, by how much each of m rows is exceeded, (P, m): a row is met where it is
-            <= 0. It is asked for points that are evaluated anyhow, and counts no evaluation.
-        groups: (m,) the constraint that each row belongs to; rows of one constraint stand together.
+        inequalities: Values (P, m) of m rows at points (P, n) within the bounds; a row is satisfied where its value is
+            <= 0. Called only for points that are also evaluated; does not count as an evaluation.
+        groups: (m,) the constraint that each row belongs to; rows of one constraint are adjacent.
     """
 
-    excess: Callable[[Array], Array]
+    inequalities: Callable[[Array], Array]
     groups: tuple[str, ...]
 
     def worst(self, X: Array) -> Array:
-        """(P, c) the greatest excess within each constraint, of points (P, n); 1e30 where it has no finite value."""
+        """Return the greatest value (P, c) within each constraint at points (P, n); 1e30 where it is not finite."""
         first = [k for k, name in enumerate(self.groups) if k == 0 or name != self.groups[k - 1]]
-        excess = np.nan_to_num(self.excess(X), nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN)
-        return np.asarray(np.maximum.reduceat(excess, first, axis=1))
+        values = np.nan_to_num(self.inequalities(X), nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN)
+        return np.asarray(np.maximum.reduceat(values, first, axis=1))
 
 
-UNKNOWN = 1e30  # excess of a row that has no finite value
+UNKNOWN = 1e30  # value of a row without a finite value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Start:
-    """All that an algorithm is given at the start of a run.
+    """Inputs of an algorithm at the start of a run.
 
     Attributes:
         lower: (n,) lower bounds, read-only.
@@ -85,7 +86,7 @@ class Start:
         initial: (P, n) starting points, read-only; P is the population of the algorithm. The first `ask` returns them.
         evaluations: Budget of the run, a hint for algorithms that plan ahead.
         rng: The only source of randomness of the search.
-        constraints: One by one, for searches that learn from each; None where only their total violation is known.
+        constraints: Separate constraints, for searches that use them; None where only the total violation is available.
     """
 
     lower: Array
@@ -95,8 +96,8 @@ class Start:
     rng: np.random.Generator
     constraints: Constraints | None = None
 
-    def excess(self, X: Array, violation: Array) -> Array:
-        """(P, c) excess of each constraint at points (P, n); without `constraints`, the violation (P,) as the only one."""
+    def inequalities(self, X: Array, violation: Array) -> Array:
+        """Return each constraint's value (P, c) at points (P, n); without `constraints`, the violation (P,) as the only one."""
         if self.constraints is not None:
             return self.constraints.worst(X)
         return np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)[:, None]
@@ -113,10 +114,10 @@ class Search(Protocol):
         """
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule, /) -> None:
-        """Learn from the points asked last.
+        """Learn from the points of the last `ask`.
 
-        The loop tells whole generations only: when the budget cuts one short, or any stopping criterion holds, the
-        run ends without telling, as nothing would be asked afterwards.
+        Called with whole generations only: when the budget cuts one short, or a stopping criterion is met, the run
+        ends without this call.
 
         Args:
             X: (P, n) points of the last `ask`.
@@ -126,28 +127,28 @@ class Search(Protocol):
         """
 
     def stop(self) -> tuple[str, ...]:
-        """Say why the search cannot usefully go on.
+        """Return the reasons why the search cannot usefully continue.
 
         Returns:
-            Reasons in words; empty to go on.
+            Reasons in words; empty to continue.
         """
 
 
 class PopulationSearch(Generic[Settings]):
-    """Base of searches that hold the points to ask for, the starting points first; `tell` is theirs."""
+    """Base of searches that store the points of the next `ask`, the starting points first; subclasses add `tell`."""
 
     def __init__(self, settings: Settings, start: Start) -> None:
-        """Hold the starting points."""
+        """Store the starting points."""
         self._settings = settings
         self._start = start
         self._X = start.initial
 
     def ask(self) -> Array:
-        """Return the points held, (P, n)."""
+        """Return the stored points (P, n)."""
         return self._X
 
     def stop(self) -> tuple[str, ...]:
-        """Return no reason: the search goes on until the budget ends."""
+        """Return no reason: the search continues until the budget ends."""
         return ()
 
 
@@ -160,7 +161,7 @@ class Algorithm(Protocol):
 
     @property
     def population(self) -> int:
-        """Number of starting points that it wants."""
+        """Number of starting points."""
 
     def start(self, start: Start, /) -> Search:
         """Begin a run.
@@ -169,5 +170,21 @@ class Algorithm(Protocol):
             start: Bounds, starting points, budget and generator.
 
         Returns:
-            The search, ready to be asked.
+            The search, ready for `ask`.
         """
+
+
+# Evaluates points (P, n) as a generation; raises `Ended` once the run is over.
+Evaluate = Callable[[Array], tuple[Array, Array, Rule]]
+
+
+class Ended(BaseException):
+    """End of a run; not an `Exception`, so that no optimiser treats it as a failed evaluation."""
+
+
+class CallingSearch(ABC):
+    """Base of searches that call the objective instead of being asked; see `minimize`."""
+
+    @abstractmethod
+    def run(self, evaluate: Evaluate) -> str:
+        """Call `evaluate` until it raises `Ended`; return the reason if the search ends by itself."""

@@ -7,21 +7,20 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metaheuristics.adapters.function import CallingSearch, Ended
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, Rule
 from metaheuristics.errors import SearchError
-from metaheuristics.evaluation import Evaluator, Observer
-from metaheuristics.interface import Algorithm, BatchObjective
+from metaheuristics.evaluation import Callback, Evaluator
+from metaheuristics.interface import Algorithm, BatchObjective, CallingSearch, Ended
 from metaheuristics.preparation import (
     check_helpers,
     check_limits,
+    check_points,
+    check_reasons,
     check_search,
-    checked_points,
-    checked_reasons,
-    checked_seed,
-    entropy,
-    prepared,
+    plain_entropy,
+    prepare_start,
+    seed_sequence,
 )
 from metaheuristics.result import Interrupted, Result
 
@@ -39,7 +38,7 @@ def minimize(
     stagnation: int | None = None,
     time_limit_s: float | None = None,
     initial: ArrayLike | None = None,
-    observe: Observer | None = None,
+    callback: Callback | None = None,
 ) -> Result:
     """Minimise an objective within bounds and constraints.
 
@@ -58,28 +57,30 @@ def minimize(
         stagnation: Stop after so many generations without a better best.
         time_limit_s: Stop after the first generation that ends beyond this time [s].
         initial: (R, n) points within the bounds that replace the first R starting points, R <= population.
-        observe: Called after each generation with X, f and violation, which it may keep but must not change; f and
+        callback: Called after each generation with X, f and violation, which it may keep but must not change; f and
             violation are infinite where the evaluation failed.
 
     Returns:
-        The result: there is always a best point, and the reasons why the run ended.
+        The result: there is always a best point, and the reasons for ending.
 
     Raises:
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
     check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
-    check_helpers(handling, observe)
-    sequence = checked_seed(seed)
-    start = prepared(objective, algorithm.population, evaluations, sequence, initial)
+    check_helpers(handling, callback)
+    sequence = seed_sequence(seed)
+    start = prepare_start(objective, algorithm.population, evaluations, sequence, initial)
     search = algorithm.start(start)
     if not isinstance(search, CallingSearch):
         check_search(search, algorithm)
-    evaluate = Evaluator(objective, observe, thinned=isinstance(search, CallingSearch))  # which calls point by point
+    evaluate = Evaluator(
+        objective, callback, thinned=isinstance(search, CallingSearch)
+    )  # which evaluates point by point
     initial_violation: Array | None = None
 
     def generation(X: Array) -> tuple[Array, Array, Array, Rule]:
-        """What fits of a generation: points, objectives, violations, and the rule that compares them."""
+        """Evaluate the part of a generation that fits the budget; return points, objectives, violations and the rule."""
         nonlocal initial_violation
         X = X[: evaluations - evaluate.evaluations]
         f, violation = evaluate(X)
@@ -94,7 +95,7 @@ def minimize(
             f"no better point in {stagnation} generations": evaluate.stagnation >= (stagnation or np.inf),
             "time limit reached": evaluate.elapsed_s >= (time_limit_s or np.inf),
         }
-        return [reason for reason, holds in reached.items() if holds]
+        return [reason for reason, is_reached in reached.items() if is_reached]
 
     def result(reasons: list[str]) -> Result:
         all_failed = evaluate.failed == evaluate.evaluations
@@ -112,19 +113,19 @@ def minimize(
             objective_time_s=evaluate.objective_time_s,
             algorithm=algorithm,
             handling=handling,
-            seed_entropy=entropy(sequence),
+            seed_entropy=plain_entropy(sequence),
             seed_spawn_key=tuple(sequence.spawn_key),
         )
 
     try:
         if isinstance(search, CallingSearch):
-            return result(_called(search, generation, limits_reached))
+            return result(_run_calling(search, generation, limits_reached))
         while True:
-            X, f, violation, rule = generation(checked_points(search.ask(), start.lower, start.upper))
+            X, f, violation, rule = generation(check_points(search.ask(), start.lower, start.upper))
             reasons = limits_reached()
             if not reasons:
                 search.tell(X, f, violation, rule)
-                reasons = checked_reasons(search.stop())
+                reasons = check_reasons(search.stop())
             if reasons:
                 return result(reasons)
     except KeyboardInterrupt as interrupt:
@@ -133,12 +134,12 @@ def minimize(
         raise Interrupted(result(["interrupted"])) from interrupt
 
 
-def _called(
+def _run_calling(
     search: CallingSearch,
     generation: Callable[[Array], tuple[Array, Array, Array, Rule]],
     limits_reached: Callable[[], list[str]],
 ) -> list[str]:
-    """Let a function call the objective until it returns or a limit is reached; why it ended.
+    """Let a function call the objective until it returns or a limit is reached; return the reasons for ending.
 
     Raises:
         SearchError: it returned without any evaluation.
@@ -148,7 +149,7 @@ def _called(
 
     def evaluate(points: Array) -> tuple[Array, Array, Rule]:
         nonlocal called
-        if reasons:  # it went on although it was ended
+        if reasons:  # the function ignored the first `Ended`
             raise Ended
         X, f, violation, rule = generation(points)
         called = True

@@ -1,4 +1,4 @@
-"""Before the loop: arguments checked, seeds split, starting points drawn."""
+"""Preparation of a run: checks of arguments, seeds, starting points."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from metaheuristics.array import Array, real_array
-from metaheuristics.errors import SearchError, shown
+from metaheuristics.errors import SearchError, abbreviate
 from metaheuristics.interface import Algorithm, Bounded, Constraints, Start
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 
 
-def prepared(
+def prepare_start(
     objective: Bounded,
     population: int,
     evaluations: int,
     seed: np.random.SeedSequence,
     initial: ArrayLike | None = None,
 ) -> Start:
-    """All that an algorithm is given; SearchError where the bounds, or given starting points (R, n), are not allowed."""
-    lower, upper = checked_bounds(objective)
-    excess, groups = getattr(objective, "excess", None), getattr(objective, "groups", ())
+    """Return the inputs of an algorithm; raises SearchError for bounds or starting points (R, n) that are not allowed."""
+    lower, upper = read_bounds(objective)
+    values, groups = getattr(objective, "inequalities", None), getattr(objective, "groups", ())
     return Start(
         lower=lower,
         upper=upper,
-        initial=starting_points(lower, upper, population, initial, child(seed, 0)),
+        initial=starting_points(lower, upper, population, initial, spawn_child(seed, 0)),
         evaluations=evaluations,
-        rng=np.random.default_rng(child(seed, 1)),
-        constraints=Constraints(excess=excess, groups=tuple(groups)) if callable(excess) and groups else None,
+        rng=np.random.default_rng(spawn_child(seed, 1)),
+        constraints=Constraints(inequalities=values, groups=tuple(groups)) if callable(values) and groups else None,
     )
 
 
-def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
+def read_bounds(objective: Bounded) -> tuple[Array, Array]:
     """Copy the bounds.
 
     Args:
@@ -48,11 +48,11 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
         SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
     """
     if not callable(objective) or not all(hasattr(objective, part) for part in ("names", "lower", "upper")):
-        raise SearchError(f"objective must be a function of X with names, lower and upper, got {shown(objective)}")
+        raise SearchError(f"objective must be a function of X with names, lower and upper, got {abbreviate(objective)}")
     try:
         names = tuple(objective.names)
     except TypeError:
-        raise SearchError(f"names must be one for each variable, got {shown(objective.names)}") from None
+        raise SearchError(f"names must be one for each variable, got {abbreviate(objective.names)}") from None
     try:
         lower, upper = np.array(real_array(objective.lower)), np.array(real_array(objective.upper))
     except (TypeError, ValueError) as error:
@@ -74,7 +74,7 @@ def checked_bounds(objective: Bounded) -> tuple[Array, Array]:
 
 
 class UnitCube:
-    """The variables that are free, as shares of their ranges: where searches work that want a cube.
+    """Free variables scaled to the unit cube, for searches that work there.
 
     Attributes:
         size: k, number of free variables.
@@ -88,16 +88,16 @@ class UnitCube:
         self.size = int(self._free.size)
 
     def shares(self, X: Array) -> Array:
-        """(..., k) positions in the cube of points (..., n)."""
+        """Return the positions (..., k) in the cube of points (..., n)."""
         return np.asarray((X[..., self._free] - self._lower) / self._range)
 
     def points(self, Z: Array) -> Array:
-        """Points (P, n) within the bounds at positions (P, k)."""
-        return completed(self._lower + Z * self._range, self._start.lower, self._start.upper)
+        """Return the points (P, n) within the bounds at positions (P, k)."""
+        return fill_fixed(self._lower + Z * self._range, self._start.lower, self._start.upper)
 
 
-def completed(free: Array, lower: Array, upper: Array) -> Array:
-    """Points (P, n) within the bounds (n,), from values (P, k) of the variables that are free: their bounds differ."""
+def fill_fixed(free: Array, lower: Array, upper: Array) -> Array:
+    """Return points (P, n) within the bounds (n,) from values (P, k) of the free variables, whose bounds differ."""
     points = np.tile(lower, (len(free), 1))
     points[:, upper > lower] = free
     return np.clip(points, lower, upper)
@@ -118,21 +118,21 @@ def check_limits(
     if isinstance(algorithm, type) or not (
         hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
     ):
-        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {shown(algorithm)}")
+        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {abbreviate(algorithm)}")
     check_population(algorithm)
     if not _whole(evaluations) or evaluations < algorithm.population:
         raise SearchError(
-            f"evaluations must be a whole number >= the population of {called(algorithm)!r}, {algorithm.population}, got "
-            f"{shown(evaluations)}: raise the budget or take a smaller population"
+            f"evaluations must be a whole number >= the population of {name_of(algorithm)!r}, {algorithm.population}, got "
+            f"{abbreviate(evaluations)}: raise the budget or take a smaller population"
         )
     if target is not None and (not _number(target) or math.isnan(target)):
-        raise SearchError(f"target must be a number or None, got {shown(target)}")
+        raise SearchError(f"target must be a number or None, got {abbreviate(target)}")
     if stagnation is not None and (not _whole(stagnation) or stagnation < 1):
         raise SearchError(
-            f"stagnation must be a whole number of generations >= 1, or None for never, got {shown(stagnation)}"
+            f"stagnation must be a whole number of generations >= 1, or None for never, got {abbreviate(stagnation)}"
         )
     if time_limit_s is not None and not (_number(time_limit_s) and time_limit_s > 0.0):
-        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {shown(time_limit_s)}")
+        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(time_limit_s)}")
 
 
 def check_population(algorithm: Algorithm, name: str = "") -> None:
@@ -140,32 +140,32 @@ def check_population(algorithm: Algorithm, name: str = "") -> None:
     population = getattr(algorithm, "population", None)
     if not isinstance(population, Integral) or isinstance(population, bool) or population < 1:
         raise SearchError(
-            f"algorithm {name or called(algorithm)!r}: population must be a whole number >= 1, got {shown(population)}"
+            f"algorithm {name or name_of(algorithm)!r}: population must be a whole number >= 1, got {abbreviate(population)}"
         )
 
 
 def check_search(search: object, algorithm: Algorithm) -> None:
-    """Raise SearchError unless what an algorithm has started can be asked and told."""
+    """Raise SearchError unless a search has `ask`, `tell` and `stop`."""
     missing = [part for part in ("ask", "tell", "stop") if not callable(getattr(search, part, None))]
     if missing:
         raise SearchError(
-            f"algorithm {called(algorithm)!r}: start must return a search with {', '.join(missing)}, got {shown(search)}"
+            f"algorithm {name_of(algorithm)!r}: start must return a search with {', '.join(missing)}, got {abbreviate(search)}"
         )
 
 
-def checked_reasons(reasons: object) -> list[str]:
-    """Why a search stops; SearchError unless these are texts."""
+def check_reasons(reasons: object) -> list[str]:
+    """Return the reasons of a search to stop; raises SearchError unless these are texts."""
     if not isinstance(reasons, (list, tuple)) or not all(isinstance(reason, str) for reason in reasons):
-        raise SearchError(f"stop must return a list of reasons as texts, empty to go on, got {shown(reasons)}")
+        raise SearchError(f"stop must return a list of reasons as texts, empty to continue, got {abbreviate(reasons)}")
     return list(reasons)
 
 
-def check_helpers(handling: object, observe: object) -> None:
-    """Raise SearchError unless these are a constraint handling and, if there is one, a function."""
+def check_helpers(handling: object, callback: object) -> None:
+    """Raise SearchError unless these are a constraint handling and a function or None."""
     if isinstance(handling, type) or not callable(getattr(handling, "rule", None)):
-        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {shown(handling)}")
-    if observe is not None and not callable(observe):
-        raise SearchError(f"observe must be a function of X, f and violation, got {shown(observe)}")
+        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {abbreviate(handling)}")
+    if callback is not None and not callable(callback):
+        raise SearchError(f"callback must be a function of X, f and violation, got {abbreviate(callback)}")
 
 
 def _whole(value: object) -> bool:
@@ -176,13 +176,13 @@ def _number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def called(algorithm: Algorithm) -> str:
-    """Name of an algorithm; one of a user's own may have none."""
+def name_of(algorithm: Algorithm) -> str:
+    """Return the name of an algorithm; a user's class may have none."""
     return str(getattr(algorithm, "name", type(algorithm).__name__))
 
 
-def checked_points(asked: object, lower: Array, upper: Array) -> Array:
-    """Points that an algorithm asks for, (P, n).
+def check_points(asked: object, lower: Array, upper: Array) -> Array:
+    """Return the points (P, n) of an `ask`.
 
     Raises:
         SearchError: another shape, no point, NaN, or a point outside the bounds.
@@ -190,10 +190,12 @@ def checked_points(asked: object, lower: Array, upper: Array) -> Array:
     try:
         points = real_array(asked)
     except (TypeError, ValueError) as error:
-        raise SearchError(f"ask must return points (P, {len(lower)}); it returned no numbers: {error}") from error
+        raise SearchError(
+            f"ask must return points (P, {len(lower)}); it returned something other than numbers: {error}"
+        ) from error
     if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
         raise SearchError(f"ask must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}")
-    outside = _first_outside(points, lower, upper)
+    outside = _find_outside(points, lower, upper)
     if outside is not None:
         row, column = outside
         raise SearchError(
@@ -203,8 +205,8 @@ def checked_points(asked: object, lower: Array, upper: Array) -> Array:
     return points
 
 
-def _first_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] | None:
-    """Row and column of the first value of points (P, n) that lies outside the bounds (n,); None if none does."""
+def _find_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] | None:
+    """Return row and column of the first value of points (P, n) outside the bounds (n,), or None."""
     outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
     if not outside.any():
         return None
@@ -212,27 +214,27 @@ def _first_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int]
     return row, column
 
 
-def checked_seed(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
-    """Wrap a seed, unless it is wrapped.
+def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
+    """Return a seed as a SeedSequence.
 
     Raises:
-        SearchError: It is neither a whole number >= 0 nor a SeedSequence.
+        SearchError: The seed is neither a whole number >= 0 nor a SeedSequence.
     """
     if isinstance(seed, np.random.SeedSequence):
         return seed
     if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
-        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {shown(seed)}")
+        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {abbreviate(seed)}")
     return np.random.SeedSequence(int(seed))
 
 
-def child(parent: np.random.SeedSequence, index: int) -> np.random.SeedSequence:
-    """Give the child that a first `spawn` would, without counting it as spawned in the parent."""
+def spawn_child(parent: np.random.SeedSequence, index: int) -> np.random.SeedSequence:
+    """Return the child that a first `spawn` would give, without counting it in the parent."""
     spawn_key = (*parent.spawn_key, index)
     return np.random.SeedSequence(parent.entropy, spawn_key=spawn_key, pool_size=parent.pool_size)
 
 
-def entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
-    """Give the entropy of a seed as plain data."""
+def plain_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
+    """Return the entropy of a seed as plain data."""
     parts: list[int] | int = np.asarray(sequence.entropy, dtype=object).tolist()
     return tuple(map(int, parts)) if isinstance(parts, list) else int(parts)
 
@@ -261,13 +263,13 @@ def starting_points(
         try:
             rows = np.array(real_array(given))
         except (TypeError, ValueError, OverflowError) as error:
-            raise SearchError(f"initial must be rows of numbers, got {shown(given)}: {error}") from error
+            raise SearchError(f"initial must be rows of numbers, got {abbreviate(given)}: {error}") from error
         if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
             raise SearchError(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "
                 f"algorithm; got {rows.shape}"
             )
-        outside = _first_outside(rows, lower, upper)
+        outside = _find_outside(rows, lower, upper)
         if outside is not None:
             row, column = outside
             raise SearchError(

@@ -4,65 +4,83 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
-from types import MappingProxyType
-from typing import Any, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeVar
 
-from metaheuristics.adapters.cma import CmaEs
-from metaheuristics.adapters.cma_lagrangian import CmaLagrangian
-from metaheuristics.adapters.egobox import BayesianOptimisation
-from metaheuristics.adapters.many_starts import CobyqaStarts, SlsqpStarts
-from metaheuristics.adapters.pymoo import MODULES, Pymoo
-from metaheuristics.algorithms.ant_colony import AntColony
-from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
-from metaheuristics.algorithms.differential_evolution import DifferentialEvolution
-from metaheuristics.algorithms.genetic import GeneticAlgorithm
-from metaheuristics.algorithms.lshade import LShade
-from metaheuristics.algorithms.particle_swarm import ParticleSwarm
-from metaheuristics.algorithms.random_search import RandomSearch
-from metaheuristics.algorithms.sobol import SobolPoints
+from metaheuristics.adapters.pymoo import FRONT_MODULES, MODULES
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
-from metaheuristics.errors import SearchError, shown
+from metaheuristics.errors import SearchError, abbreviate
 from metaheuristics.interface import Algorithm
 from metaheuristics.settings import check_installed, is_installed
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from metaheuristics.multi_objective.interface import FrontAlgorithm
 
-ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
+T = TypeVar("T", covariant=True)
+
+
+class _Factories(Mapping[str, Callable[..., T]]):
+    """Classes of settings by name; each module is imported when its class is first used."""
+
+    def __init__(self, paths: Mapping[str, str]) -> None:
+        self._paths = paths
+
+    def __getitem__(self, name: str) -> Callable[..., T]:
+        module, _, kind = self._paths[name].partition(":")
+        factory: Callable[..., T] = getattr(import_module(f"metaheuristics.{module}"), kind)
+        return partial(factory, algorithm=name.removeprefix("pymoo:")) if module.endswith("pymoo") else factory
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+
+ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = _Factories(
     {
-        factory.name: factory
-        for factory in (
-            ParticleSwarm,
-            GeneticAlgorithm,
-            AntColony,
-            AntColonyGrid,
-            DifferentialEvolution,
-            LShade,
-            RandomSearch,
-            SobolPoints,
-        )
+        "pso": "algorithms.particle_swarm:ParticleSwarm",
+        "ga": "algorithms.genetic:GeneticAlgorithm",
+        "aco": "algorithms.ant_colony:AntColony",
+        "aco-grid": "algorithms.ant_colony_grid:AntColonyGrid",
+        "de": "algorithms.differential_evolution:DifferentialEvolution",
+        "lshade": "algorithms.lshade:LShade",
+        "random": "algorithms.random_search:RandomSearch",
+        "sobol": "algorithms.random_search:SobolPoints",
     }
 )
 """This package's own algorithms."""
 
-_SINGLE: Mapping[str, Callable[..., Any]] = {  # SciPy's are not asked: they call
-    "cma": CmaEs,
-    "cma-al": CmaLagrangian,
-    "bayes": BayesianOptimisation,
-    "scipy:SLSQP": SlsqpStarts,
-    "scipy:COBYQA": CobyqaStarts,
-}
-ADAPTERS: Mapping[str, Callable[..., Algorithm]] = MappingProxyType(
-    {**_SINGLE, **{f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES}}
+ADAPTERS: Mapping[str, Callable[..., Algorithm]] = _Factories(
+    {
+        "cma": "adapters.cma:CmaEs",
+        "cma-al": "adapters.cma:CmaLagrangian",
+        "bayes": "adapters.egobox:BayesianOptimisation",
+        "scipy:SLSQP": "adapters.many_starts:SlsqpStarts",
+        "scipy:COBYQA": "adapters.many_starts:CobyqaStarts",
+        **{f"pymoo:{name}": "adapters.pymoo:Pymoo" for name in MODULES},
+    }
 )
 """Those of other packages: `pip install 'nlp-gait[algorithms]'` installs them, and `'nlp-gait[bayes]'` that of `bayes`."""
 
+FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = _Factories(
+    {
+        **{name: "multi_objective.pymoo:MultiObjective" for name in FRONT_MODULES},
+        "CMOEAD": "multi_objective.constrained_moead:ConstrainedMoead",
+        "DCNSGA3": "multi_objective.dynamic_nsga3:DynamicConstrainedNsga3",
+    }
+)
+"""Those for several objectives; all use operators of pymoo, which `pip install 'nlp-gait[algorithms]'` installs."""
+
 PACKAGES = {"cma-al": "cma", "bayes": "egobox"}  # of adapters whose names do not begin with the package's
 
-HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = MappingProxyType(
-    {"deb": Deb, "penalty": StaticPenalty, "epsilon": EpsilonLevel}
-)
+HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = {
+    "deb": Deb,
+    "penalty": StaticPenalty,
+    "epsilon": EpsilonLevel,
+}
 
 
 def algorithm(name: str, /, **settings: object) -> Algorithm:
@@ -81,7 +99,7 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
     """
     if isinstance(name, str) and name in ADAPTERS:
         check_installed(name, _package(name))
-    return made("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
+    return make_by_name("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
 
 def installed_algorithms() -> tuple[str, ...]:
@@ -103,13 +121,15 @@ def handling(name: str, /, **settings: object) -> ConstraintHandling:
     Raises:
         SearchError: Unknown name or setting, a setting that is missing, or a value that is not allowed.
     """
-    return made("constraint handling", name, HANDLINGS, settings)
+    return make_by_name("constraint handling", name, HANDLINGS, settings)
 
 
-def made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
-    """What a factory makes of settings, by its name; SearchError as `algorithm` raises it."""
+def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
+    """Call the factory of that name with settings; raises SearchError as `algorithm` does."""
     if not isinstance(name, str):
-        raise SearchError(f"the name of {'an' if kind[0] in 'aeiou' else 'a'} {kind} must be a text, got {shown(name)}")
+        raise SearchError(
+            f"the name of {'an' if kind[0] in 'aeiou' else 'a'} {kind} must be a text, got {abbreviate(name)}"
+        )
     if name not in factories:
         raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
     factory = factories[name]
@@ -121,6 +141,19 @@ def made(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settin
         if parameter.default is parameter.empty and setting not in settings:
             raise SearchError(f"{kind} {name!r} needs a value for {setting!r}")
     return factory(**settings)
+
+
+def front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
+    """Make an algorithm for several objectives by name.
+
+    Args:
+        name: A key of `FRONT_ALGORITHMS`.
+        settings: Settings that differ from the defaults.
+
+    Raises:
+        SearchError: Unknown name or setting, a value that is not allowed, or pymoo is not installed.
+    """
+    return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 
 def _suggest(word: str, known: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""What a run leaves behind."""
+"""Result of a run."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Result:
         failed_evaluations: Evaluations that gave NaN or infinity.
         generations: Batches evaluated, the starting points being the first.
         history: Best so far after each generation.
-        reasons: Why the run ended, in words; also "every evaluation failed" where that is so.
+        reasons: Reasons for ending, in words; also "every evaluation failed" where that is so.
         time_s: Wall-clock time of the run [s].
         objective_time_s: Part of it spent in the objective [s].
         algorithm: Settings used.
@@ -75,14 +75,14 @@ class Result:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a run, with what was found until then.
+    """Ctrl-C during a run, with the partial result.
 
     It propagates as any KeyboardInterrupt does, so that it ends a whole study and not only the run in progress. To get
     the partial result, catch it and read `result`.
     """
 
     def __init__(self, result: Result) -> None:
-        """Keep the partial result.
+        """Store the partial result.
 
         Args:
             result: All complete generations; its reasons are ("interrupted",).
@@ -91,4 +91,4 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
     def __str__(self) -> str:
-        return f"interrupted after {self.result.evaluations} evaluations; the attribute 'result' keeps what was found"
+        return f"interrupted after {self.result.evaluations} evaluations; the attribute 'result' has the partial result"

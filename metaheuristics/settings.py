@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
-from metaheuristics.errors import SearchError, shown
+from metaheuristics.errors import SearchError, abbreviate
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -94,6 +94,6 @@ def bad_setting(settings: DataclassInstance, name: str, allowed: str) -> SearchE
     Returns:
         The error, which names setting, value, what is allowed and the default as a way out.
     """
-    message = f"{type(settings).__name__}: {name} must be {allowed}, got {shown(getattr(settings, name))}"
+    message = f"{type(settings).__name__}: {name} must be {allowed}, got {abbreviate(getattr(settings, name))}"
     default = next(field.default for field in fields(settings) if field.name == name)
     return SearchError(message if default is MISSING else f"{message}; leave it out for the default, {default!r}")

@@ -16,15 +16,15 @@ Run = Callable[[Task, RunRecord | None], RunRecord]
 LONGEST_REASON = 500  # characters of an error that a record keeps
 
 
-def run_task(task: Task, start: RunRecord | None = None, observe: Callable[..., None] | None = None) -> RunRecord:
+def run_task(task: Task, start: RunRecord | None = None, callback: Callable[..., None] | None = None) -> RunRecord:
     """Do one run and judge it.
 
     Args:
         task: what to run.
         start: the run that this one polishes, if it does.
-        observe: called with X, f, violation of every generation (search algorithms only).
+        callback: called with X, f, violation of every generation (search algorithms only).
     """
-    return search_run(task, observe) if task.is_search else gradient_run(task, start)
+    return search_run(task, callback) if task.is_search else gradient_run(task, start)
 
 
 def attempt(task: Task, start: RunRecord | None = None, run: Run = run_task) -> RunRecord:

@@ -1,7 +1,8 @@
-"""CMA-ES of the package cma (pycma), restarted with a growing population."""
+"""CMA-ES of the package cma (pycma), restarted with a growing population; also with an augmented Lagrangian."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,8 +19,8 @@ from metaheuristics.settings import check_count, check_number
 class CmaEs:
     """Covariance matrix adaptation, with pycma's own settings but for those below.
 
-    It sees nothing of objective and violation but the order that the constraint rule gives, which is all that CMA-ES
-    uses of them. The shared starting points are its first generation; the first distribution is centred on their best.
+    It sees only the order of the points by the constraint rule, which is all that CMA-ES uses of objective and
+    violation. The shared starting points are its first generation; the first distribution is centred on their best.
     Once pycma would stop, it starts again from a random point with a larger population, until the budget ends.
 
     Attributes:
@@ -69,15 +70,15 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
         if self._strategy is None:
             self._strategy = self._begin(self._centre(X[rule.best(f, violation)]))
         else:
-            self._strategy.tell(self._asked, self._ranked(X, f, violation, rule))
+            self._strategy.tell(self._asked, self._costs(X, f, violation, rule))
             if self._strategy.stop():
                 self._size *= self._settings.growth
                 self._strategy = self._begin(self._start.rng.random(max(2, self._cube.size)))
         self._asked = self._strategy.ask()
         self._X = self._cube.points(np.array(self._asked)[:, : self._cube.size])
 
-    def _ranked(self, X: Array, f: Array, violation: Array, rule: Rule) -> list[float]:
-        """What pycma is told of each point: its place in the rule's order."""
+    def _costs(self, X: Array, f: Array, violation: Array, rule: Rule) -> list[float]:
+        """Return the rank of each point in the rule's order: all that pycma learns of it."""
         order = rule.order(f, violation)
         ranks = np.empty(len(order))
         ranks[order] = np.arange(len(order))
@@ -110,3 +111,64 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
     def _centre(self, x: Array) -> Array:
         """Position (max(2, free),) of a point in the unit cube."""
         return np.concatenate([self._cube.shares(x), np.full(max(0, 2 - self._cube.size), 0.5)])
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CmaLagrangian(CmaEs):
+    """CMA-ES that minimises an augmented Lagrangian, whose multipliers pycma adapts; restarted with a growing population.
+
+    Each constraint is its worst row; where the objective cannot separate them, the total violation is the only one. The
+    constraint handling of the study decides only where the first distribution is centred.
+
+    Source:
+        Atamna, Auger, Hansen (2017), Linearly convergent evolution strategies via augmented Lagrangian constraint handling;
+        Dufosse, Hansen (2021), Augmented Lagrangian, penalty techniques and surrogate modeling for constrained optimization
+        with CMA-ES; as in `cma.ConstrainedFitnessAL`.
+    """
+
+    name: ClassVar[str] = "cma-al"
+
+    def start(self, start: Start) -> CmaLagrangianSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return CmaLagrangianSearch(self, start)
+
+
+class CmaLagrangianSearch(CmaEsSearch):
+    """A run of `CmaLagrangian`; see `Search`."""
+
+    def __init__(self, settings: CmaEs, start: Start) -> None:
+        """Ask for the starting points first."""
+        super().__init__(settings, start)
+        self._fitness: Any = None
+        self._current: tuple[float, Array] = (np.inf, np.empty(0))
+
+    def _costs(self, X: Array, f: Array, violation: Array, rule: Rule) -> list[float]:
+        """Return the augmented Lagrangian of each point, whose coefficients pycma then adapts; failed evaluations come last."""
+        inequalities = self._start.inequalities(X, violation)
+        worked = np.isfinite(f)
+        values = np.zeros(len(f))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of coefficients that are not set yet
+            for k in np.flatnonzero(worked):
+                self._current = float(f[k]), inequalities[k]
+                values[k] = self._fitness(self._asked[k])
+            self._fitness.update(self._strategy)
+        values[~worked] = values.max() + 1.0
+        return values.tolist()
+
+    def _begin(self, centre: Array) -> Any:
+        from cma import ConstrainedFitnessAL
+
+        self._fitness = ConstrainedFitnessAL(
+            lambda x: self._current[0],
+            lambda x: self._current[1],
+            dimension=len(centre),
+            which="best",
+            logging=0,
+            archives=False,
+        )
+        return super()._begin(centre)
+
+    def _criteria(self) -> dict[str, float]:
+        """Pycma's own, which see the values of the Lagrangian."""
+        return {}

@@ -21,8 +21,8 @@ class BayesianOptimisation:
     """Bayesian optimisation: Gaussian processes of the objective and of each constraint say where to look next.
 
     egobox's own settings: the logarithm of expected improvement within the constraints' predicted means. Each constraint is
-    its worst row, and its excess is told as sign(c) ln(1 + |c|), as it spans many powers of ten. The constraint handling of
-    the study is not asked. After 500 evaluations it stops: fitting takes longer with every point.
+    its worst row, modelled as sign(c) ln(1 + |c|), as it spans many powers of ten. The constraint handling of the study
+    is not used. After 500 evaluations it stops: fitting takes longer with every point.
 
     Attributes:
         population: points evaluated before the first model; 20 are about two for each of 9 variables.
@@ -63,12 +63,12 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
         """Fit the models and ask for the most promising point; see `Search.tell`."""
         if not self._cube.size:
             return
-        excess = self._start.excess(X, violation)
-        values = np.column_stack([f, np.sign(excess) * np.log1p(np.abs(excess))])
-        worked = np.isfinite(f)  # egobox is not told of failed evaluations
+        inequalities = self._start.inequalities(X, violation)
+        values = np.column_stack([f, np.sign(inequalities) * np.log1p(np.abs(inequalities))])
+        worked = np.isfinite(f)  # egobox does not see failed evaluations
         self._known = np.concatenate([self._known, self._cube.shares(X)[worked]])
         self._values = values[worked] if self._values is None else np.concatenate([self._values, values[worked]])
-        self._X = self._cube.points(self._next())
+        self._X = self._cube.points(self._suggest())
 
     def stop(self) -> tuple[str, ...]:
         """Give up where there is nothing to vary, or too much to fit."""
@@ -76,8 +76,8 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
             return ("all variables are fixed",)
         return (f"fitting to more than {MOST} points takes too long",) if len(self._known) >= MOST else ()
 
-    def _next(self) -> Array:
-        """(1, k) the most promising point; a random one as long as there is too little to fit."""
+    def _suggest(self) -> Array:
+        """Return the most promising point (1, k); a random one while there is too little to fit."""
         values = self._values
         if values is None or len(values) < self._settings.population or not np.ptp(values[:, 0]) > 0.0:
             return self._start.rng.random((1, self._cube.size))

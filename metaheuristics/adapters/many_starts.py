@@ -1,4 +1,4 @@
-"""Local solvers of SciPy, begun again from random points until the budget ends."""
+"""Local solvers of SciPy, restarted from random points until the budget ends."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from metaheuristics.adapters.function import CallingSearch, Evaluate
 from metaheuristics.array import Array
-from metaheuristics.interface import UNKNOWN, Start
+from metaheuristics.interface import UNKNOWN, CallingSearch, Evaluate, Start
 from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_number
 
@@ -18,15 +17,15 @@ DIFFERENCE = 1.5e-8  # of forward differences, as a share of each variable's ran
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScipyStarts:
-    """What the local solvers of SciPy share: starts, and how they see the constraints.
+    """Base of the local solvers of SciPy: starts, and how they see the constraints.
 
-    Where the objective cannot tell its constraints apart, the total violation is the only one. The constraint handling of the
-    study is not asked.
+    Where the objective cannot separate its constraints, the total violation is the only one. The constraint handling of the
+    study is not used.
 
     Attributes:
         population: starting points, which all searches share; further starts are drawn uniformly.
-        margin: by which each constraint is to be kept, in units of its scale, as a solver stops a little outside its
-            constraints, and a search counts that as infeasible. The total violation has no inside, and is kept as it is.
+        margin: tightens each constraint, in units of its scale: a solver stops slightly outside its constraints, which a
+            search counts as infeasible. Not applied to the total violation, which has no inside.
         iterations: limit for one start.
 
     Raises:
@@ -90,34 +89,34 @@ class _Functions:
         self._slope: tuple[bytes, Array, Array] = (b"", np.empty(0), np.empty((0, 0)))
 
     def at(self, z: Array) -> tuple[float, Array]:
-        """Objective, and by how much each constraint is exceeded (m,)."""
+        """Return the objective and the constraint values (m,)."""
         key = z.tobytes()
         if self._at[0] != key:
-            f, excess = self._values(z[None])
-            self._at = key, float(f[0]), excess[0]
+            f, values = self._values(z[None])
+            self._at = key, float(f[0]), values[0]
         return self._at[1], self._at[2]
 
     def slope(self, z: Array) -> tuple[Array, Array]:
-        """Forward differences: gradient (k,) of the objective and Jacobian (m, k) of the excess."""
+        """Return forward differences: gradient (k,) of the objective and Jacobian (m, k) of the constraint values."""
         key = z.tobytes()
         if self._slope[0] != key:
-            f, excess = self.at(z)
+            f, values = self.at(z)
             step = np.where(z + DIFFERENCE <= 1.0, DIFFERENCE, -DIFFERENCE)
             shifted_f, shifted = self._values(z + np.diag(step))
-            self._slope = key, (shifted_f - f) / step, ((shifted - excess) / step[:, None]).T
+            self._slope = key, (shifted_f - f) / step, ((shifted - values) / step[:, None]).T
         return self._slope[1], self._slope[2]
 
     def _values(self, Z: Array) -> tuple[Array, Array]:
         X = self.cube.points(np.clip(Z, 0.0, 1.0))
         f, violation, _ = self._evaluate(X)
         constraints = self._start.constraints
-        if constraints is None:  # COBYQA takes what is exactly zero for a constraint that binds
+        if constraints is None:  # COBYQA treats exactly zero as a binding constraint
             met = 0.0 if self._settings.by_row else -1.0
-            excess = np.where(violation > 0.0, violation, met)[:, None]
+            values = np.where(violation > 0.0, violation, met)[:, None]
         else:
-            excess = constraints.excess(X) if self._settings.by_row else constraints.worst(X)
-            excess = excess + self._settings.margin
-        finite = np.clip(np.nan_to_num(excess, nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN), -UNKNOWN, UNKNOWN)
+            values = constraints.inequalities(X) if self._settings.by_row else constraints.worst(X)
+            values = values + self._settings.margin
+        finite = np.clip(np.nan_to_num(values, nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN), -UNKNOWN, UNKNOWN)
         return np.minimum(f, UNKNOWN), finite
 
 
@@ -128,22 +127,22 @@ class ScipyStartsSearch(CallingSearch):
         self._settings, self._start = settings, start
 
     def run(self, evaluate: Evaluate) -> str:
-        """Start after start, until `evaluate` ends it."""
+        """Run start after start until `evaluate` ends the run."""
         functions = _Functions(self._start, self._settings, evaluate)
         cube = functions.cube
         if not cube.size:
             evaluate(np.array(self._start.initial))
             return "all variables are fixed"
-        begin = _slsqp if self._settings.method == "SLSQP" else _cobyqa
+        solve = _slsqp if self._settings.method == "SLSQP" else _cobyqa
         starts = iter(self._start.initial)
         while True:
             x0 = next(starts, None)
             z0 = self._start.rng.random(cube.size) if x0 is None else cube.shares(x0)
-            begin(functions, z0, self._settings.iterations)
+            solve(functions, z0, self._settings.iterations)
 
 
 def _slsqp(functions: _Functions, z0: Array, iterations: int) -> Any:
-    return _minimised(
+    return _minimize(
         functions,
         z0,
         method="SLSQP",
@@ -160,7 +159,7 @@ def _slsqp(functions: _Functions, z0: Array, iterations: int) -> Any:
 def _cobyqa(functions: _Functions, z0: Array, iterations: int) -> Any:
     from scipy.optimize import NonlinearConstraint
 
-    return _minimised(
+    return _minimize(
         functions,
         z0,
         method="COBYQA",
@@ -169,7 +168,7 @@ def _cobyqa(functions: _Functions, z0: Array, iterations: int) -> Any:
     )
 
 
-def _minimised(functions: _Functions, z0: Array, **how: Any) -> Any:
+def _minimize(functions: _Functions, z0: Array, **how: Any) -> Any:
     from scipy.optimize import minimize
 
     return minimize(lambda z: functions.at(z)[0], z0, bounds=[(0.0, 1.0)] * len(z0), **how)

@@ -13,7 +13,7 @@ from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import fill_fixed
 from metaheuristics.settings import bad_setting, check_count, check_installed
 
 MODULES: Mapping[str, str] = {
@@ -30,11 +30,12 @@ MODULES: Mapping[str, str] = {
     "SPEA2": "moo.spea2",
     "SRES": "soo.nonconvex.sres",
 }
+FRONT_MODULES: Mapping[str, str] = {"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PymooSettings:
-    """An algorithm of pymoo with its own defaults, begun from the starting points.
+    """An algorithm of pymoo with its own defaults, started from the starting points.
 
     Attributes:
         algorithm: Class name in pymoo, for example "GA".
@@ -60,8 +61,8 @@ class PymooSettings:
         check_count(self, "population", at_least=5)
         check_installed(self.algorithm, "pymoo")
 
-    def begun(self, start: Start, objectives: int = 1) -> Any:
-        """Begin pymoo's own search of the variables that are free; raises SearchError if it does not take the settings."""
+    def begin(self, start: Start, objectives: int = 1) -> Any:
+        """Begin pymoo's own search of the free variables; raises SearchError if it does not take the settings."""
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
 
@@ -82,7 +83,7 @@ class Pymoo(PymooSettings):
     """An algorithm of pymoo for one objective; many-objective ones get one.
 
     pymoo prefers feasible points by itself, as Deb's rules do. It is given the objective and the violation as the
-    constraint rule in force sees them, for its whole population anew in each generation.
+    constraint rule in force sees them, for its whole population again in each generation.
     """
 
     modules: ClassVar[Mapping[str, str]] = MODULES
@@ -105,7 +106,7 @@ class PymooSearch(PopulationSearch[Pymoo]):
         super().__init__(settings, start)
         self._algorithm: Any = None
         if (start.upper > start.lower).any():
-            self._algorithm = settings.begun(start)
+            self._algorithm = settings.begin(start)
             self._infills = self._algorithm.ask()
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
@@ -119,7 +120,7 @@ class PymooSearch(PopulationSearch[Pymoo]):
         self._set_values([*members, *self._infills], rule)
         self._algorithm.tell(infills=self._infills)
         self._infills = self._algorithm.ask()
-        self._X = completed(self._infills.get("X"), self._start.lower, self._start.upper)
+        self._X = fill_fixed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def stop(self) -> tuple[str, ...]:
         """Give up if there is nothing to vary."""
@@ -132,6 +133,6 @@ class PymooSearch(PopulationSearch[Pymoo]):
         violation, objective = rule.keys(raw[:, 0], raw[:, 1])
         # Finite, for the sums and differences that some algorithms take: failed evaluations still come last.
         objective, violation = (np.nan_to_num(values, posinf=1e30) for values in (objective, violation))
-        for individual, value, excess in zip(individuals, objective, violation, strict=True):
-            individual.F, individual.G, individual.H = np.array([value]), np.array([excess]), np.zeros(0)
+        for individual, value, violated_by in zip(individuals, objective, violation, strict=True):
+            individual.F, individual.G, individual.H = np.array([value]), np.array([violated_by]), np.zeros(0)
             individual.evaluated = {"F", "G", "H"}

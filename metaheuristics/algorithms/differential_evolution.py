@@ -32,14 +32,14 @@ MOST_OTHERS = 5
 class DifferentialEvolution:
     """Each member of the population meets a trial, which takes its place unless the constraint rule finds the member better.
 
-    A trial takes some variables from a mutant and the others from the member. Variables beyond a bound are drawn anew within
+    A trial takes some variables from a mutant and the others from the member. Variables beyond a bound are drawn again within
     the bounds. Strategies, defaults and the order of random numbers are those of `scipy.optimize.differential_evolution`
     with deferred updating and without polishing, so that both make equal trials of equal members.
 
     Attributes:
         population: Members. SciPy's default is 15 for each variable; 50 is what the other algorithms here have.
         strategy: Mutation and crossover, binomial or exponential, as SciPy names them.
-        mutation_low: Least weight of a difference; the weight is drawn anew for each generation.
+        mutation_low: Least weight of a difference; the weight is drawn again for each generation.
         mutation_high: Greatest weight of a difference.
         recombination: Probability of taking a variable from the mutant.
 
@@ -70,10 +70,10 @@ class DifferentialEvolution:
         return DifferentialEvolutionSearch(self, start)
 
 
-def crossed(
+def cross_over(
     members: Array, mutants: Array, first: NDArray[np.int64], draws: NDArray[np.bool_], exponential: bool
 ) -> Array:
-    """Trials that take the variable `first` from their mutant, and others at random.
+    """Return trials that take the variable `first` from their mutant, and others at random.
 
     Args:
         members: (P, n).
@@ -108,7 +108,7 @@ class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
         trials = Points(X, f, violation)
         if self._members is not None:
             members = self._members
-            trials = trials.replaced(rule.better(members.f, members.violation, f, violation), members)
+            trials = trials.replace_rows(rule.better(members.f, members.violation, f, violation), members)
         # Best first, and trials keep the places of their members.
         self._members = trials.best(len(trials.f), rule)
         self._X = self._trials(self._members.X)
@@ -125,7 +125,7 @@ class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
         mutants = MUTATIONS[settings.strategy[:-3]](members, members[0], others, weight)
         first = rng.integers(members.shape[1], size=len(members))
         draws = rng.uniform(size=members.shape) < settings.recombination
-        trials = crossed(members, mutants, first, draws, settings.strategy.endswith("exp"))
+        trials = cross_over(members, mutants, first, draws, settings.strategy.endswith("exp"))
         beyond = (trials < 0.0) | (trials > 1.0)
         trials[beyond] = rng.uniform(size=np.count_nonzero(beyond))
         return np.clip(middle + (trials - 0.5) * width, start.lower, start.upper)

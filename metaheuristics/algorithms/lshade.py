@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.algorithms.differential_evolution import crossed
+from metaheuristics.algorithms.differential_evolution import cross_over
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
@@ -37,8 +37,8 @@ class LShade:
 
     Source:
         Tanabe, Fukunaga (2014), Improving the search performance of SHADE using linear population size reduction; epsilon
-        levels after Takahama, Sakai (2006). The source has no constraints: a success that the violation decides counts there
-        by how much the violation fell, and each kind of success has the weight of its largest.
+        levels after Takahama, Sakai (2006). The source has no constraints: a improved that the violation decides counts there
+        by how much the violation fell, and each kind of improved has the weight of its largest.
     """
 
     population: int = 162
@@ -104,23 +104,23 @@ class LShadeSearch(PopulationSearch[LShade]):
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Select, learn, shrink and make the next trials; see `Search.tell`."""
-        told = Points(X, f, violation)
+        trials = Points(X, f, violation)
         self._used += len(X)
-        self._members = self._selected(told, rule) if len(self._members.f) else told
+        self._members = self._select(trials, rule) if len(self._members.f) else trials
         self._shrink(rule)
-        self._X = self._trials(rule)
+        self._X = self._make_trials(rule)
 
-    def _selected(self, trials: Points, rule: Rule) -> Points:
-        """Members, or trials where the rule does not find the member better; what succeeded is learned."""
+    def _select(self, trials: Points, rule: Rule) -> Points:
+        """Return members, or trials where the rule does not find the member better; learn from improvements."""
         members = self._members
         worse = rule.better(members.f, members.violation, trials.f, trials.violation)
-        success = rule.better(trials.f, trials.violation, members.f, members.violation)
-        if success.any():
-            keys = (rule.keys(points.f[success], points.violation[success]) for points in (members, trials))
+        improved = rule.better(trials.f, trials.violation, members.f, members.violation)
+        if improved.any():
+            keys = (rule.keys(points.f[improved], points.violation[improved]) for points in (members, trials))
             before, after = keys
-            self._learn(self._F[success], self._CR[success], gains(before, after))
-            self._archive = self._cut(np.concatenate([self._archive, members.X[success]]))
-        return members.replaced(~worse, trials)
+            self._learn(self._F[improved], self._CR[improved], gains(before, after))
+            self._archive = self._cut(np.concatenate([self._archive, members.X[improved]]))
+        return members.replace_rows(~worse, trials)
 
     def _learn(self, F: Array, CR: Array, weights: Array) -> None:
         # Algorithm 1 of the source.
@@ -142,13 +142,13 @@ class LShadeSearch(PopulationSearch[LShade]):
         most = round(self._settings.archive * len(self._members.f))
         return archive if len(archive) <= most else archive[self._start.rng.permutation(len(archive))[:most]]
 
-    def _trials(self, rule: Rule) -> Array:
+    def _make_trials(self, rule: Rule) -> Array:
         start, rng, X = self._start, self._start.rng, self._members.X
         count, n = X.shape
         entry = rng.integers(self._settings.memory, size=count)
         rates = np.array([np.nan if rate is None else rate for rate in self._rates])[entry]
         self._CR = np.where(np.isnan(rates), 0.0, np.clip(rng.normal(np.nan_to_num(rates), SPREAD), 0.0, 1.0))
-        self._F = _drawn_weights(self._weights[entry], rng)
+        self._F = _draw_weights(self._weights[entry], rng)
         best = rule.order(self._members.f, self._members.violation)[: max(2, round(self._settings.best * count))]
         towards = X[best[rng.integers(len(best), size=count)]]
         first, second = _two_others(count, count + len(self._archive), rng)
@@ -158,12 +158,12 @@ class LShadeSearch(PopulationSearch[LShade]):
         mutants = np.where(mutants < start.lower, (start.lower + X) / 2, mutants)
         mutants = np.where(mutants > start.upper, (start.upper + X) / 2, mutants)
         draws = rng.random((count, n)) < self._CR[:, None]
-        trials = crossed(X, mutants, rng.integers(n, size=len(X)), draws, exponential=False)
+        trials = cross_over(X, mutants, rng.integers(n, size=len(X)), draws, exponential=False)
         return np.clip(trials, start.lower, start.upper)
 
 
-def _drawn_weights(centres: Array, rng: np.random.Generator) -> Array:
-    """Cauchy's draws, anew until they are above 0, at most 1."""
+def _draw_weights(centres: Array, rng: np.random.Generator) -> Array:
+    """Draw from Cauchy's distribution again until the values are above 0; cap them at 1."""
     drawn = centres + SPREAD * rng.standard_cauchy(len(centres))
     while (low := drawn <= 0.0).any():
         drawn[low] = centres[low] + SPREAD * rng.standard_cauchy(int(low.sum()))

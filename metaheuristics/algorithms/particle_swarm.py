@@ -111,7 +111,7 @@ class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         """Update the bests and move; see `Search.tell`."""
         improved = rule.better(f, violation, self._own.f, self._own.violation)
-        self._own = self._own.replaced(improved, Points(X, f, violation))
+        self._own = self._own.replace_rows(improved, Points(X, f, violation))
         leader = self._own.X[rule.best(self._own.f, self._own.violation)]
 
         settings, start = self._settings, self._start

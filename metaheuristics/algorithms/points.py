@@ -37,7 +37,7 @@ class Points(NamedTuple):
         """Append the rows of others."""
         return Points(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
-    def replaced(self, rows: NDArray[np.bool_], by: Points) -> Points:
+    def replace_rows(self, rows: NDArray[np.bool_], by: Points) -> Points:
         """Put the same rows of others, of equal number, in place of those that are True."""
         return Points(
             np.where(rows[:, None], by.X, self.X),

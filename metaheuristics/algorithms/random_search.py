@@ -1,4 +1,4 @@
-"""Uniform random search: what every other algorithm has to beat."""
+"""Random search and Sobol points: the baselines that every other algorithm has to beat."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count
 
 
@@ -43,3 +44,54 @@ class RandomSearchRun(PopulationSearch[RandomSearch]):
         start = self._start
         width = start.upper - start.lower
         self._X = np.clip(start.lower + start.rng.random(start.initial.shape) * width, start.lower, start.upper)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SobolPoints:
+    """Points of a scrambled Sobol sequence over the variables that are free; nothing is learned.
+
+    Attributes:
+        population: starting points, which all searches share, before the sequence begins.
+        batch: points of the sequence asked for at once.
+
+    Raises:
+        SearchError: a setting is not allowed.
+
+    Source:
+        Sobol (1967), On the distribution of points in a cube; Owen (1998), Scrambling Sobol and Niederreiter-Xing points;
+        as in `scipy.stats.qmc.Sobol`.
+    """
+
+    population: int = 1
+    batch: int = 64
+    name: ClassVar[str] = "sobol"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=1)
+        check_count(self, "batch", at_least=1)
+
+    def start(self, start: Start) -> SobolRun:
+        """Begin a run; see `Algorithm.start`."""
+        return SobolRun(self, start)
+
+
+class SobolRun(PopulationSearch[SobolPoints]):
+    """A run of `SobolPoints`; see `Search`."""
+
+    def __init__(self, settings: SobolPoints, start: Start) -> None:
+        """Ask for the starting points first."""
+        from scipy.stats.qmc import Sobol
+
+        super().__init__(settings, start)
+        self._cube = UnitCube(start)
+        seed = int(start.rng.integers(2**31))
+        self._sequence = Sobol(self._cube.size, seed=np.random.default_rng(seed)) if self._cube.size else None
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        """Take the next points; see `Search.tell`."""
+        if self._sequence is not None:
+            self._X = self._cube.points(self._sequence.random(self._settings.batch))
+
+    def stop(self) -> tuple[str, ...]:
+        """Give up if there is nothing to vary."""
+        return ("all variables are fixed",) if self._sequence is None else ()

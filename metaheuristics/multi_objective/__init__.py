@@ -5,7 +5,7 @@ snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_0
 
 from metaheuristics.multi_objective.interface import FrontAlgorithm, ManyObjectives, check_budgets
 from metaheuristics.multi_objective.minimize_many import Snapshot, minimize_many
-from metaheuristics.multi_objective.registry import FRONT_ALGORITHMS, front_algorithm
+from metaheuristics.registry import FRONT_ALGORITHMS, front_algorithm
 
 __all__ = [
     "FRONT_ALGORITHMS",

@@ -38,7 +38,7 @@ class ConstrainedMoead:
     Source:
         Jain, Deb (2014), An evolutionary many-objective optimization algorithm using reference-point-based nondominated
         sorting approach, part II, IEEE Transactions on Evolutionary Computation 18(4), 602-622; Zhang, Li (2007), MOEA/D.
-        Read was not the paper but its implementation in PlatEMO, whose defaults these are.
+        Implemented from PlatEMO, not from the paper; the defaults are PlatEMO's.
     """
 
     population: int = 100
@@ -67,10 +67,10 @@ class ConstrainedMoead:
         return ConstrainedMoeadSearch(self, start, objectives)
 
 
-def taken(
+def places_to_take(
     old: Array, new: Array, violation: Array, child_violation: float, places: NDArray[np.intp], most: int
 ) -> NDArray[np.intp]:
-    """Which places a child takes.
+    """Return the places that a child takes.
 
     Args:
         old: (P,) values of the members at some places, each for its own scalar problem.
@@ -131,7 +131,7 @@ class ConstrainedMoeadSearch:
         weights, places = self._weights[self._places], self._places
         old = self._values.do(self._F[places], weights=weights, ideal_point=self._ideal, _type="one_to_one")
         new = self._values.do(F[0], weights=weights, ideal_point=self._ideal, _type="one_to_many")
-        won = taken(old, new, self._violation[places], float(violation[0]), places, self._most)
+        won = places_to_take(old, new, self._violation[places], float(violation[0]), places, self._most)
         self._X[won], self._F[won], self._violation[won] = X[0], F[0], violation[0]
         self._turn = (self._turn + 1) % len(self._X)
 

@@ -21,7 +21,7 @@ LEAST = 1e-8  # boundary at which the last generation arrives, z
 class DynamicConstrainedNsga3:
     """DCNSGA-III: the mean violation is an objective more, and what counts as feasible tightens generation by generation.
 
-    A point is within the boundary if no constraint is exceeded by more than epsilon, which falls from the greatest excess in
+    A point is within the boundary if no constraint is violated by more than epsilon, which falls from the greatest violation in
     the first generation to zero at the end of the budget. Where more points are within it than the population holds, they are
     sorted by all objectives and the violation, and thinned out along reference directions as in NSGA-III; else those of least
     violation stay.
@@ -37,8 +37,8 @@ class DynamicConstrainedNsga3:
 
     Source:
         Jiao, Zeng, Li, Yang, Ong (2021), Handling constrained many-objective optimization problems via problem
-        transformation, IEEE Transactions on Cybernetics 51(10), 4834-4847. Read was not the paper but its first author's
-        implementation (RuwangJiao/DCNSGA-III, and the one in PlatEMO), whose defaults these are.
+        transformation, IEEE Transactions on Cybernetics 51(10), 4834-4847. Implemented from its first
+        author's code, not from the paper (RuwangJiao/DCNSGA-III, and the one in PlatEMO), whose defaults these are.
     """
 
     population: int = 100
@@ -59,8 +59,8 @@ class DynamicConstrainedNsga3:
         return DynamicNsga3Search(self, start, objectives)
 
 
-def boundary(first: Array, generation: int, generations: int, decrease: float) -> Array:
-    """What each constraint may be exceeded by.
+def compute_boundary(first: Array, generation: int, generations: int, decrease: float) -> Array:
+    """Return the violation allowed for each constraint.
 
     Args:
         first: (c,) in the beginning, > 0.
@@ -89,53 +89,58 @@ class DynamicNsga3Search:
         # The starting points are the first of the generations that fit into the budget.
         self._last = max(1, start.evaluations // settings.population - 1)
         self._generation = 0
-        self._asked = start.initial
+        self._next = start.initial
         self._X = np.empty((0, start.initial.shape[1]))
         self._F = np.empty((0, objectives))
-        self._violation, self._excess = np.empty(0), np.empty((0, 0))
+        self._violation, self._violations = np.empty(0), np.empty((0, 0))
         self._first = np.empty(0)
 
     def ask(self) -> Array:
         """See `FrontSearch.ask`."""
-        return self._asked
+        return self._next
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
         """See `FrontSearch.tell`."""
-        excess = np.maximum(0.0, self._start.excess(X, violation))
+        violations = np.maximum(0.0, self._start.inequalities(X, violation))
         if not len(self._X):
-            self._X, self._F, self._violation, self._excess = np.array(X), np.array(F), np.array(violation), excess
-            largest = np.where(excess < UNKNOWN, excess, 0.0).max(axis=0)
+            self._X, self._F, self._violation, self._violations = (
+                np.array(X),
+                np.array(F),
+                np.array(violation),
+                violations,
+            )
+            largest = np.where(violations < UNKNOWN, violations, 0.0).max(axis=0)
             self._first = np.where(largest > 0.0, largest, 1.0)
         else:
             self._X = np.concatenate([self._X, X])
             self._F = np.concatenate([self._F, F])
             self._violation = np.concatenate([self._violation, violation])
-            self._excess = np.concatenate([self._excess, excess])
-            self._keep(self._chosen(self._epsilon()))
+            self._violations = np.concatenate([self._violations, violations])
+            self._keep(self._select(self._epsilon()))
         self._generation += 1
-        self._asked = self._children()
+        self._next = self._make_children()
 
     def front(self) -> tuple[Array, Array]:
         """See `FrontSearch.front`."""
         return feasible_front(self._X, self._F, self._violation)
 
     def _epsilon(self) -> Array:
-        return boundary(self._first, self._generation, self._last, self._settings.decrease)
+        return compute_boundary(self._first, self._generation, self._last, self._settings.decrease)
 
-    def _children(self) -> Array:
-        """Children of winners of tournaments between two, which less excess beyond the boundary decides."""
+    def _make_children(self) -> Array:
+        """Return children of winners of binary tournaments on the violation beyond the boundary."""
         count, rng = self._settings.population, self._start.rng
-        beyond = np.maximum(0.0, self._excess - self._epsilon()).sum(axis=1)
+        beyond_boundary = np.maximum(0.0, self._violations - self._epsilon()).sum(axis=1)
         drawn = rng.integers(len(self._X), size=(2 * -(-count // 2), 2))
-        pool = np.where(beyond[drawn[:, 0]] <= beyond[drawn[:, 1]], drawn[:, 0], drawn[:, 1])
+        pool = np.where(beyond_boundary[drawn[:, 0]] <= beyond_boundary[drawn[:, 1]], drawn[:, 0], drawn[:, 1])
         half = len(pool) // 2
         return self._vary(self._X[pool[:half]], self._X[pool[half:]])[:count]
 
-    def _chosen(self, epsilon: Array) -> NDArray[np.intp]:
-        """Places of the members that survive."""
+    def _select(self, epsilon: Array) -> NDArray[np.intp]:
+        """Return the positions of the members that survive."""
         size = self._settings.population
-        mean = (self._excess / self._first).mean(axis=1)
-        within = np.flatnonzero((self._excess <= epsilon).all(axis=1))
+        mean = (self._violations / self._first).mean(axis=1)
+        within = np.flatnonzero((self._violations <= epsilon).all(axis=1))
         if len(within) <= size:
             return np.argsort(mean, kind="stable")[:size]
         from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
@@ -150,7 +155,7 @@ class DynamicNsga3Search:
         return chosen
 
     def _spread(self, F: Array, sure: NDArray[np.intp], last: NDArray[np.intp], count: int) -> list[int]:
-        """Which of the last front join the sure ones, by NSGA-III's niches; the ideal point is that of all of them."""
+        """Select members of the last front by NSGA-III's niches; the ideal point is that of all."""
         from pymoo.algorithms.moo.nsga3 import (
             associate_to_niches,
             calc_niche_count,
@@ -169,4 +174,4 @@ class DynamicNsga3Search:
 
     def _keep(self, chosen: NDArray[np.intp]) -> None:
         self._X, self._F = self._X[chosen], self._F[chosen]
-        self._violation, self._excess = self._violation[chosen], self._excess[chosen]
+        self._violation, self._violations = self._violation[chosen], self._violations[chosen]

@@ -1,4 +1,4 @@
-"""What the loop of several objectives needs of the objectives and of an algorithm."""
+"""Protocols of objectives and algorithms for the loop of several objectives."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from metaheuristics.interface import Bounded, Start
 class ManyObjectives(Bounded, Protocol):
     """Objectives to be minimised within bounds, called on many points at once.
 
-    It may tell its constraints apart by `excess` and `groups`, see `metaheuristics.interface.Constraints`.
+    It may separate its constraints by `inequalities` and `groups`, see `metaheuristics.interface.Constraints`.
     """
 
     @property
@@ -33,10 +33,10 @@ class FrontSearch(Protocol):
         """Points (P, n) within the bounds: a generation, or one point where each is learned from at once."""
 
     def tell(self, X: Array, F: Array, violation: Array, /) -> None:
-        """Learn from the points asked last: objectives (P, m), violations (P,), 1e30 where an evaluation failed."""
+        """Learn from the points of the last `ask`: objectives (P, m), violations (P,), 1e30 where an evaluation failed."""
 
     def front(self) -> tuple[Array, Array]:
-        """Feasible members (k, n) of the population, and their objectives (k, m), that no other member betters."""
+        """Return the nondominated feasible members (k, n) of the population and their objectives (k, m)."""
 
 
 class FrontAlgorithm(Protocol):
@@ -59,7 +59,7 @@ class FrontAlgorithm(Protocol):
 
 
 def check_budgets(algorithm: FrontAlgorithm, evaluations: Sequence[int]) -> None:
-    """Refuse budgets that a run cannot be looked at after.
+    """Check the budgets at which snapshots are taken.
 
     Raises:
         SearchError: they do not rise, or the first one is less than a generation.
@@ -72,7 +72,7 @@ def check_budgets(algorithm: FrontAlgorithm, evaluations: Sequence[int]) -> None
 
 
 def feasible_front(X: Array, F: Array, violation: Array) -> tuple[Array, Array]:
-    """Of points (P, n) with objectives (P, m), those without violation (P,) that no other of these betters."""
+    """Return the nondominated points among those without violation (P,), of points (P, n) with objectives (P, m)."""
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
     feasible = np.flatnonzero(violation == 0.0)

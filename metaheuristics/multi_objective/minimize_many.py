@@ -1,4 +1,4 @@
-"""The loop of several objectives: ask, evaluate, tell, and looks at what is found on the way."""
+"""The loop for several objectives: ask, evaluate, tell, with snapshots on the way."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import UNKNOWN
 from metaheuristics.multi_objective.interface import FrontAlgorithm, ManyObjectives, check_budgets
-from metaheuristics.preparation import checked_seed, prepared
+from metaheuristics.preparation import prepare_start, seed_sequence
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
@@ -46,16 +46,16 @@ def minimize_many(
     seed: int = 0,
     progress: Callable[[int], None] = lambda used: None,
 ) -> tuple[Snapshot, ...]:
-    """One run, looked at each time that another budget is used.
+    """Run an algorithm once and take a snapshot at each budget.
 
-    For an algorithm that does not know its budget each look is a run of that budget; DCNSGA3 plans for the last one.
+    For an algorithm that does not know its budget each snapshot equals a run of that budget; DCNSGA3 plans for the last one.
 
     Args:
         objectives: what to minimise.
         algorithm: settings.
         evaluations: budgets, rising; each at least the population. Of the last generation before each only whole ones count.
         seed: of starting points and search; equal seeds start alike whatever the algorithm.
-        progress: told the evaluations used, after each generation.
+        progress: called with the evaluations used after each generation.
 
     Returns:
         A snapshot for each budget.
@@ -65,9 +65,9 @@ def minimize_many(
     """
     check_budgets(algorithm, evaluations)
     budgets = list(evaluations)
-    start = prepared(objectives, algorithm.population, budgets[-1], checked_seed(seed))
+    start = prepare_start(objectives, algorithm.population, budgets[-1], seed_sequence(seed))
     if not (start.upper > start.lower).any():
-        raise SearchError("all variables are fixed, so there is no front to look for; widen the bounds of one")
+        raise SearchError("all variables are fixed, so there is no front; widen the bounds of one")
     began, in_objectives = process_time(), 0.0
     search = algorithm.start(start, objectives.count)
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 
-from metaheuristics.adapters.pymoo import PymooSettings
+from metaheuristics.adapters.pymoo import FRONT_MODULES, PymooSettings
 from metaheuristics.array import Array
 from metaheuristics.interface import Start
-from metaheuristics.preparation import completed
-
-MODULES: Mapping[str, str] = MappingProxyType({"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"})
+from metaheuristics.preparation import fill_fixed
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -27,7 +24,7 @@ class MultiObjective(PymooSettings):
     """
 
     population: int = 100
-    modules: ClassVar[Mapping[str, str]] = MODULES
+    modules: ClassVar[Mapping[str, str]] = FRONT_MODULES
 
     @property
     def name(self) -> str:
@@ -36,7 +33,7 @@ class MultiObjective(PymooSettings):
 
     def start(self, start: Start, objectives: int) -> PymooFrontSearch:
         """Begin a run; see `FrontAlgorithm.start`."""
-        search = self.begun(start, objectives)
+        search = self.begin(start, objectives)
         if self.algorithm == "CMOPSO":
             _seed_elites(search)
         return PymooFrontSearch(search, start)
@@ -52,7 +49,7 @@ class PymooFrontSearch:
     def ask(self) -> Array:
         """See `FrontSearch.ask`."""
         self._infills = self._search.ask()
-        return completed(self._infills.get("X"), self._start.lower, self._start.upper)
+        return fill_fixed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
         """See `FrontSearch.tell`."""
@@ -66,7 +63,7 @@ class PymooFrontSearch:
         search, start = self._search, self._start
         feasible = search.opt[search.opt.get("FEAS")[:, 0]]
         problem = search.problem
-        X = completed(feasible.get("X").astype(float).reshape(len(feasible), problem.n_var), start.lower, start.upper)
+        X = fill_fixed(feasible.get("X").astype(float).reshape(len(feasible), problem.n_var), start.lower, start.upper)
         return X, feasible.get("F").astype(float).reshape(len(feasible), problem.n_obj)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Start
-from metaheuristics.preparation import completed
+from metaheuristics.preparation import fill_fixed
 
 
 class Variation:
@@ -47,7 +47,7 @@ class Variation:
         if one_child:
             children = children[: len(first)]
         children = self._mutate.do(self._problem, children, random_state=self._start.rng)
-        return completed(children.get("X").astype(float), self._start.lower, self._start.upper)
+        return fill_fixed(children.get("X").astype(float), self._start.lower, self._start.upper)
 
 
 def directions(number: int, objectives: int) -> Array:

@@ -22,7 +22,7 @@ PROBLEM = load("walk12")
 OBJECTIVE = compile_objective(PROBLEM, threads=1)
 X = ((PROBLEM.lower + PROBLEM.upper) / 2).tolist()
 MOST_EVALUATIONS = 1000
-CALLBACKS = ("observe", "progress")
+CALLBACKS = ("callback", "progress")
 PSO = search.ParticleSwarm(population=5)
 
 
@@ -89,7 +89,7 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
         _minimize,
         {
             **{"objective": OBJECTIVE, "algorithm": PSO, "evaluations": 10, "seed": 0, "handling": search.Deb()},
-            **{"target": None, "stagnation": None, "time_limit_s": None, "initial": None, "observe": None},
+            **{"target": None, "stagnation": None, "time_limit_s": None, "initial": None, "callback": None},
         },
     ),
 }  # fmt: skip

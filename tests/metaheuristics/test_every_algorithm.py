@@ -47,10 +47,10 @@ def same(a: Result, b: Result) -> bool:
 def test_points_stay_within_bounds(algorithm: Algorithm) -> None:
     problem = Function(lambda X: (X.sum(axis=1), np.zeros(len(X))), [-1.0, 0.1, 1e-3], [1.0, 0.3, 1e3])
 
-    def observe(X: Array, f: Array, violation: Array) -> None:
+    def callback(X: Array, f: Array, violation: Array) -> None:
         assert ((problem.lower <= X) & (X <= problem.upper)).all()
 
-    minimize(problem, algorithm, evaluations=1500, observe=observe)
+    minimize(problem, algorithm, evaluations=1500, callback=callback)
 
 
 @every_algorithm
@@ -76,10 +76,10 @@ def test_best_never_gets_worse_and_is_one_of_the_evaluated(
 ) -> None:
     seen: list[tuple[float, float, tuple[float, ...]]] = []
 
-    def observe(X: Array, f: Array, violation: Array) -> None:
+    def callback(X: Array, f: Array, violation: Array) -> None:
         seen.extend(zip(violation.tolist(), f.tolist(), map(tuple, X.tolist()), strict=True))
 
-    result = minimize(disc(), algorithm, evaluations=BUDGET, handling=handling, observe=observe)
+    result = minimize(disc(), algorithm, evaluations=BUDGET, handling=handling, callback=callback)
     best = list(zip(result.history.violation.tolist(), result.history.objective.tolist(), strict=True))
     assert best == sorted(best, reverse=True)
     assert (result.violation, result.objective, tuple(result.x)) == min(seen, key=lambda point: point[:2])
@@ -95,13 +95,13 @@ def test_some_failed_evaluations_are_counted_and_never_best(algorithm: Algorithm
 
     failures = 0
 
-    def observe(X: Array, f: Array, violation: Array) -> None:
+    def callback(X: Array, f: Array, violation: Array) -> None:
         nonlocal failures
         failed = (X[:, 0] < 0.0) | (X[:, 1] < -1.0) | (X[:, 1] > 1.0)
         failures += int(failed.sum())
         assert np.isposinf(f[failed]).all() and np.isposinf(violation[failed]).all()
 
-    result = minimize(Function(function, [-2.0, -2.0], [2.0, 2.0]), algorithm, evaluations=BUDGET, observe=observe)
+    result = minimize(Function(function, [-2.0, -2.0], [2.0, 2.0]), algorithm, evaluations=BUDGET, callback=callback)
     assert result.failed_evaluations == failures > 0
     assert result.feasible and result.x[0] >= 0.0 and abs(result.x[1]) <= 1.0
     assert result.reasons == ("evaluation budget used",)
@@ -120,7 +120,7 @@ def test_a_run_of_failures_only_says_so(algorithm: Algorithm) -> None:
 def test_fixed_variables_stay_fixed(algorithm: Algorithm) -> None:
     problem = Function(lambda X: ((X**2).sum(axis=1), np.zeros(len(X))), [-1.0, 0.1, -1.0], [1.0, 0.1, 1.0])
     result = minimize(
-        problem, algorithm, evaluations=1500, observe=lambda X, f, v: np.testing.assert_equal(X[:, 1], 0.1)
+        problem, algorithm, evaluations=1500, callback=lambda X, f, v: np.testing.assert_equal(X[:, 1], 0.1)
     )
     assert result.objective < 0.05
 
@@ -156,11 +156,11 @@ def test_arrays_of_the_caller_are_not_modified(algorithm: Algorithm) -> None:
     problem.function = function
     before = [array.copy() for array in (initial, problem.lower, problem.upper)]
 
-    def observe(X: Array, f: Array, violation: Array) -> None:
+    def callback(X: Array, f: Array, violation: Array) -> None:
         np.testing.assert_array_equal(f, (X**2).sum(axis=1))
         kept.append((X, X.copy(), f))
 
-    result = minimize(problem, algorithm, evaluations=BUDGET, initial=initial, observe=observe)
+    result = minimize(problem, algorithm, evaluations=BUDGET, initial=initial, callback=callback)
     for array, copy in zip((initial, problem.lower, problem.upper), before, strict=True):
         np.testing.assert_array_equal(array, copy)
     for X, copy, f in kept:  # generations shown to the observer stay as they were

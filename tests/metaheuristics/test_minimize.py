@@ -19,7 +19,7 @@ def first_generation(algorithm: Algorithm, seed: int | np.random.SeedSequence) -
     """Starting points of a run."""
     generations: list[Array] = []
     minimize(
-        disc(), algorithm, evaluations=algorithm.population, seed=seed, observe=lambda X, f, v: generations.append(X)
+        disc(), algorithm, evaluations=algorithm.population, seed=seed, callback=lambda X, f, v: generations.append(X)
     )
     return generations[0]
 
@@ -81,7 +81,7 @@ def test_times_add_up() -> None:
 def test_given_points_replace_the_first_rows() -> None:
     given = np.array([[0.5, 0.25], [0.0, 1.0]])
     generations: list[Array] = []
-    minimize(disc(), SWARM, evaluations=10, seed=7, initial=given, observe=lambda X, f, v: generations.append(X))
+    minimize(disc(), SWARM, evaluations=10, seed=7, initial=given, callback=lambda X, f, v: generations.append(X))
     np.testing.assert_array_equal(generations[0][:2], given)
     np.testing.assert_array_equal(generations[0][2:], first_generation(SWARM, 7)[2:])
 

@@ -9,8 +9,8 @@ from metaheuristics import SearchError
 from metaheuristics.array import Array
 from metaheuristics.interface import Constraints
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm, minimize_many
-from metaheuristics.multi_objective.constrained_moead import taken
-from metaheuristics.multi_objective.dynamic_nsga3 import boundary
+from metaheuristics.multi_objective.constrained_moead import places_to_take
+from metaheuristics.multi_objective.dynamic_nsga3 import compute_boundary
 
 
 class TwoParabolas:
@@ -118,7 +118,7 @@ class Circle:
         F, G = self.problem.evaluate(X, return_values_of=["F", "G"])
         return F, np.maximum(0.0, G).sum(axis=1)
 
-    def excess(self, X: Array) -> Array:
+    def inequalities(self, X: Array) -> Array:
         return np.asarray(self.problem.evaluate(X, return_values_of=["G"]))
 
 
@@ -145,21 +145,21 @@ def test_places_go_to_a_child_that_violates_less_or_is_no_worse() -> None:
     places = np.array([7, 3, 2, 5])
     old, new = np.array([0.1, 0.1, 0.5, 0.0]), np.array([0.5, 0.5, 0.5, 9.0])
     violation = np.array([2.0, 1.0, 1.0, 3.0])
-    assert taken(old, new, violation, 1.0, places, 4).tolist() == [7, 2, 5]
-    assert taken(old, new, violation, 1.0, places, 1).tolist() == [7]
-    assert taken(old, new, violation, 2.5, places, 4).tolist() == [5]
+    assert places_to_take(old, new, violation, 1.0, places, 4).tolist() == [7, 2, 5]
+    assert places_to_take(old, new, violation, 1.0, places, 1).tolist() == [7]
+    assert places_to_take(old, new, violation, 2.5, places, 4).tolist() == [5]
 
 
-def test_the_boundary_falls_from_the_first_excess_to_nothing() -> None:
+def test_the_boundary_falls_from_the_first_violation_to_zero() -> None:
     first = np.array([1.0, 400.0])
-    np.testing.assert_allclose(boundary(first, 0, 10, 5.0), first, atol=2e-8)
-    np.testing.assert_array_equal(boundary(first, 10, 10, 5.0), 0.0)
+    np.testing.assert_allclose(compute_boundary(first, 0, 10, 5.0), first, atol=2e-8)
+    np.testing.assert_array_equal(compute_boundary(first, 10, 10, 5.0), 0.0)
     # By hand for cp = 1: halfway the logarithm has fallen by half, so 1 has become 1e-4.
-    np.testing.assert_allclose(boundary(np.array([1.0]), 5, 10, 1.0), 1e-4, rtol=1e-3)
+    np.testing.assert_allclose(compute_boundary(np.array([1.0]), 5, 10, 1.0), 1e-4, rtol=1e-3)
 
 
 def test_constraints_told_apart_are_told_by_their_worst_row() -> None:
-    """The excess within a group is that of its worst row, and what has no value is the greatest."""
+    """The value of a group is that of its worst row; a row without a finite value is the greatest."""
     rows = np.array([[-1.0, 2.0, 0.5], [np.nan, -3.0, -0.5]])
-    constraints = Constraints(excess=lambda X: rows, groups=("a", "a", "b"))
+    constraints = Constraints(inequalities=lambda X: rows, groups=("a", "a", "b"))
     np.testing.assert_array_equal(constraints.worst(np.zeros((2, 1))), [[2.0, 0.5], [1e30, -0.5]])

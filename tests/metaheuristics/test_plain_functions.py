@@ -11,8 +11,8 @@ from scipy.optimize import dual_annealing
 from scipy.optimize import minimize as scipy_minimize
 
 from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, as_algorithm, minimize
-from metaheuristics.adapters.function import FAILED, INFEASIBLE
 from metaheuristics.array import Array
+from metaheuristics.user_algorithm import FAILED, INFEASIBLE
 
 
 class Disk:
@@ -114,11 +114,11 @@ def test_objects_classes_and_makers_are_algorithms() -> None:
             "'own' cannot be called as an algorithm: missing a required argument: 'f'; a plain function takes",
         ),
         (ParticleSwarm, {"popl": 3}, "cannot be called as an algorithm: got an unexpected keyword argument 'popl'"),
-        (Plain(), {"width": 1.0}, "'own' takes no settings, got width: it is no data class"),
+        (Plain(), {"width": 1.0}, "'own' takes no settings, got width: it is not a data class"),
         (type("Odd", (), {"start": print, "population": 2.5}), {}, "population must be a whole number >= 1, got 2.5"),
     ],
 )
-def test_what_is_none_is_refused(own: Any, settings: dict[str, Any], message: str) -> None:
+def test_other_objects_are_rejected(own: Any, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         as_algorithm(own, "own", settings)
 

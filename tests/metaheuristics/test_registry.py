@@ -98,11 +98,11 @@ def test_every_pymoo_algorithm_runs_from_the_shared_points_and_leaves_the_global
         algorithm(f"pymoo:{name}", population=20),
         evaluations=400,
         seed=7,
-        observe=lambda X, f, v: generations.append(X),
+        callback=lambda X, f, v: generations.append(X),
     )
     reference: list[Array] = []
     minimize(
-        disc(), algorithm("pso", population=20), evaluations=20, seed=7, observe=lambda X, f, v: reference.append(X)
+        disc(), algorithm("pso", population=20), evaluations=20, seed=7, callback=lambda X, f, v: reference.append(X)
     )
     np.testing.assert_array_equal(generations[0], reference[0])
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]
@@ -153,7 +153,7 @@ def test_every_strategy_of_differential_evolution_converges(strategy: str) -> No
 @pytest.mark.slow
 def test_cma_restarts_with_a_growing_population() -> None:
     sizes: list[int] = []
-    minimize(sphere(2), CmaEs(), evaluations=6000, seed=2, observe=lambda X, f, v: sizes.append(len(X)))
+    minimize(sphere(2), CmaEs(), evaluations=6000, seed=2, callback=lambda X, f, v: sizes.append(len(X)))
     assert sizes[0] == 10 and sorted(sizes) == sizes or set(sizes[:-1]) <= {10, 20, 40, 80, 160}
     assert 20 in sizes
 

@@ -98,7 +98,7 @@ def run_keeping_points(folder: Path, task: Task, start: RunRecord | None = None)
         good = violation == 0.0
         feasible.append((X[good], f[good]))
 
-    record = run_task(task, observe=keep)
+    record = run_task(task, callback=keep)
     x, power = (np.concatenate(part) for part in zip(*feasible, strict=True))
     write_points(points_file(folder, task), x, power)
     return record

@@ -50,7 +50,7 @@ class PowerAndCompeting:
     def __init__(self, objective: CompiledObjective, criterion: CompetingObjective, scale: Scale) -> None:
         self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
         self._objective, self._criterion, self._scale = objective, criterion, scale
-        self.excess, self.groups = objective.excess, objective.groups
+        self.inequalities, self.groups = objective.inequalities, objective.groups
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
         """Objectives (P, 2) and violations (P,)."""

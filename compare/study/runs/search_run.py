@@ -13,12 +13,12 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import Task, plain_settings
 
 
-def search_run(task: Task, observe: Callable[..., None] | None = None) -> RunRecord:
+def search_run(task: Task, callback: Callable[..., None] | None = None) -> RunRecord:
     """Do the run and judge its best point.
 
     Args:
         task: what to run.
-        observe: called with X, f, violation of every generation.
+        callback: called with X, f, violation of every generation.
     """
     started = time.perf_counter()
     problem = task.problem.load()
@@ -35,7 +35,7 @@ def search_run(task: Task, observe: Callable[..., None] | None = None) -> RunRec
         target=None if stop.target is None else sign * stop.target,
         stagnation=stop.stagnation,
         time_limit_s=stop.time_limit_s,
-        observe=observe,
+        callback=callback,
     )
     history = result.history
     best = [

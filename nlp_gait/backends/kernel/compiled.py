@@ -43,7 +43,7 @@ class CompiledObjective:
         lower: (n,) current lower bounds.
         upper: (n,) current upper bounds.
         row_names: (m,) constraint rows, in the order of ``constraints``.
-        groups: (m - n,) what each row of ``excess`` belongs to: its name without the place.
+        groups: (m - n,) what each row of ``inequalities`` belongs to: its name without the place.
         backend: ``"compiled"`` or ``"interpreted"``.
         description: backend, compiler and lane count, in words.
     """
@@ -102,14 +102,14 @@ class CompiledObjective:
         self._evaluate(X, f, violation, g)
         return g
 
-    def excess(self, X: Array | Mapping[str, float]) -> Array:
-        """(P, m - n) by how much each row is beyond the nearer of its bounds, in units of its scale; met where <= 0.
+    def inequalities(self, X: Array | Mapping[str, float]) -> Array:
+        """Return (P, m - n) signed violations of the rows in units of their scales: a row is satisfied where <= 0.
 
         Bounds of the variables are left out.
         """
         g = self.constraints(X)
-        beyond: Array = np.maximum(self._lower - g, g - self._upper) * self._weights
-        return beyond[:, : len(self.groups)]
+        signed: Array = np.maximum(self._lower - g, g - self._upper) * self._weights
+        return signed[:, : len(self.groups)]
 
     def __reduce__(self) -> tuple[Callable[..., CompiledObjective], tuple[Any, ...]]:
         """For pickle: the call that made it."""

@@ -24,7 +24,7 @@ class Disc(Function):
     def __init__(self) -> None:
         super().__init__(disc().function, [-2.0, -2.0], [2.0, 2.0])
 
-    def excess(self, X: Array) -> Array:
+    def inequalities(self, X: Array) -> Array:
         return np.stack([(X**2).sum(axis=1) - 1.0, X[:, 0] - 9.0, -9.0 - X[:, 1]], axis=1)
 
 
@@ -33,10 +33,10 @@ def test_equal_seeds_give_identical_runs_within_budget_and_bounds(name: str) -> 
     def run(seed: int) -> tuple[float, Array, list[int]]:
         problem = Disc()
 
-        def observe(X: Array, f: Array, violation: Array) -> None:
+        def callback(X: Array, f: Array, violation: Array) -> None:
             assert ((problem.lower <= X) & (X <= problem.upper)).all()
 
-        result = minimize(problem, algorithm(name), evaluations=26, seed=seed, observe=observe)
+        result = minimize(problem, algorithm(name), evaluations=26, seed=seed, callback=callback)
         assert result.evaluations == sum(problem.calls) == 26
         return result.objective, result.x, problem.calls
 
@@ -65,7 +65,7 @@ def test_a_local_solver_begins_again_until_the_budget_ends(name: str) -> None:
     """A sphere has one minimum, which takes a start some ten evaluations."""
     points: list[Array] = []
     result = minimize(
-        sphere(2), algorithm(name), evaluations=300, seed=0, observe=lambda X, f, violation: points.append(X)
+        sphere(2), algorithm(name), evaluations=300, seed=0, callback=lambda X, f, violation: points.append(X)
     )
     assert result.objective < 1e-6
     late = np.concatenate(points)[-200:]
@@ -121,7 +121,7 @@ def test_bayesian_optimisation_stops_where_fitting_takes_too_long() -> None:
 def test_sobol_points_are_those_of_scipy_and_fill_each_axis_evenly() -> None:
     seen: list[Array] = []
     problem = Function(lambda X: (X.sum(axis=1), np.zeros(len(X))), [0.0, 0.0, 5.0], [1.0, 1.0, 5.0])
-    minimize(problem, algorithm("sobol"), evaluations=1 + 64, observe=lambda X, f, violation: seen.append(X))
+    minimize(problem, algorithm("sobol"), evaluations=1 + 64, callback=lambda X, f, violation: seen.append(X))
     points = np.concatenate(seen)[1:]
     assert np.all(points[:, 2] == 5.0)
     for axis in (0, 1):  # one in each of 64 equal parts: a net in base 2

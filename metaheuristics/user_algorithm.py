@@ -1,0 +1,145 @@
+"""User code as an algorithm: settings, a class or function that makes them, or a plain function."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from metaheuristics.array import real_array
+from metaheuristics.errors import SearchError
+from metaheuristics.interface import Algorithm, CallingSearch, Evaluate, Start
+from metaheuristics.preparation import check_population
+
+ARGUMENTS = ("f", "lower", "upper", "evaluations", "seed")
+# Value of an infeasible point under feasibility rules for a function that expects one number: more than any objective.
+INFEASIBLE = 1e9
+FAILED = 1e30
+
+
+def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None) -> Algorithm:
+    """Return the algorithm that an object is or makes.
+
+    Args:
+        user: an `Algorithm`; a class or function that makes one from keyword settings; or a plain function
+            `minimise(f, lower, upper, evaluations, seed)`, see `PlainFunction`.
+        name: its name in messages.
+        settings: that differ from its defaults.
+
+    Raises:
+        SearchError: the object is none of these, or does not take the settings.
+    """
+    settings = dict(settings or {})
+    algorithm: Any
+    if hasattr(user, "start") and not isinstance(user, type):
+        if settings and not (is_dataclass(user) and not isinstance(user, type)):
+            raise SearchError(
+                f"algorithm {name!r} takes no settings, got {', '.join(settings)}: it is not a data class"
+            )
+        algorithm = replace(user, **settings) if settings else user
+    elif callable(user) and not isinstance(user, type) and takes_function_arguments(user, settings):
+        algorithm = PlainFunction(function=user, name=name, settings=settings)
+    elif callable(user):
+        try:
+            inspect.signature(user).bind(**settings)
+        except (TypeError, ValueError) as error:
+            wanted = f"a plain function takes ({', '.join(ARGUMENTS)}); a class or function of settings takes them by keyword"
+            raise SearchError(f"{name!r} cannot be called as an algorithm: {error}; {wanted}") from error
+        algorithm = user(**settings)
+    else:
+        algorithm = user
+    return check_algorithm(algorithm, name)
+
+
+def check_algorithm(candidate: Any, name: str) -> Algorithm:
+    """Return the algorithm if the loop can run it.
+
+    Raises:
+        SearchError: it has no `start`, or its population is not a whole number >= 1.
+    """
+    if not callable(getattr(candidate, "start", None)):
+        raise SearchError(
+            f"{name!r} must be an algorithm with `population` and `start`, or a plain function of ({', '.join(ARGUMENTS)}); "
+            f"got {type(candidate).__name__}"
+        )
+    check_population(candidate, name)
+    algorithm: Algorithm = candidate
+    return algorithm
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlainFunction:
+    """A function `minimise(f, lower, upper, evaluations, seed)` that minimises `f` by itself.
+
+    The loop counts the calls of `f`, keeps the best point, and ends the function within a call once a limit is reached; its
+    return value is ignored. `f(x)` of one point (n,) is a float, `f(X)` of many (P, n) an array (P,). It is one number for
+    objective and constraints: the objective where a point is feasible, and 1e9 plus the violation elsewhere, so that its order
+    is Deb's; under a static penalty it is objective plus weighted violation. 1e30 marks a failed evaluation.
+
+    Attributes:
+        function: to call.
+        name: in reports.
+        settings: further keyword arguments.
+        population: 1, as a function has no first generation.
+
+    Raises:
+        SearchError: the function does not take these arguments.
+    """
+
+    function: Callable[..., object]
+    name: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    population: int = 1
+
+    def __post_init__(self) -> None:
+        if not takes_function_arguments(self.function, self.settings):
+            raise SearchError(
+                f"function {self.name!r} must take ({', '.join(ARGUMENTS)})"
+                + (f" and the settings {', '.join(self.settings)}" if self.settings else "")
+                + f"; it takes {inspect.signature(self.function)}"
+            )
+
+    def start(self, start: Start) -> FunctionSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return FunctionSearch(self, start)
+
+
+def takes_function_arguments(function: Callable[..., object], settings: Mapping[str, Any]) -> bool:
+    """Return whether a function can be called as `PlainFunction` calls it."""
+    try:
+        inspect.signature(function).bind(*ARGUMENTS, **settings)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+class FunctionSearch(CallingSearch):
+    """A run of `PlainFunction`."""
+
+    def __init__(self, settings: PlainFunction, start: Start) -> None:
+        self._settings = settings
+        self._start = start
+
+    def run(self, evaluate: Evaluate) -> str:
+        """Call the function until it returns or `evaluate` raises `Ended`; return the reason for ending."""
+        n = len(self._start.lower)
+
+        def f(x: Any) -> Any:
+            try:
+                points = real_array(x)
+            except (TypeError, ValueError) as error:
+                raise SearchError(f"f was called with something other than numbers: {error}") from error
+            if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:
+                raise SearchError(f"f takes one point of shape ({n},) or points of shape (P, {n}); got {points.shape}")
+            values, violation, rule = evaluate(np.array(points, ndmin=2))
+            major, minor = rule.keys(values, violation)
+            cost = np.where(np.isfinite(values), np.where(major > 0.0, INFEASIBLE + major, minor), FAILED)
+            return float(cost[0]) if points.ndim == 1 else cost
+
+        start, settings = self._start, self._settings
+        lower, upper = start.lower.copy(), start.upper.copy()
+        settings.function(f, lower, upper, start.evaluations, int(start.rng.integers(2**31)), **settings.settings)
+        return "the function returned"
