@@ -12,9 +12,9 @@ import nlp_gait
 from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import engine_step
-from compare.papers.stairs.paper import TABLE_3 as STAIRS_TABLE_3
-from compare.papers.stairs.paper import TABLE_4 as STAIRS_TABLE_4
-from compare.papers.walk12.paper import TABLE_3, TABLE_4, PaperRow, row_of
+from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
+from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
+from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, row_of
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.walk12 import playback as walk12_playback
 from nlp_gait.simulation.conditions import Conditions

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import nlp_gait
-from compare.papers.walk12.paper import TABLE_3
+from compare.papers.walk12.walk12_paper import TABLE_3
 from nlp_gait.files import write_json
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import certificate_file

@@ -15,11 +15,11 @@ from nlp_gait.errors import unknown
 
 # Modules with `reproduce(out, *, progress)`, which writes `out/report.md`, and `STEPS`, how often it calls progress, if known.
 REPRODUCTIONS = {
-    "nao": "compare.papers.nao.reproduce",
-    "nao-pareto": "compare.papers.nao_pareto.reproduce",
-    "walk12": "compare.papers.walk12.reproduce",
-    "stairs": "compare.papers.stairs.reproduce",
-    "nao-claims": "compare.papers.nao_claims.reproduce",
+    "nao": "compare.papers.nao.nao_reproduction",
+    "nao-pareto": "compare.papers.nao_pareto.nao_pareto_reproduction",
+    "walk12": "compare.papers.walk12.walk12_reproduction",
+    "stairs": "compare.papers.stairs.stairs_reproduction",
+    "nao-claims": "compare.papers.nao_walk.nao_walk_reproduction",
 }
 
 

@@ -8,7 +8,7 @@ pytest.importorskip("mujoco")
 import nlp_gait  # noqa: E402
 from benchmarks.engine import agreement, gaits, other_robots  # noqa: E402
 from compare.judge import evaluate  # noqa: E402
-from compare.papers.walk12.paper import row_of  # noqa: E402
+from compare.papers.walk12.walk12_paper import row_of  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.formulation import Result  # noqa: E402
 from nlp_gait.gaits.walk12.playback import rigid_bodies  # noqa: E402

@@ -173,7 +173,7 @@ ALLOWED = {
     "compare/drawing/animation.py",
     "compare/drawing/figures.py",
     "compare/drawing/shown_figure.py",  # into memory
-    "compare/papers/nao/runs.py",
+    "compare/papers/nao/nao_runs.py",
     "compare/questions/certainty/branch_and_bound.py",
     "compare/study/apart.py",  # /dev/null
 }

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from compare.papers.nao.runs import read_points, write_points
+from compare.papers.nao.nao_runs import read_points, write_points
 from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
 from compare.study.settings import StudySettings, read_settings

@@ -6,17 +6,17 @@ from collections.abc import Iterable
 from importlib import resources
 from typing import Any
 
-from compare.papers.nao.figures import all_figures
-from compare.papers.nao.findings import NAMES, Findings, PhaseFindings
-from compare.papers.nao.runs import ALGORITHMS
-from compare.papers.nao.tables import all_tables
+from compare.papers.nao.nao_figures import all_figures
+from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings
+from compare.papers.nao.nao_runs import ALGORITHMS
+from compare.papers.nao.nao_tables import all_tables
 from compare.report.document import Document
 from compare.report.template import document_from
 
 
 def document(findings: Findings) -> Document:
     """The whole report."""
-    text = (resources.files("compare.papers.nao") / "report.md").read_text(encoding="utf-8")
+    text = (resources.files("compare.papers.nao") / "nao_report.md").read_text(encoding="utf-8")
     return document_from(
         text, values=_values(findings), tables=all_tables(findings), figures=dict(all_figures(findings))
     )

@@ -6,10 +6,10 @@ from importlib import resources
 from typing import Any
 
 from compare.analysis.units import listed
-from compare.papers.nao.claims import FAILS, HOLDS
-from compare.papers.nao_pareto.claims import NEAR, claims
-from compare.papers.nao_pareto.figures import all_figures
-from compare.papers.nao_pareto.findings import EVEN_POINTS, Findings, PhaseFindings
+from compare.papers.nao.nao_claims import FAILS, HOLDS
+from compare.papers.nao_pareto.nao_pareto_claims import NEAR, claims
+from compare.papers.nao_pareto.nao_pareto_figures import all_figures
+from compare.papers.nao_pareto.nao_pareto_findings import EVEN_POINTS, Findings, PhaseFindings
 from compare.papers.nao_pareto.tables import all_tables
 from compare.questions.pareto.search import REFERENCE
 from compare.report.document import Document
@@ -18,7 +18,7 @@ from compare.report.template import document_from
 
 def document(findings: Findings) -> Document:
     """The whole report."""
-    text = (resources.files("compare.papers.nao_pareto") / "report.md").read_text(encoding="utf-8")
+    text = (resources.files("compare.papers.nao_pareto") / "nao_pareto_report.md").read_text(encoding="utf-8")
     return document_from(text, values=_values(findings), tables=all_tables(findings), figures=all_figures(findings))
 
 

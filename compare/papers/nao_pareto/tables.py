@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from compare.papers.nao_pareto.claims import NEAR, claims
-from compare.papers.nao_pareto.findings import NAMES, Findings, PhaseFindings
+from compare.papers.nao_pareto.nao_pareto_claims import NEAR, claims
+from compare.papers.nao_pareto.nao_pareto_findings import NAMES, Findings, PhaseFindings
 from compare.report.document import Rows, Value
 
 

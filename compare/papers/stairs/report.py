@@ -6,11 +6,11 @@ import math
 from importlib import resources
 from typing import Any
 
-from compare.papers.stairs.figures import all_figures
-from compare.papers.stairs.paper import TABLE_3
-from compare.papers.stairs.replay import FEEDBACK, STEP_S
-from compare.papers.stairs.runs import ALGORITHMS, LOST_RAD, RULES, Effort, track_spec
-from compare.papers.stairs.tables import Findings, all_tables
+from compare.papers.stairs.stairs_figures import all_figures
+from compare.papers.stairs.stairs_paper import TABLE_3
+from compare.papers.stairs.stairs_replay import FEEDBACK, STEP_S
+from compare.papers.stairs.stairs_runs import ALGORITHMS, LOST_RAD, RULES, Effort, track_spec
+from compare.papers.stairs.stairs_tables import Findings, all_tables
 from compare.report.document import Document
 from compare.report.template import document_from
 from compare.study.task import IPOPT
@@ -23,7 +23,7 @@ NEAR_BOUND = 0.01  # of a gain's range
 
 def document(findings: Findings) -> Document:
     """The whole report."""
-    text = (resources.files("compare.papers.stairs") / "report.md").read_text(encoding="utf-8")
+    text = (resources.files("compare.papers.stairs") / "stairs_report.md").read_text(encoding="utf-8")
     effort = findings.effort
     values = {
         "plan_evaluations": effort.plan_evaluations,

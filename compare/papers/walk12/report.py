@@ -10,11 +10,11 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import DENSE_INTERVALS
-from compare.papers.runs import best, objectives
-from compare.papers.walk12.errata import corner_slopes, hip_miss
-from compare.papers.walk12.figures import all_figures
-from compare.papers.walk12.paper import F1MAX, F2MAX, TABLE_3, TABLE_4, row_of
-from compare.papers.walk12.runs import (
+from compare.papers.paper_runs import best, objectives
+from compare.papers.walk12.walk12_errata import corner_slopes, hip_miss
+from compare.papers.walk12.walk12_figures import all_figures
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, row_of
+from compare.papers.walk12.walk12_runs import (
     CORNER_M,
     GA_EVALUATIONS,
     HORIZONS,
@@ -24,7 +24,7 @@ from compare.papers.walk12.runs import (
     Effort,
     f1_of_gait,
 )
-from compare.papers.walk12.tables import SAME_OPTIMUM, Findings, all_tables, dense, f_of_runs
+from compare.papers.walk12.walk12_tables import SAME_OPTIMUM, Findings, all_tables, dense, f_of_runs
 from compare.report.document import Document
 from compare.report.template import document_from
 from compare.study.record import RunRecord
@@ -39,7 +39,7 @@ PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
 
 def document(findings: Findings, effort: Effort) -> Document:
     """The whole report."""
-    text = (resources.files("compare.papers.walk12") / "report.md").read_text(encoding="utf-8")
+    text = (resources.files("compare.papers.walk12") / "walk12_report.md").read_text(encoding="utf-8")
     values = {
         "ga_evaluations": GA_EVALUATIONS,
         "pso_evaluations": effort.pso_evaluations,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from compare.papers import runs
+from compare.papers import paper_runs
 from compare.study import steps
 
 
@@ -14,6 +14,6 @@ from compare.study import steps
 def in_this_process() -> Iterator[None]:
     """No worker processes: each would build every problem again."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (steps, runs):
+        for module in (steps, paper_runs):
             patch.setattr(module, "available_cores", lambda: 1)
         yield

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compare.papers.stairs.motion import Leg, first_step, swing_leg, two_steps
+from compare.papers.stairs.stairs_motion import Leg, first_step, swing_leg, two_steps
 from nlp_gait.gaits.stairs.track import PARAMETERS, PLAN
 
 TREAD, RISE = 0.254, 0.1778

@@ -7,7 +7,7 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.papers.stairs.paper import TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError

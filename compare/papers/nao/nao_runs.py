@@ -1,0 +1,173 @@
+"""Runs and sweeps behind the reproduction of the NAO paper."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
+from compare.study.record import RunRecord
+from compare.study.runner import run_task
+from compare.study.steps import Step
+from compare.study.task import IPOPT, ProblemSpec, Stop, Task
+from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError
+from nlp_gait.files import new_file, read_bytes
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.gaits.nao.body import PLANNED_JOINTS
+
+ALGORITHMS = ("pso", "ga")
+LEVER = "nao-dsp-lever"
+SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is computed.
+
+    Attributes:
+        runs: of each search algorithm, as in the paper.
+        evaluations: of a search, as in the paper.
+        starts: of IPOPT.
+        lever_starts: of IPOPT with the lever rule for the torso's share.
+        intervals: between the samples of a phase, as in the paper.
+        sweep_starts: random starts at both ends of a sweep.
+        sweep_points: of a sweep over the range of all feasible solutions, and over that of the cheap ones.
+    """
+
+    runs: int = 11
+    evaluations: int = 10_000
+    starts: int = 20
+    lever_starts: int = 5
+    intervals: int = 10
+    sweep_starts: int = 2
+    sweep_points: tuple[int, int] = (13, 10)
+
+    @property
+    def steps(self) -> int:
+        """Runs, sweeps over two sets of values and over each variable, and the report."""
+        variables = sum(len(phase.optima["pso"].x) for phase in PHASES)
+        return len(PHASES) * (len(ALGORITHMS) * self.runs + self.starts) + self.lever_starts + 2 + variables + 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """IPOPT's optimum with a variable held at a value."""
+
+    at: float
+    power_W: float
+    feasible: bool
+
+
+def tasks(effort: Effort) -> list[Task]:
+    """Searches and starts of IPOPT; equal runs of the searches start from the same population."""
+    stop = Stop(evaluations=effort.evaluations)
+    specs = [spec_of(phase.problem, effort) for phase in PHASES]
+    lever = replace(specs[1].with_options(torso_share="lever"), label=LEVER)
+    found = [
+        Task(problem=spec, algorithm=name, stop=stop, run=k)
+        for spec in specs
+        for name in ALGORITHMS
+        for k in range(effort.runs)
+    ]
+    for spec, starts in (*((spec, effort.starts) for spec in specs), (lever, effort.lever_starts)):
+        found += [Task(problem=spec, algorithm=IPOPT, run=k) for k in range(starts)]
+    return found
+
+
+def spec_of(problem: str, effort: Effort) -> ProblemSpec:
+    """A phase of the paper."""
+    return ProblemSpec(name=problem, options={"intervals": effort.intervals})
+
+
+def run_keeping_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
+    """One run; every feasible solution that a search evaluated goes to ``points_file``."""
+    if not task.is_search:
+        return run_task(task, start)
+    feasible: list[tuple[Array, Array]] = []
+
+    def keep(X: Array, f: Array, violation: Array) -> None:
+        good = violation == 0.0
+        feasible.append((X[good], f[good]))
+
+    record = run_task(task, callback=keep)
+    x, power = (np.concatenate(part) for part in zip(*feasible, strict=True))
+    write_points(points_file(folder, task), x, power)
+    return record
+
+
+def points_file(folder: Path, task: Task) -> Path:
+    """NumPy archive of a search with x (m, n) and power_W (m,)."""
+    return folder / "points" / f"{task.problem.title}-{task.title}-{task.run:02d}.npz"
+
+
+def write_points(path: Path, x: Array, power: Array) -> None:
+    """Keep feasible solutions x (m, n) with their power (m,) [W]; raises OutputError."""
+    with new_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, x=x, power_W=power)
+
+
+def read_points(path: Path) -> tuple[Array, Array]:
+    """Feasible solutions of a run: x (m, n) and power (m,) [W].
+
+    Raises:
+        InputError: the archive is damaged.
+    """
+    content = io.BytesIO(read_bytes(path, "points"))
+    try:
+        with np.load(content, allow_pickle=False) as archive:
+            return np.asarray(archive["x"], dtype=float), np.asarray(archive["power_W"], dtype=float)
+    except Exception as error:
+        # NumPy and zipfile raise a dozen kinds of errors on damaged archives.
+        raise InputError(f"points {str(path)!r} cannot be read ({error}); delete it to have it made anew") from error
+
+
+def special_sweeps(effort: Effort) -> list[Step]:
+    """IPOPT over the paper's swing heights, and over durations of single support."""
+    values = {SWING_SWEEP: (SWING_HEIGHT, SWING_POWER_W["pso"]), DURATION_SWEEP: (SSP.duration, DURATIONS_S)}
+    return [
+        sweep_step(name, spec_of(SSP.problem, effort), position, list(at), effort.sweep_starts)
+        for name, (position, at) in values.items()
+    ]
+
+
+def sweep_step(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Step:
+    """Sweep over a variable, kept as a step: its optima lead to each other and are no runs of their own."""
+    problem = spec.load()
+    variable = problem.names[position]
+    return Step(
+        name=name,
+        inputs={
+            **fingerprint(problem),
+            **{"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts},
+        },
+        compute=partial(sweep, spec, variable, values, starts),
+    )
+
+
+def sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int) -> list[dict[str, float | bool]]:
+    """Fields of ``Held`` for each of some values, ascending; infeasible points are kept."""
+    problem = spec.load()
+    solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
+    return [
+        {"at": value, "power_W": solution.objective, "feasible": solution.success}
+        for value, solution in zip(values, solutions, strict=True)
+    ]
+
+
+def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
+    """Power if the mechanical term of the leg joints that move counted twice [W]; see the remark in the report."""
+    signals = problem.signals(problem.check_x(x))
+    legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
+    mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
+    share = np.diff(signals.arrays["t"]) / signals.arrays["t"][-1]
+    mean = float(np.sum(share * (mechanical[1:] + mechanical[:-1]) / 2))
+    return float(evaluate(problem, x).objective["value"]) + mean

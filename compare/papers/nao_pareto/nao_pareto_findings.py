@@ -1,0 +1,162 @@
+"""What the runs of both phases found, measured against the true front, and what tables, figures and claims read from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Effort, FrontRun
+from compare.questions.pareto.compare import Challenge
+from compare.questions.pareto.competing import CompetingObjective
+from compare.questions.pareto.front import FrontPoint, nondominated
+from compare.questions.pareto.knees import Bends, bends
+from compare.questions.pareto.report import SEARCH_NAMES
+from compare.questions.pareto.search import REFERENCE, Scale
+from compare.questions.pareto.study import ParetoStudy
+from metaheuristics.array import Array
+from nlp_gait.formulation import GaitProblem
+
+EVEN_POINTS = 200  # of the true front, which distances are measured from
+NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """R runs of one algorithm with one budget, measured at L looks.
+
+    Attributes:
+        algorithm: its name.
+        budget: evaluations.
+        evaluations: (L,) used at each look.
+        hypervolume: (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point.
+        igd: (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without
+            one.
+        feasible: (R,) share of the evaluated points that meet all constraints.
+        first_feasible: (R,) number of the first of these; infinite without one.
+        time_s: (R,) processor time [s].
+        objective_time_s: (R,) part of it in the objectives [s].
+    """
+
+    algorithm: str
+    budget: int
+    evaluations: Array
+    hypervolume: Array
+    igd: Array
+    feasible: Array
+    first_feasible: Array
+    time_s: Array
+    objective_time_s: Array
+
+    def until(self, share: float) -> Array:
+        """(R,) evaluations at the first look with so great a share of the hypervolume; infinite if never."""
+        reached = self.hypervolume >= share
+        at = np.where(reached.any(axis=1), self.evaluations[reached.argmax(axis=1)], np.inf)
+        return np.asarray(at)
+
+    def look(self, evaluations: float) -> int:
+        """Number of the last look within some evaluations; the first one where there is none."""
+        return max(0, int(np.count_nonzero(self.evaluations <= evaluations)) - 1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PhaseFindings:
+    """Results of one support phase.
+
+    Attributes:
+        problem: with its demand on the criterion dropped.
+        criterion: beside power.
+        first_front: of the gradient method alone, whose ranges the searches saw as 1.
+        answer: the front with what the searches' best points added to it.
+        runs: of all algorithms.
+    """
+
+    problem: GaitProblem
+    criterion: CompetingObjective
+    first_front: Sequence[FrontPoint]
+    answer: Challenge
+    runs: Sequence[FrontRun]
+
+    @property
+    def front(self) -> tuple[FrontPoint, ...]:
+        """The true front, as far as it is known."""
+        return self.answer.front
+
+    @cached_property
+    def bends(self) -> Bends:
+        """Its knees."""
+        return bends(self.front)
+
+    @cached_property
+    def budgets(self) -> tuple[int, ...]:
+        """Of the runs."""
+        return tuple(dict.fromkeys(run.budget for run in self.runs))
+
+    @cached_property
+    def measured(self) -> dict[tuple[str, int], Measured]:
+        """By algorithm and budget."""
+        return {(name, budget): self._measure(name, budget) for budget in self.budgets for name in ALGORITHMS}
+
+    def points(self, algorithm: str, budget: int) -> tuple[Array, Array]:
+        """Criterion and power [W] of all points at the ends of all runs."""
+        scale = Scale(self.first_front)
+        F = [run.looks[-1].F for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
+        return scale.back(np.concatenate(F))
+
+    def _measure(self, algorithm: str, budget: int) -> Measured:
+        from pymoo.indicators.hv import HV
+        from pymoo.indicators.igd import IGD
+
+        first, scale = Scale(self.first_front), Scale(self.front)
+        values, powers = (np.array([getattr(p, key) for p in self.front]) for key in ("value", "power_W"))
+        true = scale(values, powers)
+        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(evenly(true))
+        whole = float(hypervolume(true))
+        runs = [run for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
+        fronts = [[scale(*first.back(look.F)) for look in run.looks] for run in runs]
+        ends = [run.looks[-1] for run in runs]
+        return Measured(
+            algorithm=algorithm,
+            budget=budget,
+            evaluations=np.array([look.evaluations for look in runs[0].looks], dtype=float),
+            hypervolume=np.array([[float(hypervolume(F)) / whole if len(F) else 0.0 for F in row] for row in fronts]),
+            igd=np.array([[float(distance(F)) if len(F) else math.inf for F in row] for row in fronts]),
+            feasible=np.array([end.feasible / end.evaluations for end in ends]),
+            first_feasible=np.array([math.inf if e.first_feasible is None else e.first_feasible for e in ends]),
+            time_s=np.array([end.time_s for end in ends]),
+            objective_time_s=np.array([end.objective_time_s for end in ends]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Findings:
+    """All results.
+
+    Attributes:
+        phases: single and double support.
+        effort: what was computed.
+    """
+
+    phases: tuple[PhaseFindings, ...]
+    effort: Effort
+
+
+def evenly(front: Array) -> Array:
+    """(EVEN_POINTS, 2) points evenly along the lines between a front's (k, 2): its own crowd where the searches' best were."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(front, axis=0).T))])
+    places = np.linspace(0.0, along[-1], EVEN_POINTS)
+    return np.column_stack([np.interp(places, along, column) for column in front.T])
+
+
+def points_found(study: ParetoStudy, runs: Sequence[FrontRun]) -> list[FrontPoint]:
+    """Points of all runs that none of them betters."""
+    scale = Scale(study.front)
+    found = []
+    for run in runs:
+        values, powers = scale.back(run.looks[-1].F)
+        for value, power, x in zip(values.tolist(), powers.tolist(), run.looks[-1].X.tolist(), strict=True):
+            found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
+    return nondominated(found)

@@ -1,0 +1,207 @@
+"""Figures 3 and 6 to 29 of the stairs paper, from our plans and rollouts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from compare.drawing.figures import legend_below, new_figure, style
+from compare.papers.paper_runs import point
+from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
+from compare.papers.stairs.stairs_paper import TABLE_4
+from compare.papers.stairs.stairs_runs import complete, plan_spec, tracked
+from compare.papers.stairs.stairs_tables import Findings
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import SETBACK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DENSITY = 5  # samples of a drawn plan, as a multiple of the problem's own
+DRAWN_CASE = 2  # where the paper draws one case only
+TRACKED_LINKS = LINKS[:7]  # q1 to q7
+
+
+def all_figures(findings: Findings) -> dict[str, Figure]:
+    """By the stem of their files."""
+    plans = {case: complete(findings.effort, case, findings.plan(case)) for case in findings.cases}
+    followed = {case: tracked(case, plans[case], point(findings.best_track(case))) for case in findings.cases}
+    plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
+    size = TABLE_4[DRAWN_CASE].stair_length_m / 2
+    step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
+    first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
+    following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
+    with style():
+        return {
+            "fig03": _segments(arrays, plan, step),
+            "fig06-07": _sticks(first, step, "first step", from_ground=True),
+            "fig08-09": _sticks(following, step, "next steps", from_ground=False),
+            "fig10-11": _ankle(arrays),
+            "fig12": _stairs_compared(plans),
+            "fig13": _pose_times(findings.steps["network"], findings.cases[0]),
+            "fig14-20": _tracking(followed, "q", "angle [rad]"),
+            "fig21-27": _tracking(followed, "qd", "rate [rad/s]"),
+            "fig28": _zmp(followed, plans),
+            "fig29": _torques(followed),
+        }
+
+
+def _planned(findings: Findings, case: int) -> Mapping[str, Array]:
+    problem = plan_spec(findings.effort, case).load().dense(DENSITY)
+    if problem is None:
+        raise TypeError("the planner has samples and signals")
+    return problem.signals(findings.plan(case)).arrays
+
+
+def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
+    """Treads from the rear ankle's on; an edge lies a setback behind the ankle that stands on it."""
+    tread, rise = step
+    corners = [(-0.25, 0.0)]
+    for k in range(1, count):
+        edge = k * tread - SETBACK
+        corners += [(edge, (k - 1) * rise), (edge, k * rise)]
+    corners.append(((count - 1) * tread + 0.35, (count - 1) * rise))
+    x, z = zip(*corners, strict=True)
+    axes.plot(x, z, color="0.4", linewidth=1.0)
+    axes.fill_between(x, z, min(z) - 0.05, color="0.92", linewidth=0)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+
+
+def _segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tuple[float, float]) -> Figure:
+    figure = new_figure(height_in=3.6)
+    axes = figure.subplots()
+    _draw_stair(axes, step, 3)
+    place = arrays["ankle"] + np.array(step)
+    ends = [0.0, plan["t1_s"], plan["t2_s"], plan["t_bc_s"], plan["t3_s"]]
+    names = ("double support, heel rises", "double support, sole rises", "Bezier: catch the cycloid", "cycloid")
+    for i, name in enumerate(names):
+        part = (arrays["t"] >= ends[i] - 1e-9) & (arrays["t"] <= ends[i + 1] + 1e-9)
+        axes.plot(*place[part].T, label=name)
+    axes.set_ylabel("z [m]")
+    axes.set_title(f"Fig. 3: swing ankle, case {DRAWN_CASE}")
+    legend_below(figure)
+    return figure
+
+
+def _sticks(legs: tuple[Leg, Leg], step: tuple[float, float], start: str, *, from_ground: bool) -> Figure:
+    figure = new_figure(height_in=3.4)
+    for axes, leg, name in zip(figure.subplots(1, 2, sharey=True), legs, ("swing", "stance"), strict=True):
+        _draw_stair(axes, step, 2 if from_ground else 3)
+        lines = leg.lines
+        for k, line in enumerate(lines):
+            axes.plot(*line.T, color=_shade(k / (len(lines) - 1)), linewidth=0.8)
+        axes.plot(*leg.hip.T, color="#D55E00", linewidth=1.0)
+        axes.plot(*leg.toe.T, color="#009E73", linewidth=1.0)
+        axes.set_title(f"{name} leg, {start}")
+    figure.axes[0].set_ylabel("z [m]")
+    return figure
+
+
+def _shade(share: float) -> tuple[float, float, float]:
+    """From light to dark blue."""
+    return 0.75 * (1 - share), 0.85 - 0.4 * share, 0.95 - 0.25 * share
+
+
+def _ankle(arrays: Mapping[str, Array]) -> Figure:
+    figure = new_figure(height_in=4.4)
+    t, place = arrays["t"], arrays["ankle"]
+    keep = np.concatenate([[True], np.diff(t) > 1e-9])
+    t, place = t[keep], place[keep]
+    velocity = np.gradient(place, t, axis=0)
+    acceleration = np.gradient(velocity, t, axis=0)
+    for axes, values, unit in zip(
+        figure.subplots(2, 1, sharex=True),
+        (velocity, acceleration),
+        ("velocity [m/s]", "acceleration [m/s\u00b2]"),
+        strict=True,
+    ):
+        for column, axis in enumerate("xz"):
+            axes.plot(t, values[:, column], label=axis)
+        axes.set_ylabel(unit)
+    figure.axes[0].set_title(f"Figs. 10, 11: swing ankle, case {DRAWN_CASE}")
+    figure.axes[1].set_xlabel("time [s]")
+    legend_below(figure)
+    return figure
+
+
+def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
+    figure = new_figure(height_in=2.9)
+    for axes, (case, plan) in zip(
+        figure.subplots(1, len(plans), sharey=True, squeeze=False)[0], plans.items(), strict=True
+    ):
+        tread = TABLE_4[case].stair_length_m / 2
+        step = tread, tread * TABLE_4[case].rise_run_ratio
+        swing, _ = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"], 201))
+        _draw_stair(axes, step, 3)
+        for name in ("ankle", "sole", "toe"):
+            axes.plot(*getattr(swing, name).T, label=name)
+        axes.set_title(f"case {case}: {step[1] * 100:.1f} cm on {tread * 100:.1f} cm")
+    figure.axes[0].set_ylabel("z [m]")
+    legend_below(figure)
+    return figure
+
+
+def _pose_times(network: Mapping[str, Any], case: int) -> Figure:
+    figure = new_figure()
+    axes = figure.subplots()
+    for rule, found in network.items():
+        label = f"{rule}: {found['converged']} of {found['poses']} poses"
+        axes.plot(np.array(found["time_s"]) * 1e3, label=label, linewidth=0.9)
+    axes.set(xlabel="pose", ylabel="time [ms]", yscale="log", title=f"Fig. 13: training time of each pose, case {case}")
+    legend_below(figure)
+    return figure
+
+
+def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str) -> Figure:
+    figure = new_figure(height_in=7.0)
+    panels = figure.subplots(4, 2, sharex=True).ravel()
+    for i, link in enumerate(TRACKED_LINKS):
+        for case, arrays in followed.items():
+            (line,) = panels[i].plot(arrays["t"], arrays[name][:, i], label=f"case {case}")
+            panels[i].plot(arrays["t"], arrays[f"{name}_desired"][:, i], ":", color=line.get_color(), linewidth=1.0)
+        panels[i].set_title(f"q{i + 1} ({link})")
+        panels[i].set_ylabel(unit)
+    panels[-1].set_axis_off()
+    for axes in panels[-3:]:
+        axes.set_xlabel("time [s]")
+        axes.tick_params(labelbottom=True)  # also where the panel below is empty
+    legend_below(figure)
+    figure.suptitle("solid: rolled out, dotted: desired", fontsize=8)
+    return figure
+
+
+def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
+    figure = new_figure()
+    axes = figure.subplots()
+    foot = toe_foot_biped().foot_m
+    axes.axhspan(0.0, foot, color="0.9", label="stance foot")
+    for case, arrays in followed.items():
+        (line,) = axes.plot(arrays["t"], arrays["zmp"], label=f"case {case}")
+        lift = plans[case]["t2_s"]
+        axes.plot(
+            [0.0, lift], [foot - TABLE_4[case].stair_length_m / 2] * 2, "--", color=line.get_color(), linewidth=0.8
+        )
+        axes.axvline(lift, color=line.get_color(), linewidth=0.6, linestyle=":")
+    axes.set(xlabel="time [s]", ylabel="ZMP ahead of the stance ankle [m]", title="Fig. 28: ZMP of the rollout")
+    legend_below(figure)
+    return figure
+
+
+def _torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
+    figure = new_figure(height_in=2.9)
+    for axes, (case, arrays) in zip(
+        figure.subplots(1, len(followed), sharey=True, squeeze=False)[0], followed.items(), strict=True
+    ):
+        for i, link in enumerate(LINKS):
+            foot = link.startswith(("A'S", "S'"))
+            axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)
+        axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
+    figure.axes[0].set_ylabel("torque on the link [N m]")
+    legend_below(figure)
+    return figure

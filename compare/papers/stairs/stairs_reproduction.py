@@ -1,0 +1,40 @@
+"""Bhardwaj, Mishra, Sukavanam, Balasubramanian, reproduced: Tables III and IV, Figs. 3, 6 to 29, next to IPOPT and searches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from compare.papers.paper_runs import run_all
+from compare.papers.stairs import stairs_replay as stairs_replay
+from compare.papers.stairs import stairs_runs as stairs_runs
+from compare.papers.stairs.report import document
+from compare.papers.stairs.stairs_runs import Effort, first_tasks, other_steps, track_tasks
+from compare.papers.stairs.stairs_tables import Findings
+from compare.report.writing import write_document
+from compare.study.steps import Steps
+from nlp_gait.files import writable_folder
+from nlp_gait.progress import Progress
+
+FULL = Effort()
+STEPS = FULL.steps
+
+
+def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
+    """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG).
+
+    Args:
+        out: folder; finished runs in ``out/records`` and other steps in ``out/steps`` are used again.
+        progress: told about each run and each step, ``effort.steps`` times.
+        effort: how much is computed.
+
+    Raises:
+        OutputError: the folder cannot be written to.
+    """
+    folder = writable_folder(out)
+    runs = run_all(folder, first_tasks(effort), progress)
+    runs |= run_all(folder, track_tasks(effort, runs), progress)
+    todo = other_steps(effort, runs)
+    results = Steps(folder, progress, code=(stairs_runs, stairs_replay)).side_by_side(todo)
+    steps = dict(zip((step.name for step in todo), results, strict=True))
+    progress("figures, tables and report")
+    write_document(folder, document(Findings(effort=effort, runs=runs, steps=steps)))

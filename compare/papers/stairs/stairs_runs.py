@@ -1,0 +1,289 @@
+"""Runs and other steps behind the stairs reproduction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, get_args
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.papers.paper_runs import Runs, best, point, searches, starts
+from compare.papers.stairs.stairs_motion import swing_leg
+from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_replay import FEEDBACK, OPEN_LOOP, replay
+from compare.study.record import RunRecord
+from compare.study.steps import Step
+from compare.study.task import IPOPT, ProblemSpec, Task
+from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
+from metaheuristics.interface import Algorithm
+from nlp_gait.backends.identity import fingerprint
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.closed_loop import InverseKinematics
+from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.network import LEGS, NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import PAPER_TIMES
+from nlp_gait.gaits.stairs.track import PLAN
+
+ALGORITHMS: Mapping[str, Algorithm] = {
+    "aco": AntColony(population=ANTS, spread=EVAPORATION),
+    "aco-grid": AntColonyGrid(population=ANTS, evaporation=EVAPORATION),
+    "pso": ParticleSwarm(),
+    "ga": GeneticAlgorithm(),
+}
+TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
+IMPOSSIBLE_RISE_M = 0.5
+LOST_RAD = 0.1  # a replayed pose that is so far from the planned one has lost it
+RULES = {
+    "adam": NetworkSettings(),
+    "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
+    "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
+    "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
+}
+PER_CASE = 5  # steps beside the runs: see ``case_steps``
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is computed.
+
+    Attributes:
+        cases: of Table IV.
+        plan_starts: of IPOPT on the plan of least energy.
+        jerk_starts: on that of least peak jerk.
+        hip_starts: on the plan of least energy with the paper's hip height.
+        ideal_starts: on the ideal.
+        runs: of each search algorithm.
+        plan_evaluations: of a search for a plan.
+        track_evaluations: of a search for gains, as in the paper.
+        track_settings: of IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
+        other_stairs: tread and rise of one step that the paper did not try [m]; a rise of ``IMPOSSIBLE_RISE_M`` is impossible.
+        other_starts: of IPOPT on the plan there.
+        poses: of the swing leg for which the network is trained.
+        plan_intervals: between the samples of a plan.
+        ideal_intervals: between those of the ideal.
+    """
+
+    cases: tuple[int, ...] = tuple(TABLE_4)
+    plan_starts: int = 20
+    jerk_starts: int = 5
+    hip_starts: int = 6
+    ideal_starts: int = 3
+    runs: int = 3
+    plan_evaluations: int = 10_000
+    track_evaluations: int = ANTS * ITERATIONS
+    track_settings: Mapping[str, float | str] = field(default_factory=lambda: {"time_limit_s": 1200.0})
+    other_stairs: tuple[tuple[float, float], ...] = (
+        (0.30, 0.10),
+        (0.30, 0.13),
+        (0.28, 0.17),
+        (0.26, 0.20),
+        (0.254, 0.50),
+    )
+    other_starts: int = 8
+    poses: int = 351
+    plan_intervals: int = 40
+    ideal_intervals: int = 70
+
+    @property
+    def steps(self) -> int:
+        """Runs, other steps of each case, the network, and the report."""
+        gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
+        case = gradient + 2 * len(ALGORITHMS) * self.runs + PER_CASE
+        others = sum(1 + _other_starts(self, rise) for _, rise in self.other_stairs)
+        return len(self.cases) * case + others + 2
+
+
+def plan_spec(effort: Effort, case: int, minimise: str = "energy") -> ProblemSpec:
+    """Planner of a case."""
+    label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
+    options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
+    return ProblemSpec(name="stairs-plan", options=options, values=stair_of(case), label=label)
+
+
+def hip_spec(effort: Effort, case: int) -> ProblemSpec:
+    """Planner of a case with the paper's hip height."""
+    fixed = {f"hip_height_m.{end}": TABLE_3["hip_height_m"] for end in ("lower", "upper")}
+    spec = plan_spec(effort, case)
+    return replace(spec, values={**spec.values, **fixed}, label=f"hip-{case}")
+
+
+def ideal_spec(effort: Effort, case: int) -> ProblemSpec:
+    """Full trajectory optimisation of a case."""
+    options = {"intervals": effort.ideal_intervals}
+    return ProblemSpec(name="stairs-ideal", options=options, values=stair_of(case), label=f"ideal-{case}")
+
+
+def track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemSpec:
+    """Tracking of a plan, given by the planner's variables, in a case."""
+    values = {**stair_of(case), **{name: plan[name] for name in PLAN}}
+    return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
+
+
+def other_spec(effort: Effort, name: str, tread: float, rise: float) -> ProblemSpec:
+    """The planner or the ideal on a stair that the paper did not try."""
+    values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
+    intervals = {"stairs-plan": effort.plan_intervals, "stairs-ideal": effort.ideal_intervals}[name]
+    return ProblemSpec(name=name, options={"intervals": intervals}, values=values, label=f"{name}-{tread:g}-{rise:g}")
+
+
+def stair_of(case: int) -> dict[str, float]:
+    """Parameters of a case of Table IV."""
+    row = TABLE_4[case]
+    return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}
+
+
+def first_tasks(effort: Effort) -> Iterator[Task]:
+    """Ideals and plans, on the paper's stairs and on others."""
+    for case in effort.cases:
+        yield from starts(ideal_spec(effort, case), effort.ideal_starts, seed=case)
+        yield from starts(plan_spec(effort, case), effort.plan_starts)
+        yield from starts(plan_spec(effort, case, "jerk"), effort.jerk_starts)
+        yield from starts(hip_spec(effort, case), effort.hip_starts)
+        for name, algorithm in ALGORITHMS.items():
+            yield from searches(plan_spec(effort, case), name, algorithm, effort.runs, effort.plan_evaluations)
+    for tread, rise in effort.other_stairs:
+        settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
+        for name, count in (("stairs-plan", _other_starts(effort, rise)), ("stairs-ideal", 1)):
+            yield from starts(other_spec(effort, name, tread, rise), count, settings=settings)
+
+
+def _other_starts(effort: Effort, rise: float) -> int:
+    return min(3, effort.other_starts) if rise >= IMPOSSIBLE_RISE_M else effort.other_starts
+
+
+def track_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
+    """Gains and torso pitch with which the plans of least energy are followed."""
+    for case in effort.cases:
+        spec = track_spec(case, plan_of(runs, case))
+        for name, algorithm in ALGORITHMS.items():
+            yield from searches(spec, name, algorithm, effort.runs, effort.track_evaluations)
+        yield Task(problem=spec, algorithm=IPOPT, settings=effort.track_settings, start=TRACK_START)
+
+
+def plan_of(runs: Runs, case: int, minimise: str = "energy") -> dict[str, float]:
+    """Best plan that IPOPT found in a case."""
+    return dict(best(runs[f"{'plan' if minimise == 'energy' else minimise}-{case}", IPOPT]).x)
+
+
+def best_track(runs: Runs, case: int) -> RunRecord:
+    """Best run of any solver on the track of a case, a feasible one if there is one."""
+    found = [record for name in (*ALGORITHMS, IPOPT) for record in runs[f"track-{case}", name]]
+    return min(found, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
+
+
+def complete(effort: Effort, case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """A plan with the parameters that are not its variables."""
+    problem = plan_spec(effort, case).load()
+    given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
+    return {**plan, **given}
+
+
+def other_steps(effort: Effort, runs: Runs) -> list[Step]:
+    """What is computed from the runs and is no run of a solver, so that it is kept as steps."""
+    first = effort.cases[0]
+    plan = complete(effort, first, plan_of(runs, first))
+    trained = Step(
+        name="network",
+        inputs={**fingerprint(plan_spec(effort, first).load()), "plan": plan, "poses": effort.poses},
+        compute=partial(network, first, plan, effort.poses),
+    )
+    return [trained, *(step for case in effort.cases for step in case_steps(effort, case, runs))]
+
+
+def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Step]:
+    """Replay of the ideal, the printed scheme, differences of both plans, and the network in the loop."""
+    ideal, plan = point(best(runs[f"ideal-{case}", IPOPT])), plan_of(runs, case)
+    spec = ideal_spec(effort, case)
+    yield _step("replay", case, spec, partial(replayed, spec), x=ideal)
+    yield _step("printed", case, track_spec(case, plan), partial(printed_scheme, case), plan=plan)
+    for name in ("energy", "jerk"):
+        used = plan_of(runs, case, name)
+        yield _step(f"differences-{name}", case, track_spec(case, used), partial(differences, case), plan=used)
+    x = point(best_track(runs, case))
+    yield _step("learned", case, track_spec(case, plan), partial(with_network, case), plan=plan, x=x)
+
+
+def _step(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Step:
+    inputs = {**fingerprint(spec.load()), **arguments}
+    return Step(name=f"{name}-{case}", inputs=inputs, compute=partial(compute, **arguments))
+
+
+def network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
+    """The network on poses of a plan's swing leg: convergence, time and error against the closed form."""
+    tread = TABLE_4[case].stair_length_m / 2
+    times = np.linspace(0.0, plan["t3_s"], poses)
+    q, hip_to_ankle = swing_leg(plan, tread, tread * TABLE_4[case].rise_run_ratio, times)
+    robot = toe_foot_biped()
+    lengths = robot.link("HK").length_m, robot.link("KA").length_m
+    found = {}
+    for name, settings in RULES.items():
+        path = network_angles(hip_to_ankle, *lengths, settings)
+        error = np.abs(path.angles - q)
+        found[name] = {
+            "converged": int((path.error_m2 <= settings.tolerance_m2).sum()),
+            "poses": len(q),
+            "iterations": path.iterations.tolist(),
+            "time_s": path.time_s.tolist(),
+            "largest_angle_error_rad": float(error.max()),
+            "mean_angle_error_rad": float(error.mean()),
+        }
+    return found
+
+
+def tracked(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
+    """Time histories of the closed loop with given gains and torso pitch."""
+    return track_spec(case, plan).load().signals(np.array(x)).arrays
+
+
+def printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """Quanta that the paper's gains survive in the explicit scheme, and what the implicit one makes of them."""
+    row = TABLE_4[case]
+    x = [row.kp, row.kd, row.torso_pitch_rad]
+    compensated = track_spec(case, plan).load()
+    implicit = compensated.with_values(gravity_compensation=0.0)
+    explicit = track_spec(case, plan, scheme="explicit").load().with_values(gravity_compensation=0.0)
+    return {
+        "explicit_quanta": evaluate(explicit, x).indexes["quanta_before_divergence"],
+        "implicit_largest_error_rad": evaluate(implicit, x).indexes["largest_error_rad"],
+        "compensated_largest_error_rad": evaluate(compensated, x).indexes["largest_error_rad"],
+    }
+
+
+def with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[str, float]:
+    """A tracked step whose desired leg angles come from the network, against the closed form: cost and angles."""
+    found: dict[str, float] = {}
+    angles = []
+    for kind in get_args(InverseKinematics):
+        problem = track_spec(case, plan, inverse_kinematics=kind).load()
+        found[f"{kind} cost"] = evaluate(problem, x).objective["value"]
+        angles.append(problem.signals(np.array(x)).arrays["q_desired"])
+    error = np.abs(angles[0] - angles[1])[:, [LINKS.index(link) for leg in LEGS for link in leg]]
+    return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
+
+
+def replayed(ideal: ProblemSpec, x: list[float]) -> dict[str, float | None]:
+    """Torques of an ideal step replayed by another integrator: errors of the pose with feedback, and without."""
+    arrays = ideal.load().signals(np.array(x)).arrays
+    _, followed = replay(arrays, FEEDBACK)
+    time, fallen = replay(arrays, OPEN_LOOP)
+    off = np.maximum.accumulate(np.abs(fallen).max(axis=1))
+    return {
+        "feedback_end_rad": float(np.abs(followed[-1]).max()),
+        "open_loop_t1_rad": float(off[time <= PAPER_TIMES[0]][-1]),
+        "open_loop_t2_rad": float(off[time <= PAPER_TIMES[1]][-1]),
+        "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]) if off[-1] > LOST_RAD else None,
+        "open_loop_end_rad": float(np.abs(fallen[-1]).max()),
+    }
+
+
+def differences(case: int, plan: Mapping[str, float]) -> dict[str, float]:
+    """Largest acceleration and jerk of links and knees by differences of the desired angles at 0.01 s."""
+    q = tracked(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
+    angles = np.column_stack([q, q[:, 1] - q[:, 0], q[:, 3] - q[:, 2]])  # links and knees
+    acceleration = np.diff(angles, 2, axis=0) / 0.01**2
+    jerk = np.diff(angles, 3, axis=0) / 0.01**3
+    return {"acceleration": float(np.abs(acceleration).max()), "jerk": float(np.abs(jerk).max())}

@@ -1,0 +1,207 @@
+"""The reproduction of the NAO paper: from end to end with few runs on few samples, and its parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from compare.judge import evaluate
+from compare.papers.nao import nao_reproduction as nao
+from compare.papers.nao import report as nao_report
+from compare.papers.nao.nao_claims import claims
+from compare.papers.nao.nao_findings import Findings, PhaseFindings, Points, sweep_values
+from compare.papers.nao.nao_paper import DSP, PHASES, SSP
+from compare.papers.nao.nao_runs import Effort, Held, power_with_legs_twice
+from compare.papers.nao.nao_tables import implied_a12
+from compare.report.document import Document
+from compare.study.record import RunRecord, read_record
+from nlp_gait.errors import OutputError
+
+SMALL = Effort(runs=3, evaluations=1000, starts=1, lever_starts=1, intervals=4, sweep_starts=1, sweep_points=(0, 0))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Findings, list[str]]:
+    """Folder, findings and notes of a finished reproduction."""
+    out = tmp_path_factory.mktemp("nao")
+    kept: list[Findings] = []
+    told: list[str] = []
+
+    def document(findings: Findings) -> Document:
+        kept.append(findings)
+        return nao_report.document(findings)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nao, "document", document)
+        nao.reproduce(out, progress=told.append, effort=SMALL)
+    return out, kept[0], told
+
+
+def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings, list[str]]) -> None:
+    out, _, told = done
+    report = (out / "report.md").read_text()
+    assert "{" not in report and "nan" not in report
+    figures = re.findall(r"\((\S+)\.png\)", report)
+    assert figures[:7] == ["fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig20a"]
+    assert figures[7:] == ["swing-height", "fig15", "fig16", "fig17", "fig18", "fig19", "fig20b"]
+    for name in figures:
+        assert (out / f"{name}.png").stat().st_size > 0
+    names = ("table6", "table7", "table7-swing-heights", "table8", "table9", "rank-sum-tests", "power-gap", "claims")
+    assert all(len((out / f"{table}.csv").read_text().splitlines()) > 1 for table in names)
+    assert (out / "report.html").read_text().count("<svg") == len(figures)
+    assert len(told) == SMALL.steps
+
+
+def test_every_feasible_solution_is_kept(done: tuple[Path, Findings, list[str]]) -> None:
+    out, findings, _ = done
+    with np.load(out / "points" / "nao-dsp-ga-02.npz") as archive:
+        x, power = archive["x"], archive["power_W"]
+    f, violation = nlp_gait.compile_objective(findings.dsp.problem)(x)
+    assert len(x) > 100 and np.all(violation == 0.0)
+    np.testing.assert_allclose(f, power, rtol=1e-12)
+    assert power.min() == pytest.approx(findings.dsp.searches["ga"][2].verdict.objective, rel=1e-9)
+
+
+def test_paired_runs_start_alike(done: tuple[Path, Findings, list[str]]) -> None:
+    for phase in done[1].phases:
+        for pso, ga in zip(phase.searches["pso"], phase.searches["ga"], strict=True):
+            assert pso.history.objective[0] == ga.history.objective[0]
+
+
+def test_nothing_lies_below_ipopts_optimum(done: tuple[Path, Findings, list[str]]) -> None:
+    """Neither where a search ends, nor an optimum with a variable held."""
+    for phase in done[1].phases:
+        assert min(phase.final_powers("pso") + phase.final_powers("ga")) > phase.best
+        for sweep in phase.sweeps.values():
+            assert all(held.power_W > phase.best * (1 - 1e-6) for held in sweep if held.feasible)
+
+
+def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, list[str]]) -> None:
+    out, findings, _ = done
+    step = out / "steps" / "nao-dsp-sweep-x1.json"
+    swept = step.read_text()
+    (out / "records" / "nao-ssp" / "pso-0001.json").unlink()
+    (out / "points" / "nao-dsp-ga-00.npz").unlink()
+    step.write_text(swept[: len(swept) // 2])  # torn by a crash
+    told: list[str] = []
+
+    def stop_at_news(note: str) -> None:
+        told.append(note)
+        if "kept" not in note:
+            raise KeyboardInterrupt
+
+    for news in ("nao-dsp, ga 0", "nao-ssp, pso 1", "nao-dsp-sweep-x1"):
+        with pytest.raises(KeyboardInterrupt):
+            nao.reproduce(out, progress=stop_at_news, effort=SMALL)
+        assert told[-1] == news
+    told.clear()
+
+    def stop_at_figures(note: str) -> None:
+        told.append(note)
+        if note.startswith("figures"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        nao.reproduce(out, progress=stop_at_figures, effort=SMALL)
+    assert [note for note in told if "kept" not in note] == ["nao-dsp-sweep-x1", "figures, tables and report"]
+    assert step.read_text() == swept
+    again = read_record(out / "records" / "nao-ssp" / "pso-0001.json")
+    assert again.x == findings.ssp.searches["pso"][1].x
+    assert (out / "points" / "nao-dsp-ga-00.npz").exists()
+
+
+def test_progress_is_told_as_often_as_announced() -> None:
+    jobs = len(PHASES) * (2 * 11 + 20) + 5
+    sweeps = 2 + 9 + 8
+    assert jobs + sweeps + 1 == 109
+    assert nao.STEPS == 109
+
+
+def test_a_folder_that_cannot_be_written_to_fails_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        nao.reproduce(tmp_path / "file", progress=print)
+
+
+def verdict(findings: Findings, start: str) -> str:
+    (found,) = [claim.verdict for claim in claims(findings) if claim.text.startswith(start)]
+    return found
+
+
+def with_sweep(findings: Findings, position: int, powers: Sequence[float]) -> Findings:
+    """With a line of IPOPT in single support that has these powers; infinity where nothing is feasible."""
+    line = [Held(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)]
+    phases = [replace(phase, sweeps={**phase.sweeps, position: line}) for phase in findings.phases]
+    return replace(findings, ssp=phases[0], dsp=phases[1])
+
+
+def with_powers(phase: PhaseFindings, powers: Mapping[str, Sequence[float]]) -> PhaseFindings:
+    """With these powers at the ends of the searches; infinity for an infeasible end."""
+
+    def run(power: float) -> RunRecord:
+        known = phase.searches["pso"][0]
+        return replace(known, verdict=replace(known.verdict, objective=power, feasible=np.isfinite(power)))
+
+    return replace(phase, searches={name: [run(power) for power in ends] for name, ends in powers.items()})
+
+
+def test_claims_follow_the_numbers(done: tuple[Path, Findings, list[str]]) -> None:
+    findings = done[1]
+    ssp = findings.ssp
+    low = [0.85, 0.86, 0.87, 0.88, 0.89]
+    high = [power + 0.1 for power in low]
+    pso_wins = replace(findings, ssp=with_powers(ssp, {"pso": low, "ga": high}))
+    ga_wins = replace(findings, ssp=with_powers(ssp, {"pso": high, "ga": low}))
+    assert verdict(pso_wins, "PSO is better than GA in single").startswith("holds in our model by 11.49 %")
+    assert verdict(ga_wins, "PSO is better than GA in single") == "does not hold"
+
+    falling, rising = (with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0)))
+    assert verdict(falling, "A higher hip saves power in single").startswith("holds in our model by 50 %")
+    assert verdict(rising, "A higher hip saves power in single") == "does not hold"
+
+    whole, gap = (with_sweep(findings, DSP.duration, (2.0, middle, 1.0)) for middle in (1.5, np.inf))
+    assert verdict(whole, "Slower saves power in double") == "holds in our model by a factor of 2.0"
+    assert verdict(whole, "For some durations") == "does not hold"
+    assert verdict(gap, "For some durations") == "holds"
+
+
+def test_infeasible_runs_rank_last(done: tuple[Path, Findings, list[str]]) -> None:
+    phase = with_powers(done[1].ssp, {"pso": [np.inf, 0.9, 0.8]})
+    assert phase.final_powers("pso") == [float("inf"), 0.9, 0.8]
+    assert phase.median_run("pso") == 1
+
+
+def test_the_remark_on_the_gap_is_computed() -> None:
+    """Verified values of the paper's solutions, and the power with the legs' mechanical term counted twice."""
+    here, twice = [], []
+    for phase in PHASES:
+        problem = nlp_gait.load(phase.problem)
+        here += [evaluate(problem, optimum.x).objective["value"] for optimum in phase.optima.values()]
+        twice += [power_with_legs_twice(problem, optimum.x) for optimum in phase.optima.values()]
+    assert here == pytest.approx([0.866844, 0.891966, 0.626506, 0.626492], abs=2e-6)
+    assert twice == pytest.approx([1.306, 1.355, 1.084, 1.084], abs=5e-4)
+
+
+def test_effect_size_of_the_printed_rank_sums(done: tuple[Path, Findings, list[str]]) -> None:
+    eleven = with_powers(done[1].ssp, {"pso": [1.0] * 11})
+    found = [implied_a12(replace(eleven, paper=paper)) for paper in (SSP, DSP)]
+    assert found == pytest.approx([117 / 121, 97 / 121])  # W = 66 would be a win in all 121 pairs
+
+
+def test_reading_a_history_and_choosing_where_to_sweep() -> None:
+    points = Points(
+        x=np.array([[0.0], [0.1], [0.1004], [1.0]]),
+        power_W=np.array([1.0, 3.0, 2.0, 1.01]),
+        run=np.array([0.0, 0.0, 1.0, 1.0]),
+    )
+    assert points.cheapest_near(0, 0.1, 0.0005) == 2.0
+    assert points.cheapest_near(0, 0.1, 0.0005, run=0) == 3.0
+    assert np.isnan(points.cheapest_near(0, 0.5, 0.0005))
+    dear = Points(x=np.array([[-1.0], [2.0]]), power_W=np.array([5.0, 5.0]), run=np.zeros(2))
+    assert sweep_values({"pso": points, "ga": dear}, 0, 0.3, (3, 2)) == [-1.0, 0.0, 0.3, 0.5, 1.0, 2.0]

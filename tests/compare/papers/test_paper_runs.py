@@ -1,0 +1,53 @@
+"""Runs of a reproduction: start points, the best of several, and what becomes of a run that fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import nlp_gait
+from compare.papers.paper_runs import best, run_all, starts
+from compare.study.record import RunRecord
+from compare.study.runner import run_task
+from compare.study.task import ProblemSpec, Task, check_task
+from nlp_gait.errors import InputError
+from tests.compare.records import record
+
+WALK = ProblemSpec(name="walk12")
+
+
+def test_starts_are_those_of_one_solve_with_as_many() -> None:
+    problem = WALK.load()
+    solution = nlp_gait.solve(problem, starts=2, seed=5)
+    tasks = starts(WALK, 2, seed=5)
+    assert [task.start for task in tasks] == [problem.by_name(start.x0) for start in solution.starts]
+    assert run_task(tasks[1]).x == problem.by_name(solution.starts[1].x)
+
+
+def test_the_best_run_succeeds_before_it_is_cheap() -> None:
+    runs = [record("ga", run, [(10, value)]) for run, value in enumerate((3.0, 2.0, 1.0, 0.5))]
+    runs[2] = replace(runs[2], success=False)
+    runs[3] = replace(
+        runs[3], success=False, verdict=replace(runs[3].verdict, feasible=False, violation=1.0, objective=0.5)
+    )
+    assert best(runs) is runs[1] and best(runs[2:]) is runs[2]
+    maximised = [replace(r, definition={"objective": {"sense": "maximise"}}) for r in runs[:2]]
+    assert best(maximised) is maximised[0]
+
+
+def no_luck(task: Task, start: RunRecord | None) -> RunRecord:
+    raise ValueError("no luck")
+
+
+def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="walk12/ipopt-0000 failed: ValueError: no luck; mend that and delete"):
+        run_all(tmp_path, starts(WALK, 1), lambda note: None, no_luck)
+
+
+def test_a_start_point_is_for_nlp_solvers() -> None:
+    point = starts(WALK, 1)[0].start
+    check_task(Task(problem=WALK, algorithm="slsqp", start=point))
+    with pytest.raises(InputError, match="'pso' takes no start point"):
+        check_task(Task(problem=WALK, algorithm="pso", start=point))
