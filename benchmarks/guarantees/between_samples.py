@@ -17,7 +17,7 @@ import numpy as np
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.formulation import Array, GaitProblem, registry
-from nlp_gait.gaitbench import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.guarantee import guarantee
 
 GAITS, SAMPLES = 100, 100_001
@@ -93,7 +93,7 @@ def main() -> None:
     for name in sys.argv[3:] or INSTANCES:
         instance = INSTANCES[name]
         problem = nlp_gait.load(name)
-        best = np.array(known.known()[instance].best_x)
+        best = np.array(load_facts()[instance].best_x)
         gaits = feasible_gaits(problem, best, count, rng)
         against, seconds, holding = contradictions(problem, gaits, samples)
         print(

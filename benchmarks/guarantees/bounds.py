@@ -14,7 +14,7 @@ from casadi import SX
 
 import nlp_gait
 from nlp_gait.formulation import InstantPoint
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.gaits.biped.curves import hip_motion
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.gaits.nao.body import (
@@ -49,7 +49,7 @@ class Errors(NamedTuple):
 
 def errors(edge: float) -> tuple[Errors, Errors]:
     """Of the recursion and of the world frame, over a box with this part of every range."""
-    problem, x = nlp_gait.load("nao-ssp"), np.array(known()["ssp-v5"].best_x)
+    problem, x = nlp_gait.load("nao-ssp"), np.array(load_facts()["ssp-v5"].best_x)
     time, ranges = x[-1], problem.upper - problem.lower
     halves = np.array([[0.5, 0.5], [0.5, -0.5]])
     middle = np.concatenate([x[:1], *(time * halves @ x[k : k + 2] for k in (1, 3, 5)), x[7:]])

@@ -10,7 +10,7 @@ import nlp_gait
 from benchmarks.guarantees.between_samples import feasible_gaits
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import bounds_of
 
 COUNT = 10_000
@@ -43,7 +43,7 @@ def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
     rng = np.random.default_rng(SEED)
     for name, instance in INSTANCES.items():
-        gone = lost(nlp_gait.load(name), np.array(known()[instance].best_x), count, rng)
+        gone = lost(nlp_gait.load(name), np.array(load_facts()[instance].best_x), count, rng)
         print(f"{name}: {count:,} boxes that hold a known feasible point, {gone} lost", flush=True)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 import nlp_gait
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.definitions import definition_of, names
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.definitions import get_definition, names
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import certificate_file
 from nlp_gait.proofs.power_form import has_power_form
@@ -42,9 +42,9 @@ def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
 
 def instance_problem(id: str) -> tuple[GaitProblem, Array]:
     """The problem from which an instance is made, what it holds constant in bounds that are equal, and its best known x."""
-    definition = definition_of(id)
+    definition = get_definition(id)
     problem = nlp_gait.load(definition.problem, **definition.options).with_values(**definition.values)
-    free = iter(known()[id].best_x)
+    free = iter(load_facts()[id].best_x)
     x = np.array([definition.held[name] if name in definition.held else next(free) for name in problem.names])
     return problem.fix(**definition.held), x
 

@@ -20,7 +20,7 @@ from nlp_gait.formulation import GaitProblem, Result, load, problem_names
 from nlp_gait.formulation.registry import PROBLEMS, problem_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.definitions import DEFINITIONS
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.symbolic.nonsmooth import Exact
 
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
@@ -135,7 +135,7 @@ def _best(problem: GaitProblem, found: Difficulty | None) -> str:
     for definition in DEFINITIONS:
         same = definition.problem == problem.name and not definition.values and not definition.held
         if same and definition.options.items() <= problem.options.items():
-            said.append(f"As instance `{definition.id}` of GaitBench: {known()[definition.id].evidence}.")
+            said.append(f"As instance `{definition.id}` of GaitBench: {load_facts()[definition.id].evidence}.")
     return f"{title}\n\n{' '.join(said)}"
 
 

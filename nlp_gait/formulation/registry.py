@@ -33,7 +33,7 @@ PROBLEMS = {
     "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
     "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
-    "gaitbench": "nlp_gait.gaitbench.problem:gaitbench",
+    "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
 }
 
 # Intervals and samples beyond this have no use, and a problem of that size is not built in any time.

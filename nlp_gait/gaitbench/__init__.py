@@ -7,9 +7,8 @@ f, violation = problem(X)                   # X: (P, n)
 problem.best_known, problem.best_x, str(problem.evidence)
 """
 
-from nlp_gait.gaitbench.catalogue import catalogue
 from nlp_gait.gaitbench.definitions import Definition, names
+from nlp_gait.gaitbench.facts import Evidence
 from nlp_gait.gaitbench.instance import Instance, load
-from nlp_gait.gaitbench.known import Evidence
 
-__all__ = ["Definition", "Evidence", "Instance", "catalogue", "load", "names"]
+__all__ = ["Definition", "Evidence", "Instance", "load", "names"]

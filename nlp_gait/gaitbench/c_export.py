@@ -11,9 +11,9 @@ from nlp_gait.backends.kernel.kernel_source import kernel_of, kernel_source
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.instance import Instance, Sides
+from nlp_gait.gaitbench.instance import Instance, OneSidedRows
 
-# Files of the export by the template that each is made from; the C++ file is put together from the kernel.
+# Name of each file by its template; the C++ file is put together from the kernel.
 TEMPLATES = {
     "{prefix}.h": "objective.h.in",
     "main.c": "main.c.in",
@@ -25,29 +25,29 @@ TEMPLATES = {
 
 
 def export_objective(instance: Instance, folder: Path) -> list[Path]:
-    """Write source, header, example, callers and build line of an instance in physical units; returns the files.
+    """Write source, header, example, callers and build line of an instance in physical units; return the files.
 
     Raises:
         OutputError: the folder cannot be written to.
     """
     instance = Instance(instance.id)
-    sides = Sides(kernel_of(instance.gait_problem), instance.gait_problem)
-    prefix = prefix_of(instance.id)
-    words = _words(instance, sides, prefix)
-    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, words, cpp_source(instance, sides))
+    sides = OneSidedRows(kernel_of(instance.gait_problem), instance.gait_problem)
+    prefix = make_prefix(instance.id)
+    words = _make_words(instance, sides, prefix)
+    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, words, make_cpp_source(instance, sides))
 
 
-def prefix_of(id: str) -> str:
-    """Beginning of all C names: ``gaitbench_ssp_v5``."""
+def make_prefix(id: str) -> str:
+    """Return the prefix of all C names, such as ``gaitbench_ssp_v5``."""
     return f"gaitbench_{id.replace('-', '_')}"
 
 
-def cpp_source(instance: Instance, sides: Sides) -> str:
-    """The whole C++ file: the kernel over lanes, the instance's constants, the functions of the header."""
+def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
+    """Return the C++ file: the kernel over lanes, the instance's constants, the functions of the header."""
     problem = instance.gait_problem
     kernel = kernel_of(problem)
     lower, upper = kernel.row_bounds(problem)
-    prefix = prefix_of(instance.id)
+    prefix = make_prefix(instance.id)
     constants = {
         "instance_parameters": problem.p,
         "instance_lower": lower,
@@ -62,7 +62,7 @@ def cpp_source(instance: Instance, sides: Sides) -> str:
             f'#pragma GCC visibility push(default)\n#include "{prefix}.h"\n#pragma GCC visibility pop',
             "#ifndef LANES\n#define LANES 1  // points at a time: 1, 2, 4 or 8\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
-            "namespace {  // so that several instances can stand in one program",
+            "namespace {  // so that a program can have several instances",
             kernel_source(kernel.function).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(f"static const double {name}[] = {_numbers(values)};" for name, values in constants.items()),
@@ -77,8 +77,8 @@ def cpp_source(instance: Instance, sides: Sides) -> str:
     )
 
 
-def _words(instance: Instance, sides: Sides, prefix: str) -> Mapping[str, str]:
-    """What stands for each place in the templates."""
+def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping[str, str]:
+    """Return the text for each placeholder of the templates."""
     problem, definition = instance.gait_problem, instance.definition
     unit = problem.objective.unit
     return {
@@ -107,7 +107,7 @@ def _words(instance: Instance, sides: Sides, prefix: str) -> Mapping[str, str]:
 
 
 def _numbers(values: Array) -> str:
-    """C initialiser; infinity as libm has it."""
+    """Return a C initialiser, with libm's name of infinity."""
     return "{" + ", ".join(repr(v).replace("inf", "INFINITY") for v in values.tolist()) + "}"
 
 

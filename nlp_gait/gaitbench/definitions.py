@@ -1,4 +1,4 @@
-"""GaitBench 1: what each instance is. An entry never changes; an instance that had to change gets a new id."""
+"""GaitBench 1: the definition of each instance. An entry never changes; an instance that has to change gets a new id."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Definition:
     """What an instance is made from.
 
     Attributes:
-        id: its name for good.
+        id: its name, which never changes.
         what: one line.
         problem: name, as in ``nlp-gait list``.
-        options: that the problem is built with.
+        options: of the problem.
         values: parameters that differ from their defaults.
         held: variables that are constants here.
-        difficulty: graded by what the shipped baseline finds hard: variables, share of feasible points, local optima.
-        small: belongs to the subset ``small`` too.
+        difficulty: graded by the results of the shipped baseline: variables, share of feasible points, local optima.
+        small: whether it also belongs to the subset ``small``.
         source: paper that the problem comes from.
     """
 
@@ -70,7 +70,7 @@ def _phase(
     source: str = NAO,
     **options: str | int | float | bool,
 ) -> Definition:
-    """A phase of NAO, whose id begins with what it is: ``ssp``, ``dsp`` or ``cycle``."""
+    """Define a phase of NAO, whose id begins with ``ssp``, ``dsp`` or ``cycle``."""
     kinds = {
         "ssp": ("nao-ssp", "single support"),
         "dsp": ("nao-dsp", "double support"),
@@ -158,7 +158,7 @@ BY_ID: Mapping[str, Definition] = {definition.id: definition for definition in D
 
 
 def names(subset: Subset = "full") -> tuple[str, ...]:
-    """Ids of the instances, from easy to hard.
+    """Return the ids of the instances, from easy to hard.
 
     Args:
         subset: ``"small"`` (ten instances, minutes) or ``"full"``.
@@ -171,8 +171,8 @@ def names(subset: Subset = "full") -> tuple[str, ...]:
     return tuple(definition.id for definition in DEFINITIONS if definition.small or subset == "full")
 
 
-def definition_of(id: str) -> Definition:
-    """Definition of an instance; raises UnknownNameError."""
+def get_definition(id: str) -> Definition:
+    """Return the definition of an instance; raises UnknownNameError."""
     if id not in BY_ID:
         raise unknown("instance of GaitBench", id, BY_ID)
     return BY_ID[id]

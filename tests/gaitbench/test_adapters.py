@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nlp_gait import gaitbench
-from nlp_gait.errors import MissingExtraError
+from nlp_gait.errors import MissingExtraError, UnknownNameError
 from nlp_gait.formulation import Array
 
 ID = "ssp-v5"
@@ -39,7 +39,7 @@ def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.optimize import minimize
 
-    problem = instance.to_pymoo(rows=rows) if rows else instance.to_pymoo()
+    problem = instance.to("pymoo", rows=rows) if rows else instance.to("pymoo")
     assert (problem.n_var, problem.n_obj) == (9, 1)
     assert problem.n_ieq_constr == (len(instance.row_names) if rows else 1)
     F, G = problem.evaluate(X, return_values_of=["F", "G"])
@@ -59,7 +59,7 @@ def test_pymoo_finds_the_same_with_one_row_as_with_all(instance: gaitbench.Insta
     from pymoo.optimize import minimize
 
     ends = [
-        minimize(instance.to_pymoo(rows=rows), GA(pop_size=20), ("n_gen", 10), seed=1, verbose=False).X
+        minimize(instance.to("pymoo", rows=rows), GA(pop_size=20), ("n_gen", 10), seed=1, verbose=False).X
         for rows in (False, True)
     ]
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
@@ -69,7 +69,7 @@ def test_pymoo_finds_the_same_with_one_row_as_with_all(instance: gaitbench.Insta
 def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
     """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
     pygmo = package("pygmo")
-    problem = instance.to_pygmo()
+    problem = instance.to("pygmo")
     assert (problem.get_nx(), problem.get_nic(), problem.has_gradient()) == (9, len(instance.row_names), True)
     values = np.array([problem.fitness(x) for x in X])
     np.testing.assert_array_equal(values[:, 0], instance(X)[0])
@@ -88,7 +88,7 @@ def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
 def test_ioh(instance: gaitbench.Instance, X: Array) -> None:
     """Bounds of each variable, the optimum, and a soft constraint that makes an infeasible point dear."""
     package("ioh")
-    problem = instance.to_ioh()
+    problem = instance.to("ioh")
     np.testing.assert_array_equal(problem.bounds.lb, instance.lower)
     np.testing.assert_array_equal(problem.bounds.ub, instance.upper)
     assert problem.optimum.y == instance.best_known
@@ -105,7 +105,7 @@ def test_ioh(instance: gaitbench.Instance, X: Array) -> None:
 def test_ioh_keeps_instances_apart() -> None:
     """Two that were wrapped one after the other: each has its own functions."""
     package("ioh")
-    first, second = gaitbench.load("walk12-w015").to_ioh(), gaitbench.load("walk12-w100").to_ioh()
+    first, second = gaitbench.load("walk12-w015").to("ioh"), gaitbench.load("walk12-w100").to("ioh")
     for problem, id in ((first, "walk12-w015"), (second, "walk12-w100")):
         instance = gaitbench.load(id)
         assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
@@ -117,7 +117,7 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     from scipy.optimize import minimize
 
     unit = gaitbench.load(ID, unit_cube=True)
-    result = minimize(**unit.to_scipy(), x0=np.full(9, 0.5), method="SLSQP", options={"maxiter": 500, "ftol": 1e-12})
+    result = minimize(**unit.to("scipy"), x0=np.full(9, 0.5), method="SLSQP", options={"maxiter": 500, "ftol": 1e-12})
     assert result.success, result.message
     assert result.fun == pytest.approx(instance.best_known, rel=1e-5)
 
@@ -126,7 +126,7 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
 def test_pycma(instance: gaitbench.Instance) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
     cma = package("cma")
-    arguments = instance.to_cma()
+    arguments = instance.to("cma")
     constraints = arguments["constraints"](instance.best_x)
     assert 5 <= len(constraints) <= 15 and max(constraints) <= 0.0
     middle = np.array(arguments["x0"])
@@ -144,7 +144,7 @@ def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
     package("optunahub")
     optuna = package("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    problem = instance.to_optuna()
+    problem = instance.to("optuna")
     params = dict(zip(instance.names, X[0].tolist(), strict=True))
     f, violation = instance(X[:1])
     assert problem.evaluate(params) == f[0]
@@ -161,7 +161,7 @@ def test_nevergrad(instance: gaitbench.Instance, X: Array) -> None:
     package("nevergrad")
     import nevergrad as ng
 
-    function = instance.to_nevergrad()
+    function = instance.to("nevergrad")
     f, violation = instance(X)
     assert function(X[0]) == f[0] and function.violation(X[0]) == violation[0]
     optimizer = ng.optimizers.OnePlusOne(parametrization=function.parametrization, budget=60)
@@ -176,8 +176,13 @@ def test_a_package_that_lacks_is_named(
     name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("nlp_gait.gaitbench.adapters.find_spec", lambda package: None)
-    with pytest.raises(MissingExtraError, match=rf"to_{name}\(\) needs the package {name}.*nlp-gait\[suites\]"):
-        getattr(instance, f"to_{name}")()
+    with pytest.raises(MissingExtraError, match=rf"to\('{name}'\) needs the package {name}.*nlp-gait\[suites\]"):
+        instance.to(name)
+
+
+def test_an_unknown_adapter_is_refused(instance: gaitbench.Instance) -> None:
+    with pytest.raises(UnknownNameError, match="unknown adapter 'pymo'; did you mean 'pymoo'"):
+        instance.to("pymo")
 
 
 def test_loading_an_instance_imports_none_of_them() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.c_export import export_objective, prefix_of
+from nlp_gait.gaitbench.c_export import export_objective, make_prefix
 
 EQUAL = 1e-12
 IDS = ("walk12-w015", "ssp-v5-time10")
@@ -40,7 +40,7 @@ def points(id: str, count: int = 130) -> Array:
 def test_files_stand_alone(built: tuple[str, Path]) -> None:
     """No file of this package is included, and what is linked is libc and libm."""
     id, folder = built
-    prefix = prefix_of(id)
+    prefix = make_prefix(id)
     assert {f"{prefix}.cpp", f"{prefix}.h", "main.c", "build.sh", f"{prefix}_mex.cpp"} <= set(os.listdir(folder))
     included = [line for line in (folder / f"{prefix}.cpp").read_text().splitlines() if line.startswith("#include")]
     assert {line.split()[1] for line in included} <= {"<math.h>", "<stdlib.h>", "<string.h>", f'"{prefix}.h"'}
@@ -59,7 +59,7 @@ def test_files_stand_alone(built: tuple[str, Path]) -> None:
 def test_called_as_a_library(built: tuple[str, Path]) -> None:
     """Objective, violation and every row of many points; rows may be left out; a NaN is infinite; threads share it."""
     id, folder = built
-    instance, prefix, X = gaitbench.load(id), prefix_of(id), points(id)
+    instance, prefix, X = gaitbench.load(id), make_prefix(id), points(id)
     evaluate = getattr(ctypes.CDLL(str(folder / f"lib{prefix}.so")), f"{prefix}_evaluate")
     double = ctypes.POINTER(ctypes.c_double)
     evaluate.argtypes = [double, ctypes.c_longlong, double, double, double]
@@ -107,7 +107,7 @@ def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     if not (shutil.which("octave-cli") and shutil.which("mkoctfile")):
         pytest.skip("Octave with mkoctfile is not installed: apt-get install octave octave-dev")
     id, folder = built
-    instance, prefix, X = gaitbench.load(id), prefix_of(id), points(id, 3)
+    instance, prefix, X = gaitbench.load(id), make_prefix(id), points(id, 3)
     command = ["mkoctfile", "--mex", f"{prefix}_mex.cpp", f"{prefix}.cpp", "-o", f"{prefix}.mex"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=300)
     rows = "; ".join(" ".join(map(repr, x)) for x in X.tolist())
@@ -134,9 +134,9 @@ def test_two_instances_stand_in_one_program(tmp_path: Path) -> None:
     lines = []
     for id in IDS:
         export_objective(gaitbench.load(id), tmp_path)
-        lines += [f'#include "{prefix_of(id)}.h"']
+        lines += [f'#include "{make_prefix(id)}.h"']
     calls = "\n".join(
-        f'  {prefix_of(id)}_evaluate({prefix_of(id)}_best_x, 1, &f, &v, 0); printf("%.17g %.17g\\n", f, v);'
+        f'  {make_prefix(id)}_evaluate({make_prefix(id)}_best_x, 1, &f, &v, 0); printf("%.17g %.17g\\n", f, v);'
         for id in IDS
     )
     (tmp_path / "both.c").write_text(
@@ -144,8 +144,8 @@ def test_two_instances_stand_in_one_program(tmp_path: Path) -> None:
     )
     flags = ["-std=c++17", "-O1", "-DLANES=2", "-ffp-contract=off", "-w", "-c"]
     for id in IDS:
-        subprocess.run(["c++", *flags, f"{prefix_of(id)}.cpp"], cwd=tmp_path, check=True, timeout=300)
-    objects = [f"{prefix_of(id)}.o" for id in IDS]
+        subprocess.run(["c++", *flags, f"{make_prefix(id)}.cpp"], cwd=tmp_path, check=True, timeout=300)
+    objects = [f"{make_prefix(id)}.o" for id in IDS]
     subprocess.run(["cc", "-o", "both", "both.c", *objects, "-lm"], cwd=tmp_path, check=True, timeout=60)
     done = subprocess.run([str(tmp_path / "both")], capture_output=True, text=True, check=True, timeout=60)
     for line, id in zip(done.stdout.splitlines(), IDS, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from benchmarks.gaitbench.known import certified
+from benchmarks.gaitbench.facts import find_proven_gap
 from benchmarks.guarantees.between_samples import feasible_gaits
 from benchmarks.guarantees.boxes import lost
 from benchmarks.guarantees.nao import around as box_around
@@ -19,7 +19,7 @@ from compare.analysis.proven import CERTIFICATES
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError, OwnCodeError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import branch_and_bound, certificate, power_form
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import certificate_file, check, read_certificate
@@ -32,7 +32,7 @@ BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
 
 
 def walk() -> tuple[GaitProblem, np.ndarray]:
-    return nlp_gait.load("walk12"), np.array(known()["walk12-w015"].best_x)
+    return nlp_gait.load("walk12"), np.array(load_facts()["walk12-w015"].best_x)
 
 
 GAITS = {"walk12": "walk12-w015", "nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
@@ -41,13 +41,13 @@ PHASES = ("nao-dsp", "nao-ssp")
 
 def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
     """A phase with bounds this part of the ranges around the best known gait, and that gait."""
-    problem, best = nlp_gait.load(name), np.array(known()[GAITS[name]].best_x)
+    problem, best = nlp_gait.load(name), np.array(load_facts()[GAITS[name]].best_x)
     return box_around(problem, best, part), best
 
 
 @pytest.mark.parametrize("name", GAITS)
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
-    best = np.array(known()[GAITS[name]].best_x)
+    best = np.array(load_facts()[GAITS[name]].best_x)
     assert lost(nlp_gait.load(name), best, 200, np.random.default_rng(SEED)) == 0
 
 
@@ -63,7 +63,7 @@ def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: st
 
 @pytest.mark.slow
 def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
-    problem, best = nlp_gait.load("nao-dsp"), np.array(known()[GAITS["nao-dsp"]].best_x)
+    problem, best = nlp_gait.load("nao-dsp"), np.array(load_facts()[GAITS["nao-dsp"]].best_x)
     gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
     costs = [exact_model(problem).at(x, problem.p).cost for x in gaits]
     wrong = gaits[int(np.argmin(np.abs(np.array(costs) / costs[0] - 1.03)))]
@@ -117,8 +117,8 @@ def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
 
 
 def test_evidence_is_what_certificates_prove() -> None:
-    for id, entry in known().items():
-        gap = certified(id, entry.best_known)
+    for id, entry in load_facts().items():
+        gap = find_proven_gap(id, entry.best_known)
         assert gap is None or gap == entry.evidence.proven_gap
 
 

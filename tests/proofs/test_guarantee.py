@@ -15,7 +15,7 @@ from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, Stretch
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.proofs.time_functions import time_functions
@@ -28,7 +28,7 @@ PEAK = 0.8  # of the toy's row, at half the time
 
 
 def best(instance: str) -> np.ndarray:
-    return np.array(known()[instance].best_x)
+    return np.array(load_facts()[instance].best_x)
 
 
 def waving(limit: float, over: Over | None = "instant") -> GaitProblem:

@@ -10,7 +10,7 @@ from casadi import SX
 import nlp_gait
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.gaitbench.known import known
+from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import power_form as power_form_module
 from nlp_gait.proofs.power_form import power_form, to_z
 from nlp_gait.proofs.quadratic import PowerRows, QuadraticForms, QuadraticFunction
@@ -41,7 +41,7 @@ def test_gaits_are_held_at_sampled_points_of_boxes_around_the_best(
     problem = nlp_gait.load(name, intervals=2)
     form, rng = power_form(problem), np.random.default_rng(SEED)
     poses, everything = sorted(read, key=lambda function: function.numel_out(0))
-    z = to_z(np.array(known()[instance].best_x))
+    z = to_z(np.array(load_facts()[instance].best_x))
     low, high = form.root.T
     for width in (0.3, 0.03, 1e-4):
         half = width * (high - low) / 2
@@ -144,7 +144,7 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
 
 
 def test_boxes_that_hold_the_best_gait_keep_it_and_have_bounds_that_end_in_its_cost() -> None:
-    problem, x = nlp_gait.load("nao-ssp"), np.array(known()["ssp-v5"].best_x)
+    problem, x = nlp_gait.load("nao-ssp"), np.array(load_facts()["ssp-v5"].best_x)
     cost, form, z = exact_model(problem).at(x, problem.p).cost, power_form(problem), to_z(x)
     half = np.diff(form.root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
     boxes = np.stack([np.maximum(form.root[:, 0], z - half), np.minimum(form.root[:, 1], z + half)], -1)

@@ -1,16 +1,43 @@
-"""Instances in the shape that other packages want, one package a file; each package is imported when it is asked for."""
+"""Instances in the form that optimisers' packages take; each package is imported when it is needed."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
+from typing import Any
 
-from nlp_gait.errors import MissingExtraError
+from nlp_gait.errors import MissingExtraError, check_name, unknown
+
+# The function that converts an instance, and the packages that it needs.
+ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "scipy": ("plain:to_scipy", ()),
+    "cma": ("plain:to_cma", ("cma",)),
+    "ioh": ("plain:to_ioh", ("ioh",)),
+    "pygmo": ("plain:to_pygmo", ("pygmo",)),
+    "pymoo": ("pymoo:PymooProblem", ("pymoo",)),
+    "optuna": ("optuna:OptunaProblem", ("optuna", "optunahub")),
+    "nevergrad": ("nevergrad:to_nevergrad", ("nevergrad",)),
+}
 
 
-def check_installed(package: str) -> None:
-    """Raise MissingExtraError unless a package is installed."""
-    if find_spec(package) is None:
-        raise MissingExtraError(
-            f"to_{package.removesuffix('hub')}() needs the package {package}, which is not installed: pip install {package}, "
-            "or all of them: pip install 'nlp-gait[suites]'"
-        )
+def find_adapter(name: str) -> Callable[..., Any]:
+    """Return the function that converts an instance for a package.
+
+    Raises:
+        UnknownNameError: no adapter has this name.
+        MissingExtraError: a package is not installed.
+    """
+    check_name("adapter", name)
+    if name not in ADAPTERS:
+        raise unknown("adapter", name, ADAPTERS)
+    address, packages = ADAPTERS[name]
+    for package in packages:
+        if find_spec(package) is None:
+            raise MissingExtraError(
+                f"to({name!r}) needs the package {package}, which is not installed: pip install {package}, or all adapters' "
+                "packages: pip install 'nlp-gait[suites]'"
+            )
+    module, _, function = address.partition(":")
+    adapter: Callable[..., Any] = getattr(import_module(f"{__name__}.{module}"), function)
+    return adapter

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
 import optuna
 from optunahub.benchmarks import BaseProblem
 
@@ -13,11 +12,10 @@ if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance
 
 
-class GaitBenchProblem(BaseProblem):
+class OptunaProblem(BaseProblem):
     """An instance whose constraint is the total violation."""
 
     def __init__(self, instance: Instance) -> None:
-        """Take an instance."""
         self.instance = instance
         self._space = {
             name: optuna.distributions.FloatDistribution(low, high)
@@ -26,7 +24,7 @@ class GaitBenchProblem(BaseProblem):
 
     @property
     def search_space(self) -> dict[str, optuna.distributions.BaseDistribution]:
-        """A range for each variable by name."""
+        """Range of each variable by name."""
         return dict(self._space)
 
     @property
@@ -35,17 +33,9 @@ class GaitBenchProblem(BaseProblem):
         return [optuna.study.StudyDirection.MINIMIZE]
 
     def evaluate(self, params: Mapping[str, float]) -> float:
-        """Objective at values by name."""
-        return float(self.instance(self._point(params))[0][0])
+        """Return the objective at values by name."""
+        return self.instance.objective([params[name] for name in self.instance.names])
 
     def evaluate_constraints(self, params: Mapping[str, float]) -> dict[str, float]:
-        """Total violation: zero where the point is feasible."""
-        return {"violation": float(self.instance(self._point(params))[1][0])}
-
-    def _point(self, params: Mapping[str, float]) -> np.ndarray:
-        return np.array([[params[name] for name in self.instance.names]])
-
-
-def to_optuna(instance: Instance) -> GaitBenchProblem:
-    """See ``Instance.to_optuna``."""
-    return GaitBenchProblem(instance)
+        """Return the total violation: zero where the point is feasible."""
+        return {"violation": self.instance.violation([params[name] for name in self.instance.names])}

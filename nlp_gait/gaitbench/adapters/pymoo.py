@@ -12,16 +12,15 @@ if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance
 
 
-class GaitBenchProblem(Problem):
+class PymooProblem(Problem):
     """An instance, evaluated population by population.
 
-    Attributes:
-        instance: what is evaluated.
-        rows: G has every row; otherwise one, the total violation, which is the sum that pymoo itself makes of them.
+    Args:
+        instance: to evaluate.
+        rows: let G have every row; otherwise it has one, the total violation, which is the sum that pymoo itself computes.
     """
 
-    def __init__(self, instance: Instance, *, rows: bool) -> None:
-        """Take bounds and counts from the instance."""
+    def __init__(self, instance: Instance, *, rows: bool = False) -> None:
         self.instance = instance
         self.rows = rows
         constraints = len(instance.row_names) if rows else 1
@@ -30,7 +29,7 @@ class GaitBenchProblem(Problem):
         )
 
     def name(self) -> str:
-        """Id of the instance."""
+        """Return the id of the instance."""
         return self.instance.id
 
     def _evaluate(self, X: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
@@ -43,8 +42,3 @@ class GaitBenchProblem(Problem):
 
     def _calc_pareto_set(self, *_: Any, **__: Any) -> Any:
         return self.instance.best_x[None]
-
-
-def to_pymoo(instance: Instance, *, rows: bool) -> GaitBenchProblem:
-    """See ``Instance.to_pymoo``."""
-    return GaitBenchProblem(instance, rows=rows)

@@ -1,4 +1,4 @@
-"""What is known of each instance: the best point, how sure that is, and values that must never change."""
+"""Facts about each instance: the best known point, its evidence, and values that must never change."""
 
 from __future__ import annotations
 
@@ -10,19 +10,17 @@ from importlib.resources import files
 
 from nlp_gait.decoding import decoded
 
-FILE = "known.json"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Why the best known objective may be the best there is.
+    """Why the best known objective may be the optimum.
 
     Attributes:
         starts: of IPOPT, from random points.
-        agreeing: how many of them end within 1e-6 of the best, relatively.
-        cma_runs: long runs of CMA-ES, which shares nothing with IPOPT but the functions; 0 if none were made.
+        agreeing: how many of them reach the best within 1e-6, relatively.
+        cma_runs: long runs of CMA-ES, which shares nothing with IPOPT but the functions; 0 if there were none.
         cma_evaluations: of each of them.
-        cma_gap: by how much the best of them is worse, relatively; negative if it is better, None if none ended feasible.
+        cma_gap: by how much the best of them is worse, relatively; negative if it is better, None if none was feasible.
         proven_gap: no feasible point is better than the best known by more than this, relatively; None without a proof.
     """
 
@@ -34,7 +32,6 @@ class Evidence:
     proven_gap: float | None = None
 
     def __str__(self) -> str:
-        """For example ``28 of 30 starts of IPOPT; CMA-ES ends 1.2e-05 % above it``."""
         parts = [f"{self.agreeing} of {self.starts} starts of IPOPT"]
         if self.proven_gap is not None:
             parts.insert(0, f"proven to {100 * self.proven_gap:.2g} %")
@@ -47,7 +44,7 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """Values at a point that define the instance as much as its formulas do.
+    """Published values at a point, which the instance must always have.
 
     Attributes:
         x: (n,) the point.
@@ -63,15 +60,15 @@ class Probe:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Known:
-    """What is known of an instance.
+class Facts:
+    """Facts about an instance.
 
     Attributes:
         best_known: least feasible objective known, in the sense of minimisation.
-        best_x: (n,) where it is; its violation is exactly zero.
-        evidence: for it.
+        best_x: (n,) its point; its violation is exactly zero.
+        evidence: that it is the optimum.
         feasible_share: of 100 000 uniform random points.
-        evaluation_us: processor time of one evaluation in a batch of many, one core of the machine that made the suite [us].
+        evaluation_us: processor time of one evaluation in a batch of many, on one core of the machine that made the suite [us].
         probes: fixed points.
     """
 
@@ -84,10 +81,10 @@ class Known:
 
 
 @cache
-def known() -> Mapping[str, Known]:
-    """By id."""
-    raw = json.loads(files("nlp_gait.gaitbench").joinpath(FILE).read_text(encoding="utf-8"))
-    return {id: decoded(Known, entry, id) for id, entry in raw.items()}
+def load_facts() -> Mapping[str, Facts]:
+    """Return the facts about all instances by id."""
+    raw = json.loads(files("nlp_gait.gaitbench").joinpath("facts.json").read_text(encoding="utf-8"))
+    return {id: decoded(Facts, entry, id) for id, entry in raw.items()}
 
 
 def _cma(gap: float) -> str:

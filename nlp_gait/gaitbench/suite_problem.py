@@ -1,4 +1,4 @@
-"""Instances as gait problems: what the suite holds constant is a parameter there, and equations are narrow bands."""
+"""Instances as gait problems: variables that the suite holds constant become parameters, and equations narrow bands."""
 
 from __future__ import annotations
 
@@ -21,44 +21,41 @@ from nlp_gait.formulation import (
     load,
     maker,
 )
-from nlp_gait.gaitbench.definitions import Definition, definition_of
+from nlp_gait.gaitbench.definitions import Definition, get_definition
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-# No search meets an equation to the last bit: it is a band of this share of its row's scale to either side.
+# No search satisfies an equation to the last bit: it becomes a band of this share of its row's scale to either side.
 BAND = 1e-2
 
 
 @maker()
 def gaitbench(*, instance: str = "ssp-v5") -> GaitProblem:
-    """A problem of the suite, by the id of its instance; raises UnknownNameError."""
-    return _made(instance)
+    """Make a problem of the suite by the id of its instance; raises UnknownNameError."""
+    return _make(instance)
 
 
 @lru_cache(maxsize=64)
-def _made(id: str) -> GaitProblem:
-    definition = definition_of(id)
-    base = load(definition.problem, **definition.options).with_values(**definition.values)
-    return _instance(base, definition)
+def _make(id: str) -> GaitProblem:
+    definition = get_definition(id)
+    return _convert(load(definition.problem, **definition.options), definition)
 
 
-def _instance(base: GaitProblem, definition: Definition) -> GaitProblem:
-    """The problem, or a finer one, as the suite has it."""
-    banded = held(base, definition.held).derived(
-        name="gaitbench", title=f"GaitBench: {definition.what}", change=_with_bands
+def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
+    """Convert the problem, or a finer one, to the suite's form."""
+    base = base.with_values(**definition.values)
+    banded = hold_constant(base, definition.held).derived(
+        name="gaitbench", title=f"GaitBench: {definition.what}", change=_widen_equations
     )
     problem = replace(banded, searchable=True)
     refine = base.refine
     if refine is None:
         return problem
 
-    def finer(factor: int) -> GaitProblem:
-        return _instance(refine(factor).with_values(**definition.values), definition)
-
-    return replace(problem, refine=finer)
+    return replace(problem, refine=lambda factor: _convert(refine(factor), definition))
 
 
-def held(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
-    """The same problem with some variables as parameters, which have these values.
+def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
+    """Return the same problem with some variables as parameters, which have these values.
 
     Raises:
         UnknownNameError: no such variable.
@@ -66,7 +63,7 @@ def held(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
     """
     if not values:
         return problem
-    problem.fix(**values)  # refuses what is not allowed
+    problem.fix(**values)  # raises
     names = problem.names
     free = [i for i, name in enumerate(names) if name not in values]
     constants = tuple(
@@ -88,11 +85,11 @@ def held(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
         return problem.assemble(point.only(names), ops)
 
     def signals(at: NumericPoint) -> Signals:
-        assert motion is not None  # only then is this called; for the type checker
+        assert motion is not None  # for the type checker
         return motion(at.only(names))
 
     def start_point(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        assert start is not None  # likewise
+        assert start is not None
         return start({**parameters, **bounds}, rng)[free]
 
     return replace(
@@ -106,19 +103,14 @@ def held(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
     )
 
 
-def _with_bands(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
-    """The assembly with a band in place of each equation."""
-    return replace(assembly, constraints=tuple(_banded(constraint) for constraint in assembly.constraints))
+def _widen_equations(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+    """Return the assembly with a band in place of each equation."""
+    return replace(assembly, constraints=tuple(map(_widen, assembly.constraints)))
 
 
-def _banded(constraint: Constraint) -> Constraint:
+def _widen(constraint: Constraint) -> Constraint:
     lower, upper = constraint.lower, constraint.upper
-    if lower is None or upper is None or not _same(lower, upper):
+    if lower is None or upper is None or lower.shape != upper.shape or not ca.is_equal(lower, upper, 2):
         return constraint
     width = BAND * constraint.scale
     return replace(constraint, lower=lower - width, upper=upper + width)
-
-
-def _same(lower: ca.MX, upper: ca.MX) -> bool:
-    """Whether two bounds are one expression."""
-    return lower.shape == upper.shape and bool(ca.is_equal(lower, upper, 2))

@@ -1,9 +1,9 @@
-"""Best known points of GaitBench, the evidence for them, and probe values: ``python -m benchmarks.gaitbench.known``.
+"""Best known points of GaitBench, the evidence for them, and probe values: ``python -m benchmarks.gaitbench.facts``.
 
-Searched for with IPOPT from random starts, with CMA-ES, and from the best points that the baseline's solvers have found.
-Finished instances are kept in ``nlp_gait/gaitbench/known.json``; a call goes on with those that are missing. A better point
-than the one there may replace it, with ``--again``; probe values never change once they are published. What the shipped
-certificates prove is always taken over.
+The points are found with IPOPT from random starts, with CMA-ES, and from the best points of the baseline's solvers.
+Finished instances are stored in ``nlp_gait/gaitbench/facts.json``; rerun the command to continue with the missing ones. With
+``--again``, a better point may replace the stored one; probe values never change once they are published. The bounds that the
+shipped certificates prove are always included.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from nlp_gait import gaitbench
 from nlp_gait.decoding import decoded
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array
+from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
 from nlp_gait.gaitbench.instance import Instance
-from nlp_gait.gaitbench.known import Evidence, Known, Probe
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import read_certificate
 
-FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "known.json"
-SAME = 1e-6  # relative difference of two ends of IPOPT that count as one
+FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"
+SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How long is searched for the best point of an instance.
+    """Effort of the search for the best point of an instance.
 
     Attributes:
-        starts: of IPOPT, by the greatest number of variables for which they are made.
+        starts: of IPOPT, by the greatest number of variables that they are for.
         cma_runs: long runs of CMA-ES.
         cma_evaluations: of each.
-        cma_most_variables: for more there are none.
+        cma_most_variables: more variables get no run of CMA-ES.
     """
 
     starts: tuple[tuple[int, int], ...]
@@ -59,34 +59,34 @@ THOROUGH = Effort(
 )
 QUICK = Effort(starts=((12, 6), (22, 2), (300, 1)), cma_runs=1, cma_evaluations=5_000, cma_most_variables=12)
 SHARES, TIMED = 100_000, 20_000
-# Slack that the best known point keeps to every row, in units of its scale: no machine's rounding makes it infeasible.
+# Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10
 PROOF_TOLERANCE = 1e-3
-BASELINE_POINTS = 5  # of the best runs of its solvers, from which is begun too
+BASELINE_POINTS = 5  # points of the baseline's best runs that the search starts from
 
 
 class NothingFound(Exception):
-    """There is no point that could be called best known."""
+    """No feasible point was found."""
 
 
 def main() -> None:
-    """Make what is missing."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.gaitbench.known", description=__doc__.splitlines()[0])
+    """Compute the missing facts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.gaitbench.facts", description=__doc__.splitlines()[0])
     parser.add_argument("--subset", choices=("small", "full"), default="full")
     parser.add_argument("--instance", action="append", help="only this one; repeatable")
-    parser.add_argument("--again", action="store_true", help="also those that are there; their probes stay")
+    parser.add_argument("--again", action="store_true", help="also instances with stored facts; their probes stay")
     parser.add_argument("--quick", action="store_true", help="a first pass: few starts, one short run of CMA-ES")
-    parser.add_argument("--prove-s", type=float, default=0.0, help="time for a proof where one can be had; 0 for none")
+    parser.add_argument("--prove-s", type=float, default=0.0, help="time for a proof where one is possible; 0 for none")
     arguments = parser.parse_args()
     for id in arguments.instance or gaitbench.names(arguments.subset):
         kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-        published = decoded(Known, kept[id], id) if id in kept else None
+        published = decoded(Facts, kept[id], id) if id in kept else None
         started = time.perf_counter()
         try:
             if published is None or arguments.again:
-                found = known_of(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
+                found = find_facts(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
             else:
-                gap = certified(id, published.best_known)
+                gap = find_proven_gap(id, published.best_known)
                 if gap in (None, published.evidence.proven_gap):
                     continue
                 found = replace(published, evidence=replace(published.evidence, proven_gap=gap))
@@ -99,8 +99,8 @@ def main() -> None:
         print(f"{id}: {kept[id]['best_known']:.10g}, {evidence} ({time.perf_counter() - started:.0f} s)", flush=True)
 
 
-def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -> Known:
-    """Everything that is known of an instance, found now; a better point that was published stays, and probes always do."""
+def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None) -> Facts:
+    """Compute the facts about an instance; a better published point is kept, and so are the probes."""
     instance = gaitbench.load(id)
     problem, n = instance.gait_problem, len(instance.names)
     starts = next(count for most, count in effort.starts if n <= most)
@@ -109,11 +109,11 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
     if not ends:
         raise NothingFound("no start of IPOPT converged to a feasible point")
     ends.sort(key=lambda outcome: outcome.cost)
-    best = strictly_feasible(instance, np.array(ends[0].x))
+    best = make_strictly_feasible(instance, np.array(ends[0].x))
     best_known = float(instance(best[None])[0][0])
     searched = long_search(instance, effort) if n <= effort.cma_most_variables else None
     others = [] if searched is None else [searched]
-    for objective, point in others + best_of_baseline(id):
+    for objective, point in others + best_baseline_points(id):
         if objective < best_known:
             for x in near(instance, point):
                 f, violation = instance(x[None])
@@ -121,9 +121,9 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
                     best, best_known = x, float(f[0])
     if published is not None and published.best_known < best_known:
         best, best_known = np.array(published.best_x), published.best_known
-    proven = certified(id, best_known)
+    proven = find_proven_gap(id, best_known)
     if proven is None:
-        proven = proof(instance, best, prove_s)
+        proven = prove_gap(instance, best, prove_s)
     if proven is None and published is not None:
         proven = published.evidence.proven_gap
     agreeing = sum(relative(outcome.cost, best_known) <= SAME for outcome in ends)
@@ -138,7 +138,7 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
     rng = np.random.default_rng(0)
     X = rng.uniform(instance.lower, instance.upper, (SHARES, n))
     feasible = float(np.mean(instance(X)[1] == 0.0))
-    return Known(
+    return Facts(
         best_known=best_known,
         best_x=tuple(best.tolist()),
         evidence=evidence,
@@ -149,12 +149,12 @@ def known_of(id: str, effort: Effort, prove_s: float, published: Known | None) -
 
 
 def relative(cost: float, reference: float) -> float:
-    """Distance of a cost from a reference, in units of the reference."""
+    """Return the difference of a cost and a reference, in units of the reference."""
     return (cost - reference) / (abs(reference) or 1.0)
 
 
 def long_search(instance: Instance, effort: Effort) -> tuple[float, Array]:
-    """Best feasible objective of several long runs of CMA-ES, infinite if none ends feasible, and its point."""
+    """Return the best feasible objective of several long runs of CMA-ES, infinite if there is none, and its point."""
     results = [
         metaheuristics.minimize(instance, CmaEs(), evaluations=effort.cma_evaluations, seed=1000 + run)
         for run in range(effort.cma_runs)
@@ -164,16 +164,16 @@ def long_search(instance: Instance, effort: Effort) -> tuple[float, Array]:
 
 
 def near(instance: Instance, point: Array) -> Iterator[Array]:
-    """A search's point, where IPOPT ends from there, and strictly feasible points next to both."""
+    """Yield a search's point, and strictly feasible points near it and near IPOPT's result from there."""
     yield point
     refined = nlp_gait.solve(instance.gait_problem, starts=1, x0=np.clip(point, instance.lower, instance.upper))
     for x in (point, np.array(list(refined.x.values()))):
         with suppress(NothingFound):
-            yield strictly_feasible(instance, x)
+            yield make_strictly_feasible(instance, x)
 
 
-def best_of_baseline(id: str) -> list[tuple[float, Array]]:
-    """Objective and point of the best feasible runs of the baseline, the best first; none where no records are shipped."""
+def best_baseline_points(id: str) -> list[tuple[float, Array]]:
+    """Return objective and point of the baseline's best feasible runs, the best first; empty without shipped records."""
     if id not in shipped():
         return []
     runs = sorted(
@@ -182,26 +182,26 @@ def best_of_baseline(id: str) -> list[tuple[float, Array]]:
     return [(record.verdict.objective, np.array(list(record.x.values()))) for record in runs[:BASELINE_POINTS]]
 
 
-def certified(id: str, best_known: float) -> float | None:
-    """How much better than the best known a feasible point may be at most, by the shipped certificates; None without one."""
+def find_proven_gap(id: str, best_known: float) -> float | None:
+    """Return how much better than the best known any feasible point can be, by the shipped certificates; None without one."""
     files = CERTIFICATES.glob(f"{id}-[0-9]*-percent.json")
     bounds = [read_certificate(path).certificate.bound for path in files]
     return (best_known - max(bounds)) / abs(best_known) if bounds else None
 
 
-def proof(instance: Instance, best: Array, limit_s: float) -> float | None:
-    """How much better than the best known a feasible point may be at most, by branch and bound; None without a bound."""
+def prove_gap(instance: Instance, best: Array, limit_s: float) -> float | None:
+    """Return how much better than the best known any feasible point can be, by branch and bound; None without a bound."""
     if len(instance.names) > 4 or not limit_s:
         return None
     found = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
     return found.gap if math.isfinite(found.bound) else None
 
 
-def strictly_feasible(instance: Instance, x: Array) -> Array:
-    """The nearest point that keeps a slack to every row, by linear programs that move as little as they can.
+def make_strictly_feasible(instance: Instance, x: Array) -> Array:
+    """Return the nearest point with a slack in every row, by linear programs with the smallest possible step.
 
-    IPOPT may leave a row violated by some 1e-8; what is shipped as best known has a violation of exactly zero everywhere. To go
-    downhill as well would be wrong where the objective is the largest of several: its gradient is that of one of them.
+    IPOPT may leave a row violated by about 1e-8; the shipped point has a violation of exactly zero. The programs ignore the
+    objective: where it is the largest of several functions, its gradient is that of one of them.
     """
     from scipy.optimize import linprog
 
@@ -230,12 +230,12 @@ def strictly_feasible(instance: Instance, x: Array) -> Array:
                 break
             x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
     if not found:
-        raise NothingFound("no strictly feasible point near the end of IPOPT")
+        raise NothingFound("no strictly feasible point near IPOPT's result")
     return min(found, key=lambda item: item[0])[1]
 
 
 def evaluation_us(instance: Instance, X: Array) -> float:
-    """Least processor time of an evaluation in a batch, over some rounds [us]."""
+    """Return the least processor time of an evaluation in a batch, over some rounds [us]."""
     rounds = []
     for _ in range(5):
         before = time.process_time()
@@ -245,7 +245,7 @@ def evaluation_us(instance: Instance, X: Array) -> float:
 
 
 def probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
-    """Values at random points, on the way from them to the best one, and there."""
+    """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
     X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])

@@ -1,0 +1,125 @@
+"""Adapters that need no base class of the package: SciPy, pycma, ioh and pygmo."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nlp_gait.formulation import Array
+
+if TYPE_CHECKING:
+    from nlp_gait.gaitbench.instance import Instance
+
+CMA_SIGMA = 0.25  # first step, as a share of each variable's range
+# A violation of 1 costs this many times the best known objective: ioh adds it to the objective that its algorithms see.
+IOH_PENALTY = 1e3
+
+
+def to_scipy(instance: Instance) -> dict[str, Any]:
+    """Return arguments of ``scipy.optimize.minimize``."""
+    return {
+        "fun": instance.objective,
+        "jac": instance.gradient,
+        "bounds": list(zip(instance.lower.tolist(), instance.upper.tolist(), strict=True)),
+        "constraints": [
+            {
+                "type": "ineq",  # SciPy's constraints are >= 0
+                "fun": lambda x: -instance.rows(np.asarray(x)[None])[0],
+                "jac": lambda x: -instance.jacobian(np.asarray(x)),
+            }
+        ],
+    }
+
+
+def to_cma(instance: Instance) -> dict[str, Any]:
+    """Return arguments of ``cma.fmin_con2``."""
+    groups = [name.partition("[")[0].split(" ")[0] for name in instance.row_names]
+    first = np.array([k for k, group in enumerate(groups) if k == 0 or group != groups[k - 1]])
+
+    def worst_of_groups(x: Any) -> list[float]:
+        return np.maximum.reduceat(instance.rows(np.asarray(x)[None])[0], first).tolist()
+
+    return {
+        "objective_function": instance.objective,
+        "constraints": worst_of_groups,
+        "x0": ((instance.lower + instance.upper) / 2).tolist(),
+        "sigma0": CMA_SIGMA,
+        "options": {
+            "bounds": [instance.lower.tolist(), instance.upper.tolist()],
+            "CMA_stds": (instance.upper - instance.lower).tolist(),
+        },
+    }
+
+
+def to_ioh(instance: Instance) -> Any:
+    """Return a problem of ioh."""
+    import ioh
+
+    total = ioh.RealConstraint(
+        instance.violation,
+        weight=IOH_PENALTY * (abs(instance.best_known) or 1.0),
+        enforced=ioh.ConstraintEnforcement.SOFT,
+        name="violation",
+    )
+    problem = ioh.wrap_problem(
+        instance.objective,
+        name=f"GaitBench-{instance.id}",
+        problem_class=ioh.ProblemClass.REAL,
+        dimension=len(instance.names),
+        lb=float(instance.lower.min()),
+        ub=float(instance.upper.max()),
+        calculate_objective=lambda _, __: ioh.RealSolution(instance.best_x.tolist(), instance.best_known),
+        constraints=[total],
+    )
+    problem.bounds.lb, problem.bounds.ub = instance.lower.tolist(), instance.upper.tolist()
+    return problem
+
+
+def to_pygmo(instance: Instance) -> Any:
+    """Return a problem of pygmo."""
+    import pygmo
+
+    return pygmo.problem(PygmoProblem(instance))
+
+
+class PygmoProblem:
+    """User-defined problem of pygmo: the objective, then every row as an inequality, with dense gradients."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+
+    def fitness(self, x: Array) -> Array:
+        """Return objective and rows (1 + m,) at x (n,)."""
+        return self.batch_fitness(x)
+
+    def batch_fitness(self, xs: Array) -> Array:
+        """Return objective and rows (P (1 + m),) of P concatenated points."""
+        X = np.reshape(xs, (-1, len(self.instance.names)))
+        f, _ = self.instance(X)
+        return np.hstack([f[:, None], self.instance.rows(X)]).ravel()
+
+    def has_batch_fitness(self) -> bool:
+        """Return True."""
+        return True
+
+    def gradient(self, x: Array) -> Array:
+        """Return the derivatives ((1 + m) n,), row by row."""
+        return np.vstack([self.instance.gradient(x), self.instance.jacobian(x)]).ravel()
+
+    def get_bounds(self) -> tuple[Array, Array]:
+        """Return the lower (n,) and the upper (n,) bounds."""
+        return self.instance.lower, self.instance.upper
+
+    def get_nic(self) -> int:
+        """Return the number of inequalities, m."""
+        return len(self.instance.row_names)
+
+    def get_name(self) -> str:
+        """Return the id of the instance."""
+        return f"GaitBench {self.instance.id}"
+
+    def get_extra_info(self) -> str:
+        """Return the title and the best known objective."""
+        instance = self.instance
+        return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
