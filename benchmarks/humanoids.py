@@ -56,9 +56,9 @@ def oracle(files: dict[str, str]) -> Iterator[str]:
     yield header("robot", "candidates", "torque, of the largest", "ZMP m", "reached, share of draws")
     for name, file in files.items():
         problem = nlp_gait.load("humanoid-ssp", robot=file)
-        playback = problem.playback
-        assert playback is not None
-        robot = playback.robot
+        model = problem.display.simulation_model
+        assert model is not None
+        robot = model.robot
         model, ankle = floating_model(robot), robot.joint_to[robot.feet["left"].link].name
         worst_torque, worst_zmp = 0.0, 0.0
         chosen, share = reachable(problem)
@@ -162,7 +162,7 @@ def steps(files: dict[str, str]) -> Iterator[str]:
     yield header("robot", "leg m", "mass kg", "time s", "step m", "power W", "CoT", "margins mm", "binding", "engine")
     for name, file in files.items():
         problem = nlp_gait.load("humanoid-ssp", robot=file)
-        robot, leg = problem.robot, leg_of(problem)
+        robot, leg = problem.display.robot, leg_of(problem)
         assert robot is not None
         time_s = TIME_S * float(np.sqrt(leg / NAO_LEG_M))
         problem = problem.fix(single_support_time_s=time_s)
@@ -211,7 +211,7 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         solution = nlp_gait.solve(problem, starts=4, seed=0)
         x = np.array(list(solution.x.values()))
         indexes = exact_model(problem).at(x, problem.p).indexes
-        robot, played = problem.robot, "-"
+        robot, played = problem.display.robot, "-"
         assert robot is not None
         if solution.success:
             plan = plan_of(Result(problem=problem, x=x), STEPS)
@@ -275,7 +275,7 @@ def cart_table(files: dict[str, str]) -> Iterator[str]:
             name,
             f"{least.at:.4f}",
             f"{least.indexes['step_length_m']:.3f}",
-            " + ".join(f"{least.found.x[key]:.3f}" for key in problem.durations),
+            " + ".join(f"{least.found.x[key]:.3f}" for key in problem.display.durations),
             watts(cart.indexes.get("power_W", np.nan), least.indexes["power_W"]),
             "; ".join(engine),
             "; ".join((cart.note, *cart.broken)),
@@ -289,8 +289,8 @@ def watts(textbook: float, optimum: float) -> str:
 
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
-    assert problem.robot is not None
-    return biped_of(problem.robot).leg_length_m
+    assert problem.display.robot is not None
+    return biped_of(problem.display.robot).leg_length_m
 
 
 GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {

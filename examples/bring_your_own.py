@@ -17,6 +17,7 @@ import nlp_gait
 from nlp_gait.formulation import (
     Assembly,
     Constraint,
+    Display,
     GaitProblem,
     Grid,
     NumericPoint,
@@ -96,7 +97,7 @@ def two_link(*, intervals: int = 20, lift_m: float = 0.05) -> GaitProblem:
         objective=Objective(name="power", unit="W"),
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        motion=signals,
+        display=Display(motion=signals),
     )
 
 

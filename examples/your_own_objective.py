@@ -20,7 +20,7 @@ def cost(gait, point, ops):
     return replace(gait, objective=gait.objective + point["price_of_time_W_s"] * point["single_support_time_s"])
 
 
-problem = nlp_gait.load("nao-ssp").derived(
+problem = nlp_gait.load("nao-ssp").derive(
     name="nao-ssp-in-a-hurry",
     objective=Objective(name="power and time", unit="W"),
     parameters=[

@@ -27,6 +27,7 @@ from metaheuristics.interface import Start
 from nlp_gait.formulation import (
     Assembly,
     Constraint,
+    Display,
     GaitProblem,
     Grid,
     NumericPoint,
@@ -85,7 +86,7 @@ def hopping_foot(*, intervals: int = 20) -> GaitProblem:
         objective=Objective(name="power", unit="W"),
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        motion=motion,
+        display=Display(motion=motion),
     )
 
 
@@ -182,7 +183,7 @@ def test_a_robot_is_one_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(json.dumps(humanoid()))
     done = CliRunner().invoke(app, ["evaluate", "nao-ssp", "--robot", str(file), "--x", X])
-    assert done.exit_code == 0 and nlp_gait.load("nao-ssp", robot=str(file)).robot is not None
+    assert done.exit_code == 0 and nlp_gait.load("nao-ssp", robot=str(file)).display.robot is not None
 
 
 def test_a_question_is_one_folder_and_one_line() -> None:
@@ -204,7 +205,7 @@ def test_a_question_is_one_folder_and_one_line() -> None:
 def test_a_change_of_mathematics_goes_through_one_door() -> None:
     """The example of the guide: a price on time, as an added parameter."""
     price = Parameter(name="price_W_s", unit="W/s", default=1.0, description="of a second", minimum=0.0)
-    problem = nlp_gait.load("nao-ssp").derived(
+    problem = nlp_gait.load("nao-ssp").derive(
         name="in-a-hurry",
         parameters=(price,),
         change=lambda gait, at, ops: replace(

@@ -90,7 +90,9 @@ def speeds() -> Iterator[str]:
         began = time.perf_counter()
         walk = walked(result, STEPS)
         m, took = walk.measurements, time.perf_counter() - began
-        simulated = STEPS * sum(result.x[result.problem.variable_index(name)] for name in result.problem.durations)
+        simulated = STEPS * sum(
+            result.x[result.problem.variable_index(name)] for name in result.problem.display.durations
+        )
         error = (walk.engine_J_per_planned_m or np.nan) / walk.model_J_per_m - 1.0
         yield cells(
             f"{speed:g}",

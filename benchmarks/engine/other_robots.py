@@ -16,7 +16,7 @@ from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
 from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, row_of
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.walk12 import playback as walk12_playback
+from nlp_gait.gaits.walk12 import simulation_model as walk12_model
 from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
@@ -124,14 +124,14 @@ def other_gains() -> Iterator[str]:
 @contextmanager
 def spheres(name: str, value: float) -> Iterator[None]:
     """Another way to make bodies of the 12-joint biped's point masses."""
-    before = getattr(walk12_playback, name)
-    setattr(walk12_playback, name, value)
-    walk12_playback.rigid_bodies.cache_clear()
+    before = getattr(walk12_model, name)
+    setattr(walk12_model, name, value)
+    walk12_model.rigid_bodies.cache_clear()
     try:
         yield
     finally:
-        setattr(walk12_playback, name, before)
-        walk12_playback.rigid_bodies.cache_clear()
+        setattr(walk12_model, name, before)
+        walk12_model.rigid_bodies.cache_clear()
 
 
 def fate(m: Measurements) -> str:

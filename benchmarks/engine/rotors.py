@@ -22,7 +22,7 @@ def rotors() -> Iterator[str]:
     for label, options in (("without rotors", {}), ("with rotors", {"motors": "rotor"})):
         for speed, result in optimal_cycles(SPEEDS, **options).items():
             plan = plan_of(result, STEPS)
-            heavy = optimal_cycles(SPEEDS, motors="rotor")[speed].problem.playback
+            heavy = optimal_cycles(SPEEDS, motors="rotor")[speed].problem.display.simulation_model
             assert heavy is not None  # a cycle has one; for the type checker
             model, light = energies(plan, {})
             _, heavier = energies(plan, dict(heavy.robot.armatures_kgm2))

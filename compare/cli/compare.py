@@ -107,7 +107,7 @@ def compare(
         tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
     check_study(study)  # before the manifest names it
-    if engine and not any(task.problem.load().playback for task in study.tasks):
+    if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
         raise InputError(
             f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
         )

@@ -81,7 +81,7 @@ def evaluate(
         return
     point = loaded.check_x(numbers_in(x))
     if signals is not None:
-        if loaded.motion is None:
+        if loaded.display.motion is None:
             fail(f"problem {problem.name!r} has no signals")
         from nlp_gait.export.tables import write_npz
 
@@ -111,7 +111,9 @@ def _evaluate_motion(gait: Recorded, engine: bool, signals: Path | None, as_json
 def _print_gait(judged: JudgedGait) -> None:
     """The gait beside the optimum, the limits that it breaks, and what the engine says."""
     gait = judged.recorded
-    times = ", ".join(f"{name} {value:.4g} s" for name, value in zip(gait.problem.durations, gait.x, strict=False))
+    times = ", ".join(
+        f"{name} {value:.4g} s" for name, value in zip(gait.problem.display.durations, gait.x, strict=False)
+    )
     stdout.print(f"{gait.gait}: step {1000 * gait.step_m:.1f} mm, {times}", soft_wrap=True)
     for remark in judged.remarks:
         stdout.print(remark, soft_wrap=True)

@@ -61,7 +61,7 @@ def solve(
     loaded = problem.spec().load()
     first = None if x0 is None else loaded.check_x(numbers_in(x0))
     chosen = registry.solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
-    starts = loaded.starts if starts is None else starts
+    starts = loaded.hints.starts if starts is None else starts
     with progress_bar(f"{solver} starts", starts) as advance:
         solution, stopped = until_interrupted(
             lambda: nlp_gait.solve(

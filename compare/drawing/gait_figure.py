@@ -56,7 +56,7 @@ def drawn_gait(result: Result) -> DrawnGait:
     problem = result.problem
     signals = sampled(result, PERIOD_S)
     arrays = signals.arrays
-    skeleton = None if problem.skeleton is None else problem.skeleton(signals, problem.parameter_values)
+    skeleton = None if problem.display.skeleton is None else problem.display.skeleton(signals, problem.parameter_values)
     margin = None if skeleton is None else skeleton.margin()
     has_power = all(name in arrays and name in JOINT_UNITS for name in ("tau", "qd"))
     return DrawnGait(

@@ -18,7 +18,7 @@ def skeleton_of(result: Result, frames_per_s: float) -> Skeleton:
         InputError: the problem has no motion to draw.
     """
     problem = result.problem
-    if problem.skeleton is None:
+    if problem.display.skeleton is None:
         raise InputError(f"problem {problem.name!r} has no skeleton to draw")
-    drawn = problem.skeleton(sampled(result, 1.0 / frames_per_s), problem.parameter_values)
+    drawn = problem.display.skeleton(sampled(result, 1.0 / frames_per_s), problem.parameter_values)
     return replace(drawn, title=problem.title)

@@ -35,4 +35,4 @@ def gaits_part(comparison: Comparison) -> Figure | str | None:
 def _gait(record: RunRecord) -> DrawnGait | None:
     """A record's gait; None for a problem without time histories."""
     gait = gait_of(record)
-    return None if gait.problem.motion is None else drawn_gait(gait)
+    return None if gait.problem.display.motion is None else drawn_gait(gait)

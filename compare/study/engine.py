@@ -91,7 +91,7 @@ def play_records(
     found = []
     for record in records:
         result = gait_of(record)
-        if result.problem.playback is not None:
+        if result.problem.display.simulation_model is not None:
             found.append(_played(folder, record, result, drive, version))
         if progress is not None:
             progress(f"{record.problem} {record.algorithm}")
@@ -111,7 +111,7 @@ def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
 
 
 def _played(folder: Path, record: RunRecord, result: Result, drive: Drive, version: str) -> Played:
-    repeats = result.problem.playback is not None and result.problem.playback.repeats
+    repeats = result.problem.display.simulation_model is not None and result.problem.display.simulation_model.repeats
     steps = STEPS if repeats else None
     plan = plan_of(result, steps)
     made_of = f"{_digest(plan, drive)}, {version}"

@@ -108,7 +108,7 @@ def _words(problem: GaitProblem) -> str:
 
 
 def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
-    if best is None or problem.motion is None:
+    if best is None or problem.display.motion is None:
         return ""
     gait = drawn_gait(Result(problem=problem, x=problem.check_x(best.x)))
     drawing = gaits_figure({problem.name: gait})
@@ -265,7 +265,7 @@ def _published(problem: GaitProblem) -> str:
 
 def _use(problem: GaitProblem) -> str:
     search = f"nlp-gait compare {problem.name} --out study\n" if problem.searchable else ""
-    python = f'import nlp_gait\n\nsolution = nlp_gait.solve("{problem.name}", starts={problem.starts})\nsolution.plot()'
+    python = f'import nlp_gait\n\nsolution = nlp_gait.solve("{problem.name}", starts={problem.hints.starts})\nsolution.plot()'
     return (
         "## Try it\n\n```sh\n"
         f"nlp-gait solve {problem.name} --out best.json\n{search}nlp-gait list {problem.name}\n```\n\n"

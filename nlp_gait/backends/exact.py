@@ -90,7 +90,7 @@ class ExactModel:
 
 def exact_model(problem: GaitProblem) -> ExactModel:
     """Exact function of a problem, built once for all copies that differ in parameter values only."""
-    return problem.built("exact", lambda: _build(problem))
+    return problem.build_once(_build)
 
 
 def violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:

@@ -20,16 +20,16 @@ def sha256_of(data: Any, code: str = "") -> str:
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
     """What identifies a problem's mathematics and its parameter values: every number of a robot is in one of both."""
-
-    def mathematics() -> str:
-        return hashlib.sha256(exact_model(problem).function.serialize().encode()).hexdigest()
-
     return {
         "problem": problem.address,
         "options": dict(problem.options),
         "parameters": problem.p.tolist(),
-        FORMULAS: problem.built(FORMULAS, mathematics),
+        FORMULAS: problem.build_once(_hash_mathematics),
     }
+
+
+def _hash_mathematics(problem: GaitProblem) -> str:
+    return hashlib.sha256(exact_model(problem).function.serialize().encode()).hexdigest()
 
 
 def problem_part(problem: GaitProblem) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def nlp_model(problem: GaitProblem) -> NlpModel:
     Raises:
         LiftedSenseError: the problem lifts a function where the reformulation would not be exact.
     """
-    return problem.built("nlp", lambda: _build(problem))
+    return problem.build_once(_build)
 
 
 def _build(problem: GaitProblem) -> NlpModel:

@@ -41,7 +41,9 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     elif name == "naoqi":
         points = _motor_set_points(result, period_ms)
         if not set(COUPLED) <= set(points.joints):
-            owner = "the robot" if result.problem.robot is None else f"robot {result.problem.robot.name!r}"
+            owner = (
+                "the robot" if result.problem.display.robot is None else f"robot {result.problem.display.robot.name!r}"
+            )
             raise InputError(
                 f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; {owner} has none of that name: export as "
                 "csv, json, webots or mjcf"
@@ -58,7 +60,7 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
 
 def _motor_set_points(result: Result, period_ms: int) -> SetPoints:
     """Set-points, if their joints are those of a robot."""
-    robot = result.problem.robot
+    robot = result.problem.display.robot
     if robot is None:
         raise InputError(f"problem {result.problem.name!r} has no robot with motors; export it as csv or json")
     points = set_points(result, period_ms)

@@ -9,13 +9,13 @@ from nlp_gait.formulation.assembly import (
     Over,
     Parameter,
     Point,
-    Stretch,
+    RowsOverTime,
     Variable,
     parameters,
 )
-from nlp_gait.formulation.gait_problem import GaitProblem, Start
+from nlp_gait.formulation.display import Display, SimulationModel
+from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
 from nlp_gait.formulation.motion.grid import Grid
-from nlp_gait.formulation.motion.playback import Playback
 from nlp_gait.formulation.motion.signals import Array, Columns, Signals, in_space
 from nlp_gait.formulation.registry import load, maker, problem_names
 from nlp_gait.formulation.result import Result, load_result
@@ -26,6 +26,7 @@ __all__ = [
     "Assembly",
     "Columns",
     "Constraint",
+    "Display",
     "GaitProblem",
     "Grid",
     "InstantPoint",
@@ -33,12 +34,13 @@ __all__ = [
     "Objective",
     "Over",
     "Parameter",
-    "Playback",
     "Point",
     "Result",
+    "RowsOverTime",
     "Signals",
+    "SimulationModel",
+    "SolverHints",
     "Start",
-    "Stretch",
     "Variable",
     "finely_sampled",
     "in_space",

@@ -258,18 +258,18 @@ NumericPoint: TypeAlias = PointOf[Any]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stretch:
-    """Part of a motion, over which rows are functions of a phase between 0 and 1: what holds between samples.
+class RowsOverTime:
+    """Rows of one phase of a motion as functions of time, which also defines them between samples.
 
     Attributes:
-        name: of the part, empty if it is the whole.
-        assemble: from a point, phases (1, k) and an interpretation to the rows and indexes with samples at these phases; each
-            row says by ``Constraint.over`` what it is of them.
-        times: from the values of variables and parameters by name to the instants of phase 0 and 1 [s].
-        intervals: equal parts over which limits on changes hold.
-        means: indexes that are means or integrals over time: with all samples at one phase they are what is averaged. Those
-            of one name in several stretches add up.
-        kinks: phases at which a formula changes, such as a spline's knots.
+        name: of the phase; empty if the motion has one phase only.
+        assemble: from a point, times (1, k) as fractions of the phase and an interpretation to the rows and indexes with samples
+            at these times; ``Constraint.over`` tells how a row depends on them.
+        times: from the values of variables and parameters by name to the start and the end of the phase [s].
+        intervals: equal parts to which limits on changes apply.
+        means: indexes that are means or integrals over time: with all samples at one time, the value that is averaged. Those of
+            the same name in several phases are added.
+        kinks: fractions of the phase at which a formula changes, such as a spline's knots.
     """
 
     name: str = ""

@@ -57,7 +57,7 @@ def check_mathematics(problem: GaitProblem) -> None:
             raise InputError(
                 f"{owner}: {part} holds {free[0].name()!r}, which is neither a variable nor a parameter of it"
             )
-    if problem.start is not None:
-        start = np.asarray(problem.start(problem.parameter_values, np.random.default_rng(0)))
+    if problem.hints.start is not None:
+        start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))
         if start.shape != (len(problem.names),):
             raise InputError(f"{owner}: start must give {len(problem.names)} values, it gave shape {start.shape}")

@@ -1,34 +1,33 @@
-"""What a gait problem is: variables, parameters, one assembly of objective and constraints, and what else it can do.
+"""Gait problems: variables, parameters, and one assembly of the objective and the constraints.
 
-A problem holds mathematics. It knows no solver: ``backends/`` turn it into an NLP or into compiled code, both from the same
+A problem contains mathematics and knows no solver: ``backends/`` turns it into an NLP or into compiled code, both from the same
 ``assemble``. Everything that a user may want to change without rebuilding is a parameter: limits, weights, and the bounds of
-every variable, which appear among the parameters as ``<variable>.lower`` and ``<variable>.upper``.
+every variable, which are the parameters ``<variable>.lower`` and ``<variable>.upper``.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError, shown, unknown
-from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Stretch, Variable
+from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, RowsOverTime, Variable
+from nlp_gait.formulation.display import Display
 from nlp_gait.formulation.locking import CASADI, one_at_a_time
 from nlp_gait.formulation.motion.grid import Grid
-from nlp_gait.formulation.motion.playback import Playback
 from nlp_gait.formulation.motion.signals import Array, Signals
-from nlp_gait.formulation.motion.skeleton import Skeleton
 from nlp_gait.formulation.numbers import is_number, real_numbers
 from nlp_gait.formulation.origin import Origin, pickled
-from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
+P = ParamSpec("P")
 T = TypeVar("T")
 LARGEST = 1e100  # of a parameter; the square of a larger one is no number any more
 # Changes what a problem assembles.
@@ -39,12 +38,49 @@ Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 ROUNDING = 1e-6
 
 
+class Cache:
+    """Values that were built from a problem's mathematics, each by one thread."""
+
+    def __init__(self) -> None:
+        self._values: dict[Hashable, Any] = {}
+
+    def get(self, key: Hashable, build: Callable[[], T]) -> T:
+        """Return the value of a key, built on the first call."""
+        if key not in self._values:
+            with CASADI:
+                if key not in self._values:  # another thread may have built it meanwhile
+                    self._values[key] = build()
+        found: T = self._values[key]
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolverHints:
+    """What solvers may use; it changes no problem.
+
+    Attributes:
+        start: start point (n,) for gradient methods from the parameters by name and a generator; None for a uniform one within
+            the bounds.
+        hessian: of the Lagrangian: exact, or approximated where that was measured to be better.
+        amplifies_rounding: a rounding error may decide a jump, so that the result depends on libm's rounding. Compiled code then
+            rounds as the virtual machine does, on every lane count, and is slower.
+        starts: default number of starts: fewer where all lead to the same point, or each takes long.
+        searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
+    """
+
+    start: Start | None = None
+    hessian: Literal["exact", "limited-memory"] = "exact"
+    amplifies_rounding: bool = False
+    starts: int = 20
+    searchable: bool = True
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GaitProblem:
     """A gait problem with the current values of its parameters.
 
-    Copies made by ``with_values`` share everything that was built from the mathematics; ``derived`` is how to change the
-    mathematics. A problem may be used by several threads. It is pickled as its maker's name, options and values.
+    Copies made by ``with_values`` share everything that was built from the mathematics; ``derive`` changes the mathematics. A
+    problem may be used by several threads. It is pickled as its maker's name, options and values.
 
     Attributes:
         name: for example ``"nao-ssp"``.
@@ -54,23 +90,13 @@ class GaitProblem:
         objective: name, unit, sense.
         assemble: builds objective and constraints from symbols and an interpretation.
         options: what the mathematics was built with (robot, intervals, ...); written by ``formulation.registry.maker``.
-        refine: makes the same problem with a number of times as many samples, or None if it has none; likewise.
-        grid: samples, or None if the problem has none.
-        motion: time histories at a point of numbers, or None.
-        start: start point (n,) for gradient methods from the parameters by name and a generator; None means uniform within
-            the bounds.
-        robot: whose joints move, where it is a tree of rigid links, else None.
-        durations: variables that hold the duration of each phase, in their order.
-        skeleton: what is drawn of a motion, from it and the parameters by name, or None.
-        playback: what a physics engine needs to play the motion, or None.
-        hessian: of the Lagrangian, for gradient methods: exact, or approximated where that was measured to be better.
-        amplifies_rounding: True where a rounding error may decide a jump, so that another sine gives another gait: its compiled
-            code then rounds as the virtual machine does, on every lane count, and is slower.
-        starts: how many starts a solve makes unless told otherwise: fewer where all lead to the same end, or each takes long.
-        searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
         values: parameters that differ from their defaults.
-        stretches: the motion's rows as functions of time, part by part; empty where a problem is sampled by definition.
-        loaded_as: what ``load`` was asked for, where that is not the name: code of one's own.
+        refine: makes the same problem with a number of times as many samples; None if there is no finer grid.
+        grid: samples, or None if the problem has none.
+        rows_over_time: the motion's rows as functions of time, one entry per phase; empty if they are defined on samples only.
+        display: what shows its gaits.
+        hints: for solvers.
+        loaded_as: argument of ``load``, if that is not the name: user code.
     """
 
     name: str
@@ -80,23 +106,15 @@ class GaitProblem:
     objective: Objective
     assemble: Callable[[Point, Nonsmooth], Assembly]
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
     refine: Callable[[int], GaitProblem] | None = None
     grid: Grid | None = None
-    motion: Callable[[NumericPoint], Signals] | None = None
-    start: Start | None = None
-    robot: Robot | None = None
-    durations: tuple[str, ...] = ()
-    skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
-    playback: Playback | None = None
-    hessian: Literal["exact", "limited-memory"] = "exact"
-    amplifies_rounding: bool = False
-    starts: int = 20
-    searchable: bool = True
-    values: Mapping[str, float] = field(default_factory=dict)
-    stretches: tuple[Stretch, ...] = ()
+    rows_over_time: tuple[RowsOverTime, ...] = ()
+    display: Display = Display()
+    hints: SolverHints = SolverHints()
     loaded_as: str = ""
-    # No argument, so that every copy but those of ``with_values`` begins with nothing built.
-    _built: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    # No arguments: only copies made by ``with_values`` and ``with_origin`` share them.
+    _cache: Cache = field(default_factory=Cache, init=False, repr=False)
     _origin: Origin | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -105,6 +123,11 @@ class GaitProblem:
         twice = [name for name, count in counts.items() if count > 1]
         if twice:
             raise InputError(f"problem {self.name!r}: these variables or parameters stand twice: {', '.join(twice)}")
+
+    @property
+    def searchable(self) -> bool:
+        """Whether searches can solve it, see ``SolverHints``."""
+        return self.hints.searchable
 
     @property
     def address(self) -> str:
@@ -165,7 +188,7 @@ class GaitProblem:
                 )
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
         changed = replace(self, values=merged)
-        object.__setattr__(changed, "_built", self._built)  # the mathematics is the same
+        object.__setattr__(changed, "_cache", self._cache)  # the mathematics is the same
         object.__setattr__(changed, "_origin", self._origin)
         changed._check_pairs()
         return changed
@@ -188,9 +211,9 @@ class GaitProblem:
         refine = self.refine
         if refine is None:
             return None
-        return self.built(f"dense {factor}", lambda: refine(factor)).with_values(**self.values)
+        return self._cache.get((refine, factor), lambda: refine(factor)).with_values(**self.values)
 
-    def derived(
+    def derive(
         self,
         *,
         name: str = "",
@@ -220,17 +243,21 @@ class GaitProblem:
             return assembly if change is None else change(assembly, point, ops)
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-            base = self.start(parameters, rng) if self.start is not None else _uniform(self.names, parameters, rng)
+            base = (
+                self.hints.start(parameters, rng)
+                if self.hints.start is not None
+                else _uniform(self.names, parameters, rng)
+            )
             return np.concatenate([base, _uniform([variable.name for variable in variables], parameters, rng)])
 
         def refine(factor: int) -> GaitProblem:
             finer = self.dense(factor)
             assert finer is not None  # only where there is one; for the type checker
-            return finer.derived(
+            return finer.derive(
                 name=name, title=title, objective=objective, variables=variables, parameters=parameters, change=change
             )
 
-        motion = self.motion
+        motion = self.display.motion
         return replace(
             self,
             name=name or self.name,
@@ -239,10 +266,10 @@ class GaitProblem:
             variables=(*self.variables, *variables),
             own_parameters=(*self.own_parameters, *parameters),
             assemble=assemble,
-            motion=None if motion is None else lambda at: motion(at.only(self.names)),
-            start=start if self.start is not None or variables else None,
             refine=None if self.refine is None else refine,
-            stretches=self.stretches if change is None and not variables else (),
+            rows_over_time=self.rows_over_time if change is None and not variables else (),
+            display=replace(self.display, motion=None if motion is None else lambda at: motion(at.only(self.names))),
+            hints=replace(self.hints, start=start if self.hints.start is not None or variables else None),
             loaded_as="" if name else self.loaded_as,
         )
 
@@ -253,9 +280,9 @@ class GaitProblem:
         Raises:
             InputError: x has the wrong length or is not finite, or the problem has no time histories.
         """
-        if self.motion is None:
+        if self.display.motion is None:
             raise InputError(f"problem {self.name!r} has no time histories")
-        return self.motion(self.at(x))
+        return self.display.motion(self.at(x))
 
     @one_at_a_time
     def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
@@ -270,8 +297,8 @@ class GaitProblem:
     @one_at_a_time
     def start_point(self, rng: np.random.Generator) -> Array:
         """(n,) start point for a gradient method, within the bounds."""
-        if self.start is not None:
-            return np.clip(self.start(self.parameter_values, rng), self.lower, self.upper)
+        if self.hints.start is not None:
+            return np.clip(self.hints.start(self.parameter_values, rng), self.lower, self.upper)
         return rng.uniform(self.lower, self.upper)
 
     def variable_index(self, name: str) -> int:
@@ -328,10 +355,10 @@ class GaitProblem:
         parameters = [q.name for q in self.parameters]
         return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
 
-    def made_by(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
+    def with_origin(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
         """The same problem, which ``make`` with these options makes again elsewhere: it can be pickled if ``make`` can."""
         made = replace(self)
-        object.__setattr__(made, "_built", self._built)
+        object.__setattr__(made, "_cache", self._cache)
         object.__setattr__(made, "_origin", Origin(make, dict(options)))
         return made
 
@@ -347,14 +374,16 @@ class GaitProblem:
         """For pickle; InputError if no maker makes exactly this problem."""
         return pickled(self, self._origin)
 
-    def built(self, key: str, build: Callable[[], T]) -> T:
-        """What was built from the mathematics under a key, built now if it was not; shared by all copies."""
-        if key not in self._built:
-            with CASADI:
-                if key not in self._built:  # another thread may have built it meanwhile
-                    self._built[key] = build()
-        found: T = self._built[key]
-        return found
+    def build_once(self, build: Callable[Concatenate[GaitProblem, P], T], *arguments: P.args, **named: P.kwargs) -> T:
+        """Return ``build(self, ...)``, computed once for all copies that differ in parameter values only.
+
+        Args:
+            build: function of a module or class; it reads the mathematics, not the parameter values.
+            arguments: further ones, hashable.
+            named: likewise.
+        """
+        key = (build, arguments, tuple(sorted(named.items())))
+        return self._cache.get(key, lambda: build(self, *arguments, **named))
 
     def _parameter(self, name: str) -> Parameter:
         if isinstance(name, str):

@@ -36,7 +36,7 @@ def pickled(problem: GaitProblem, origin: Origin | None) -> tuple[Callable[..., 
             f"problem {problem.name!r} cannot be pickled: it is not what a maker makes from options, or its maker is no "
             "function at the top of a module; make it in the other process, or give it a maker there"
         )
-    return remade, (origin.make, origin.options, dict(problem.values), repr(problem.robot))
+    return remade, (origin.make, origin.options, dict(problem.values), repr(problem.display.robot))
 
 
 def remade(
@@ -54,7 +54,7 @@ def remade(
 @lru_cache(maxsize=16)
 def _remade(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any], ...], robot: str) -> GaitProblem:
     problem = make(**dict(options))
-    if repr(problem.robot) != robot:
+    if repr(problem.display.robot) != robot:
         raise InputError(
             f"problem {problem.name!r}: its robot is another one than when it was pickled: its file has changed"
         )

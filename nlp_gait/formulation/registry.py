@@ -73,10 +73,10 @@ def maker(*later: Mapping[str, Any]) -> Callable[[Maker], Maker]:
                     recorded |= {name: values[name] for name in group}
             refined_by = None if grid is None else grid.refined_by
             if refined_by is None or refined_by not in call:  # a maker without that option refines its problem itself
-                return replace(problem, options=recorded).made_by(made, call)
+                return replace(problem, options=recorded).with_origin(made, call)
             own = getattr(grid, refined_by)
             finer = replace(problem, options=recorded, refine=lambda factor: made(**{**call, refined_by: own * factor}))
-            return finer.made_by(made, call)
+            return finer.with_origin(made, call)
 
         made.options_checked = True  # type: ignore[attr-defined]
         return made
@@ -136,7 +136,7 @@ def own_maker(name: str) -> Maker:
         check(make, options)
         problem = guarded(name, path, lambda: make(**options))
         guarded(name, path, lambda: check_mathematics(problem))
-        return replace(problem, loaded_as=name).made_by(again, options)
+        return replace(problem, loaded_as=name).with_origin(again, options)
 
     return made
 

@@ -44,5 +44,5 @@ def worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
         indexes = {f"{name}@{k}" if k else name: v for k, part in enumerate(parts) for name, v in part.indexes.items()}
         return Assembly(objective=worst, constraints=constraints, indexes=indexes)
 
-    worst = first.derived(title=f"{first.title}, worst of {len(scenarios)} scenarios", change=change)
+    worst = first.derive(title=f"{first.title}, worst of {len(scenarios)} scenarios", change=change)
     return replace(worst, refine=None)  # a denser grid of the first scenario alone would be another problem

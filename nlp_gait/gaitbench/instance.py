@@ -189,7 +189,7 @@ class Instance:
     @cached_property
     def _derivatives(self) -> ca.Function:
         with _BUILDING:
-            return self.gait_problem.built("gaitbench derivatives", lambda: _build_derivatives(self.gait_problem))
+            return self.gait_problem.build_once(_build_derivatives)
 
     def _physical(self, X: Array) -> Array:
         return self._origin + np.asarray(X, dtype=float) * self._width if self.unit_cube else X

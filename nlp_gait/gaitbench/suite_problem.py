@@ -43,10 +43,10 @@ def _make(id: str) -> GaitProblem:
 def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
     """Convert the problem, or a finer one, to the suite's form."""
     base = base.with_values(**definition.values)
-    banded = hold_constant(base, definition.held).derived(
+    banded = hold_constant(base, definition.held).derive(
         name="gaitbench", title=f"GaitBench: {definition.what}", change=_widen_equations
     )
-    problem = replace(banded, searchable=True)
+    problem = replace(banded, hints=replace(banded.hints, searchable=True))
     refine = base.refine
     if refine is None:
         return problem
@@ -79,7 +79,7 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
         if v.name in values
     )
     bounds = {f"{name}.{end}": value for name, value in values.items() for end in ("lower", "upper")}
-    motion, start = problem.motion, problem.start
+    motion, start = problem.display.motion, problem.hints.start
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return problem.assemble(point.only(names), ops)
@@ -97,8 +97,8 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
         variables=tuple(problem.variables[i] for i in free),
         own_parameters=(*problem.own_parameters, *constants),
         assemble=assemble,
-        motion=None if motion is None else signals,
-        start=None if start is None else start_point,
+        display=replace(problem.display, motion=None if motion is None else signals),
+        hints=replace(problem.hints, start=None if start is None else start_point),
         values={name: value for name, value in problem.values.items() if name.rpartition(".")[0] not in values},
     )
 

@@ -86,12 +86,10 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
 
     Rows of no time, such as those of a switch, are taken as the judge has them.
     """
-    if not problem.stretches:
+    if not problem.rows_over_time:
         return Guarantee(holds=None, means={}, reason="sampled by definition: its rows are stated on samples alone")
     try:
-        built = problem.built(
-            "between samples", lambda: [time_functions(problem, stretch) for stretch in problem.stretches]
-        )
+        built = problem.build_once(_build_time_functions)
     except CompilerError as error:
         return Guarantee(holds=None, means={}, reason=str(error))
     found = [_examined(problem, part, np.asarray(x, dtype=float)) for part in built]
@@ -111,6 +109,10 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
     )
 
 
+def _build_time_functions(problem: GaitProblem) -> list[TimeFunctions]:
+    return [time_functions(problem, rows) for rows in problem.rows_over_time]
+
+
 class _Part(NamedTuple):
     breaches: list[Breach]
     means: dict[str, tuple[float, float]]
@@ -118,9 +120,9 @@ class _Part(NamedTuple):
 
 
 def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
-    """One stretch, piece by piece."""
-    start, end = part.stretch.times({**problem.by_name(x), **problem.parameter_values})
-    step = round(1.0 / part.stretch.intervals / GRAIN) * GRAIN
+    """Examine one phase, piece by piece."""
+    start, end = part.source.times({**problem.by_name(x), **problem.parameter_values})
+    step = round(1.0 / part.source.intervals / GRAIN) * GRAIN
     given = np.concatenate([x, problem.p])
     breaches: list[Breach] = []
     means: dict[str, tuple[float, float]] = {}
@@ -130,7 +132,7 @@ def _examined(problem: GaitProblem, part: TimeFunctions, x: Array) -> _Part:
             continue
         lower, upper = rows.limits(problem.p)
         search = Search(rows.values, given, shift, lower[:plain], upper[:plain])
-        search.run(first_pieces(part.stretch.kinks, shift))
+        search.run(first_pieces(part.source.kinks, shift))
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
         limits[[k - plain for k in part.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)

@@ -1,4 +1,4 @@
-"""The rows of a stretch of motion as enclosed functions of its phase."""
+"""The rows of a phase of motion as enclosed functions of time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.formulation import Array, Constraint, GaitProblem, Stretch
+from nlp_gait.formulation import Array, Constraint, GaitProblem, RowsOverTime
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -89,10 +89,10 @@ class TimeRows(NamedTuple):
 
 
 class TimeFunctions(NamedTuple):
-    """A stretch as enclosed functions.
+    """The rows over time as enclosed functions.
 
     Attributes:
-        stretch: itself.
+        source: the rows over time.
         instants: rows of each instant, then the means' rows and indexes, whose bounds are those of their means.
         plain: how many of these are rows of instants.
         squares: numbers of means of squares, which limit a root.
@@ -100,7 +100,7 @@ class TimeFunctions(NamedTuple):
         sampled: rows that are stated on samples alone.
     """
 
-    stretch: Stretch
+    source: RowsOverTime
     instants: TimeRows
     plain: int
     squares: frozenset[int]
@@ -109,8 +109,8 @@ class TimeFunctions(NamedTuple):
 
 
 @one_at_a_time
-def time_functions(problem: GaitProblem, stretch: Stretch) -> TimeFunctions:
-    """Functions of a stretch, read from its rows with all samples at one phase and with one an interval later.
+def time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
+    """Functions of one phase, read from its rows with all samples at one phase and with one an interval later.
 
     Raises:
         InputError: an operation that cannot be enclosed.
@@ -118,8 +118,8 @@ def time_functions(problem: GaitProblem, stretch: Stretch) -> TimeFunctions:
     """
     point = problem.symbols()
     now, later = MX.sym("phase"), MX.sym("later")
-    still = stretch.assemble(point, ca.horzcat(now, now, now), Exact())
-    moved = stretch.assemble(point, ca.horzcat(now, later, later), Exact())
+    still = source.assemble(point, ca.horzcat(now, now, now), Exact())
+    moved = source.assemble(point, ca.horzcat(now, later, later), Exact())
     by_kind: dict[str | None, list[Constraint]] = {}
     for constraint in still.constraints:
         by_kind.setdefault(constraint.over, []).append(constraint)
@@ -132,16 +132,16 @@ def time_functions(problem: GaitProblem, stretch: Stretch) -> TimeFunctions:
         for name, unit, value, lower, upper in _each(c)
     ]
     indexes = [
-        (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in stretch.means if name in still.indexes
+        (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in source.means if name in still.indexes
     ]
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
     return TimeFunctions(
-        stretch=stretch,
-        instants=_rows(instants, [*means, *squares, *indexes], [point.x, point.p, now], stretch),
+        source=source,
+        instants=_rows(instants, [*means, *squares, *indexes], [point.x, point.p, now], source),
         plain=len(instants),
         squares=frozenset(range(first, first + len(squares))),
-        changes=_rows(changes, [], [point.x, point.p, now, later], stretch),
+        changes=_rows(changes, [], [point.x, point.p, now, later], source),
         sampled=tuple(c.name for kind in (None, "samples") for c in by_kind.get(kind, [])),
     )
 
@@ -163,7 +163,7 @@ def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
 
 
 def _rows(
-    plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], stretch: Stretch
+    plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], source: RowsOverTime
 ) -> TimeRows:
     """Rows of every time, and others, whose means have the bounds."""
     rows = [*plain, *others]
@@ -175,7 +175,7 @@ def _rows(
     arguments = function.sx_in()
     scalar = ca.Function("rows", arguments, ca.cse([ca.densify(v) for v in function.call(arguments)]))
     first = int(inputs[0].numel() + inputs[1].numel())
-    half_open = range(first, first + len(inputs) - 2) if stretch.kinks else ()
+    half_open = range(first, first + len(inputs) - 2) if source.kinks else ()
     groups: dict[str, list[int]] = {}
     for k, (name, *_) in enumerate(plain):
         groups.setdefault(name.partition("[")[0], []).append(k)

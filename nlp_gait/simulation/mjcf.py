@@ -8,7 +8,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from nlp_gait.formulation.motion.playback import Tread
+from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import Body, tree_from

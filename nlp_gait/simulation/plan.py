@@ -10,9 +10,9 @@ from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, finely_sampled
+from nlp_gait.formulation.display import Tread
 from nlp_gait.formulation.locking import one_at_a_time
-from nlp_gait.formulation.motion.playback import Tread
-from nlp_gait.formulation.motion.steps import walk
+from nlp_gait.gaits.several_steps import walk
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, link_shapes
 
@@ -149,19 +149,19 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
             what cannot be repeated, or more than anybody waits for.
     """
     problem = result.problem
-    playback = problem.playback
-    if playback is None:
+    model = problem.display.simulation_model
+    if model is None:
         raise InputError(f"problem {problem.name!r} cannot be simulated: it does not say how its gaits are played")
-    if steps is not None and not playback.repeats:
+    if steps is not None and not model.repeats:
         raise InputError(f"problem {problem.name!r} is no cycle that can be repeated; leave out the number of steps")
     if steps is not None and steps > MOST_STEPS:
         raise InputError(f"at most {MOST_STEPS} steps are played, got {steps}; take fewer")
     at = problem.at(result.x)
-    if playback.motion is not None:
-        signals = playback.motion(at, 1 if steps is None else steps)
+    if model.motion is not None:
+        signals = model.motion(at, 1 if steps is None else steps)
     else:
         signals = finely_sampled(result)
-        signals = signals if steps is None else walk(signals, playback.robot, steps)
+        signals = signals if steps is None else walk(signals, model.robot, steps)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
     if (duration := float(signals.arrays["t"][-1])) > LONGEST_S:
@@ -169,11 +169,11 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
             f"{steps} steps of this gait last {duration:g} s, and at most {LONGEST_S:g} s are played; take fewer"
         )
     return Plan(
-        robot=playback.robot,
-        full_robot=problem.robot or playback.robot,
+        robot=model.robot,
+        full_robot=problem.display.robot or model.robot,
         signals=signals,
-        heat_loss=0.0 if playback.heat_loss is None else problem.value(playback.heat_loss),
-        gravity=playback.gravity,
-        ground=() if playback.ground is None else playback.ground(at, steps or 1),
-        planar=playback.planar,
+        heat_loss=0.0 if model.heat_loss is None else problem.value(model.heat_loss),
+        gravity=model.gravity,
+        ground=() if model.ground is None else model.ground(at, steps or 1),
+        planar=model.planar,
     )

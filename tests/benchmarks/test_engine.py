@@ -11,8 +11,8 @@ from compare.judge import evaluate  # noqa: E402
 from compare.papers.walk12.walk12_paper import row_of  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.formulation import Result  # noqa: E402
-from nlp_gait.gaits.walk12.playback import rigid_bodies  # noqa: E402
 from nlp_gait.gaits.walk12.robot import point_mass_biped  # noqa: E402
+from nlp_gait.gaits.walk12.simulation_model import rigid_bodies  # noqa: E402
 
 
 @pytest.mark.slow

@@ -98,7 +98,12 @@ def test_what_a_problem_has_not_is_refused(tmp_path):
         with pytest.raises(InputError, match="no robot with motors; export it as csv or json"):
             write_as(name, tmp_path / "x", walk, 40)
     with pytest.raises(InputError, match="does not say how its gaits are played"):
-        write_as("mjcf", tmp_path / "x", replace(walk, problem=replace(problem, playback=None)), 40)
+        write_as(
+            "mjcf",
+            tmp_path / "x",
+            replace(walk, problem=replace(problem, display=replace(problem.display, simulation_model=None))),
+            40,
+        )
     write_as("csv", tmp_path / "x.csv", walk, 40)
     assert "left_stance [1]" in (tmp_path / "x.csv").read_text().splitlines()[0]
     with pytest.raises(UnknownNameError, match="webots"):

@@ -19,6 +19,7 @@ import pytest
 import nlp_gait
 from benchmarks.faults import together
 from compare.judge import evaluate
+from nlp_gait.backends.exact import exact_model
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.formulation import GaitProblem
 from tests.backends.toys import corner, toy
@@ -58,7 +59,7 @@ def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
     points = [problem.start_point(np.random.default_rng(k)) for k in range(8)]
     builds: list[str] = []
 
-    def build() -> object:
+    def build(problem: GaitProblem) -> object:
         builds.append("built")
         return object()
 
@@ -66,7 +67,7 @@ def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
 
     def solved(k: int) -> tuple[bool, float, bytes, float]:
         together_at.wait()
-        problem.built("something", build)
+        problem.build_once(build)
         solution = nlp_gait.solve(problem, x0=points[k])
         history = problem.signals(solution.x)
         judged = float(evaluate(problem, solution.x).objective["value"])
@@ -187,13 +188,13 @@ def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[],
     assert len(text) < 20_000
     again = pickle.loads(text)
     assert same(again, problem)
-    assert pickle.loads(text).built("exact", lambda: None) is again.built("exact", lambda: None)  # built once
+    assert exact_model(pickle.loads(text)) is exact_model(again)  # built once
     assert copy.deepcopy(problem) is copy.copy(problem) is problem
 
 
 def test_a_problem_without_a_maker_is_refused_by_name() -> None:
     walk = nlp_gait.load("walk12")
-    for problem in (toy(corner), walk.derived(title="other mathematics under the same name")):
+    for problem in (toy(corner), walk.derive(title="other mathematics under the same name")):
         for given in (problem, nlp_gait.compile_objective(problem)):
             with pytest.raises(
                 InputError, match=rf"problem '{problem.name}' cannot be pickled.*make it in the other process"

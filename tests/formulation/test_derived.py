@@ -36,7 +36,7 @@ def dearer(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
 
 
 def with_slack(problem: GaitProblem) -> GaitProblem:
-    return problem.derived(name="dearer", variables=[SLACK], parameters=[PRICE], change=dearer)
+    return problem.derive(name="dearer", variables=[SLACK], parameters=[PRICE], change=dearer)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
         changed = replace(problem, assemble=lambda point, ops: doubled(problem.assemble(point, ops), point, ops))
     else:
         changed = problem.with_values(limit=0.25) if "values" in how else problem
-        changed = changed.derived(change=doubled)
+        changed = changed.derive(change=doubled)
     x = [1.5, 0.0]
     assert evaluated(problem, x).cost == 2.5 and evaluated(changed, x).cost == 5.0
     assert nlp_model(changed) is not nlp_model(problem)
@@ -71,8 +71,8 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
 
 
 def test_what_is_derived_of_what_is_derived_has_its_own_functions() -> None:
-    once = built(toy(corner).derived(change=doubled))
-    twice = once.derived(change=doubled)
+    once = built(toy(corner).derive(change=doubled))
+    twice = once.derive(change=doubled)
     assert [evaluated(problem, [1.5, 0.0]).cost for problem in (once, twice)] == [5.0, 10.0]
 
 
@@ -102,7 +102,7 @@ def test_start_points_have_the_new_variable_within_its_current_bounds(name: str)
     changed = with_slack(problem).with_values(**{"slack_m.lower": 0.6})
     x = changed.start_point(np.random.default_rng(0))
     assert x.shape == (len(problem.names) + 1,) and 0.6 <= x[-1] <= 1.0
-    if problem.start is not None:
+    if problem.hints.start is not None:
         np.testing.assert_array_equal(x[:-1], problem.start_point(np.random.default_rng(0)))
 
 
@@ -140,7 +140,7 @@ def test_ipopt_solves_it() -> None:
 
 def test_another_objective_has_its_own_name_and_sense() -> None:
     gain = Objective(name="gain", unit="J", sense="maximise")
-    flipped = toy(corner).derived(
+    flipped = toy(corner).derive(
         objective=gain, change=lambda assembly, point, ops: replace(assembly, objective=-assembly.objective)
     )
     solution = nlp_gait.solve(flipped, starts=2)
@@ -161,7 +161,7 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
 )
 def test_names_that_stand_twice_are_refused(more: dict[str, Any], twice: str) -> None:
     with pytest.raises(InputError, match=f"problem 'toy': these variables or parameters stand twice: {twice}$"):
-        toy(corner).derived(**more)
+        toy(corner).derive(**more)
 
 
 def test_an_added_variable_is_nothing_to_the_parts_of_a_richer_motion() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import load, problem_names
+from nlp_gait.formulation import GaitProblem, load, problem_names
 from tests.backends.toys import corner, toy
 
 SINGLE_SUPPORT_NAMES = (
@@ -50,15 +50,19 @@ def test_limits_default_to_the_papers(name: str, limits: tuple[float, ...]) -> N
 
 
 def test_a_copy_with_other_values_shares_what_was_built_and_leaves_the_first_alone() -> None:
+    def build(problem: GaitProblem, *kind: str) -> object:
+        return object()
+
     problem = toy(corner)
-    first = problem.built("thing", object)
+    first = problem.build_once(build)
+    assert problem.build_once(build, "another") is not first
     other = problem.with_values(**{"limit": 0.75, "x.upper": 1.5})
-    assert other.built("thing", object) is first
+    assert other.build_once(build) is first
     assert (other.value("limit"), problem.value("limit")) == (0.75, 0.5)
     assert (other.upper[0], problem.upper[0]) == (1.5, 2.0)
     assert other.values == {"limit": 0.75, "x.upper": 1.5}
     assert other.with_values(limit=0.25).upper[0] == 1.5  # values add up
-    assert toy(corner).built("thing", object) is not first
+    assert toy(corner).build_once(build) is not first
 
 
 def test_a_fixed_variable_has_equal_bounds() -> None:

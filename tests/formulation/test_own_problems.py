@@ -56,10 +56,10 @@ def test_a_robot_file_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     raw = humanoid()
     Path("my.json").write_text(json.dumps(raw))
-    first = load("nao-ssp", robot="my.json").robot
+    first = load("nao-ssp", robot="my.json").display.robot
     raw["links"]["torso"]["mass_kg"] += 1.0
     Path("my.json").write_text(json.dumps(raw))
-    second = load("nao-ssp", robot="my.json").robot
+    second = load("nao-ssp", robot="my.json").display.robot
     assert first is not None and second is not None and second.mass_kg == pytest.approx(first.mass_kg + 1.0)
 
 

@@ -14,7 +14,7 @@ import nlp_gait
 from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError
-from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, Stretch
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, RowsOverTime
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
@@ -43,9 +43,9 @@ def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
         rows = Constraint(name="wave", labels=labels, unit="m", scale=1.0, value=value, upper=MX(limit), over=over)
         return Assembly(objective=MX(0), constraints=(rows,), indexes={"mean_m": ca.sum2(wave) / phases.shape[1]})
 
-    stretch = Stretch(assemble=at_phases, times=lambda values: (1.0, 3.0), intervals=4, means=("mean_m",))
+    rows = RowsOverTime(assemble=at_phases, times=lambda values: (1.0, 3.0), intervals=4, means=("mean_m",))
     base = toy(lambda x, y, lim, ops: (x, (row(0 * y, lower=MX(0.0)),)))
-    return replace(base, stretches=(stretch,))
+    return replace(base, rows_over_time=(rows,))
 
 
 def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -> None:
@@ -96,10 +96,10 @@ def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:
         rows = Constraint(name="jump", labels=labels, unit="m", scale=1.0, value=value.T, upper=MX(0.3), over="instant")
         return Assembly(objective=MX(0), constraints=(rows,), indexes={})
 
-    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
-    kinked = replace(waving(0.5), stretches=(stretch,))
+    rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
+    kinked = replace(waving(0.5), rows_over_time=(rows,))
     assert guarantee(kinked, np.array([PEAK, 0.0])).holds
-    assert not guarantee(replace(kinked, stretches=(replace(stretch, kinks=()),)), np.array([PEAK, 0.0])).holds
+    assert not guarantee(replace(kinked, rows_over_time=(replace(rows, kinks=()),)), np.array([PEAK, 0.0])).holds
 
 
 def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
@@ -120,7 +120,7 @@ def test_a_mean_is_that_over_time() -> None:
 
 def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
     problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
-    rows = time_functions(problem, problem.stretches[0]).instants
+    rows = time_functions(problem, problem.rows_over_time[0]).instants
     assert rows.values is not None
     groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.values.groups)}
     assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
@@ -191,8 +191,8 @@ def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> Non
         mean = Constraint(name="mean", unit="m", scale=1.0, value=ca.sum2(pole), upper=MX(0.0), over="mean")
         return Assembly(objective=MX(0), constraints=(rows, wild, mean), indexes={"mean_m": ca.sum2(pole)})
 
-    stretch = Stretch(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
-    found = guarantee(replace(waving(PEAK), stretches=(stretch,)), np.array([PEAK, 0.0]))
+    rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
+    found = guarantee(replace(waving(PEAK), rows_over_time=(rows,)), np.array([PEAK, 0.0]))
     assert found.holds is not True
     assert {b.row: b.most for b in found.breaches}["wild[pole]"] is None
     assert "mean_m" not in found.means and "any amount" in str(found)
@@ -205,8 +205,8 @@ def test_finite_differences_are_sampled_by_definition() -> None:
 
 def test_a_change_of_the_mathematics_takes_the_guarantee_away_and_new_values_do_not() -> None:
     problem = nlp_gait.load("walk12")
-    assert problem.with_values(step_time_s=0.9).stretches
-    assert not problem.derived(change=lambda assembly, point, ops: assembly).stretches
+    assert problem.with_values(step_time_s=0.9).rows_over_time
+    assert not problem.derive(change=lambda assembly, point, ops: assembly).rows_over_time
 
 
 def test_without_a_compiler_the_verdict_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

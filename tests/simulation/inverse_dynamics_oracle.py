@@ -29,9 +29,9 @@ def engine_torques(result: Result, signals: Signals) -> Array:
         result: gait of ``nao-ssp`` or ``nao-dsp``, with rotational inertia: an engine takes no point masses.
         signals: its time histories.
     """
-    options, playback = result.problem.options, result.problem.playback
-    assert playback is not None  # a gait of NAO has one; for the type checker
-    robot = playback.robot
+    options, model = result.problem.options, result.problem.display.simulation_model
+    assert model is not None  # a gait of NAO has one; for the type checker
+    robot = model.robot
     torques = np.zeros_like(signals.arrays["tau"])
     if result.problem.name == "nao-ssp":
         _fill(torques, tree_from(robot, robot.feet["left"].link), signals)

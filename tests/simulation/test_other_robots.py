@@ -11,7 +11,7 @@ import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.stairs.formulas.loads import MOVING
-from nlp_gait.gaits.stairs.playback import whole_force
+from nlp_gait.gaits.stairs.simulation_model import whole_force
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
 from nlp_gait.simulation.drive import Drive

@@ -13,8 +13,8 @@ import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, finely_sampled
-from nlp_gait.formulation.motion.steps import step_of, walk
 from nlp_gait.gaits.nao.body import GRAVITY, nao
+from nlp_gait.gaits.several_steps import step_of, walk
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over
 

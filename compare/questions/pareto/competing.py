@@ -132,8 +132,8 @@ def competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
         UnknownNameError: no such objective.
         InputError: the problem has no power, margins and duration to trade.
     """
-    durations = problem.durations
-    if problem.objective.name != POWER or len(durations) != 1 or problem.motion is None:
+    durations = problem.display.durations
+    if problem.objective.name != POWER or len(durations) != 1 or problem.display.motion is None:
         raise InputError(f"{problem.name} trades no power against balance or speed; allowed are nao-ssp and nao-dsp")
     if name in MARGINS:
         return Margin(name=name)
@@ -154,7 +154,7 @@ def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProble
     reward = Parameter(
         name=REWARD, unit=f"W/({criterion.unit})", default=0.0, description=f"reward for {criterion.name}", minimum=0.0
     )
-    return problem.derived(
+    return problem.derive(
         name=f"{problem.name}-{criterion.name}",
         objective=Objective(name="rewarded_power", unit="W"),
         parameters=(reward,),

@@ -117,8 +117,8 @@ def prices(
         limits = [price for price in every if abs(price.per_step) > FREE * max(abs(found.objective), FREE)]
         free = len(every) - len(limits)
         limits = [kept.checked(base, price, partial(_moved, problem, price)) for price in limits]
-        if problem.robot is not None:
-            robot = _ranked(kept.of_robot(partial(_robot_prices, spec, found, problem.robot, progress)))
+        if problem.display.robot is not None:
+            robot = _ranked(kept.of_robot(partial(_robot_prices, spec, found, problem.display.robot, progress)))
             robot[:checks] = [
                 kept.checked(base, price, partial(_with_changed_robot, spec, price)) for price in robot[:checks]
             ]

@@ -74,7 +74,7 @@ class Robust:
 
 def boxes(spec: ProblemSpec, mass: float, sole_m: float) -> dict[str, Box]:
     """Boxes of uncertainty, each wider than the one before: soles alone, with the whole robot's mass, with each link's."""
-    robot = spec.load().robot
+    robot = spec.load().display.robot
     if robot is None:
         raise InputError(f"problem {spec.name!r} has no robot to be uncertain about; the NAO problems have one")
     soles = {"sole_x_m": sole_m, "sole_y_m": sole_m}

@@ -125,7 +125,7 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
     """The textbook's walk at the cheapest height of its hip: from the highest that reaches, lower as long as it pays."""
     problem = own.problem
     body = ON_A_TABLE[problem.name](**_shared(problem))
-    single, double = (gait.found.x[name] for name in problem.durations)
+    single, double = (gait.found.x[name] for name in problem.display.durations)
 
     def at(height_m: float) -> Result:
         footsteps = Footsteps(
@@ -164,8 +164,8 @@ def height_step_m(problem: GaitProblem) -> float:
     """Between the hip's heights that are tried: NAO's, of other robots in proportion to their legs [m]."""
     if problem.name == CYCLE:
         return HEIGHT_STEP_M
-    assert problem.robot is not None  # a cycle is some robot's; for the type checker
-    return HEIGHT_STEP_M * biped_of(problem.robot).length_scale
+    assert problem.display.robot is not None  # a cycle is some robot's; for the type checker
+    return HEIGHT_STEP_M * biped_of(problem.display.robot).length_scale
 
 
 def least_torque(
@@ -174,7 +174,7 @@ def least_torque(
     """The gait of least squared torques at the same times, so with the same steps."""
     own = result_of(spec, gait.found).problem
     problem = replace(spec, options={**spec.options, "objective": "torque"}).load().with_values(**own.values)
-    same = {name: gait.found.x[name] for name in (*own.durations, LIFT)}
+    same = {name: gait.found.x[name] for name in (*own.display.durations, LIFT)}
     solution = solve(problem, starts=starts, seed=seed, fix=same, solver=finished.solver())
     if not solution.success:
         return None, solution.status

@@ -20,7 +20,7 @@ from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.formulation import GaitProblem, Result, finely_sampled
-from nlp_gait.formulation.motion.steps import walk
+from nlp_gait.gaits.several_steps import walk
 from nlp_gait.simulation.measurements import Measurements
 from nlp_gait.simulation.walking import Walk
 
@@ -63,8 +63,8 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait], rivals: Sequence[Rival
             "power": lambda gait: f"{gait.indexes['power_W']:.4f} W",
             "cost of transport": lambda gait: f"{gait.indexes['cost_of_transport']:.4f}",
             "step": lambda gait: f"{gait.indexes['step_length_m']:.4f} m",
-            "single": lambda gait: f"{gait.found.x[problem.durations[0]]:.3f} s",
-            "double": lambda gait: f"{gait.found.x[problem.durations[1]]:.3f} s",
+            "single": lambda gait: f"{gait.found.x[problem.display.durations[0]]:.3f} s",
+            "double": lambda gait: f"{gait.found.x[problem.display.durations[1]]:.3f} s",
         },
     )
     costs = Figure(
@@ -181,7 +181,7 @@ def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
         lengths.plot(at, [1000.0 * gait.indexes["step_length_m"] for gait in good], "o-", color=MODEL)
         lengths.set_ylabel("step\n[mm]")
         lengths.set_ylim(bottom=0.0)
-        for time, colour in zip(problem.durations, (LEFT, RIGHT), strict=True):
+        for time, colour in zip(problem.display.durations, (LEFT, RIGHT), strict=True):
             phase = name_in_words(time, "s").removesuffix(" time")  # for example "single support"
             times.plot(at, [gait.found.x[time] for gait in good], "o-", color=colour, label=phase)
         times.set_ylabel("time [s]")
@@ -207,12 +207,12 @@ def _engine_costs(axes: Axes, gaits: Sequence[Gait]) -> None:
 def cycle_figure(result: Result) -> Drawing:
     """Two steps of a cycle: paths of hip and feet from the side and from above, and the angles of the left leg."""
     problem = result.problem
-    assert problem.playback is not None  # a cycle can be played; for the type checker
-    robot = problem.playback.robot
+    assert problem.display.simulation_model is not None  # a cycle can be played; for the type checker
+    robot = problem.display.simulation_model.robot
     signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
     leg = [joint.name for joint in reversed(robot.path_to_root(robot.feet["left"].link))]
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
-    durations = [float(result.x[problem.variable_index(name)]) for name in problem.durations]
+    durations = [float(result.x[problem.variable_index(name)]) for name in problem.display.durations]
     switches = np.cumsum([0.0] + durations * STEPS_SHOWN)
     with style():
         figure = new_figure(6.3, 7.2)

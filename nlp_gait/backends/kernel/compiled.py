@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
+from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
 from nlp_gait.backends.kernel.interpreted import InterpretedKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
@@ -187,26 +187,30 @@ def compile_objective(
         threads = checked_count("threads", threads, at_most=MOST_THREADS)
     if lanes is not None and checked_count("lanes", lanes) not in LANE_COUNTS:
         raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
-    kernel = kernel_of(problem)
     count = native_lanes() if lanes is None else lanes
     evaluator: NativeKernel | InterpretedKernel
     used = threads or available_cores()
     try:
         compiler = find_compiler()
-        evaluator = problem.built(
-            f"native kernel {count} {compiler}",
-            lambda: _verified(
-                NativeKernel(kernel, compiler, count, scalar_functions=problem.amplifies_rounding), problem, kernel
-            ),
-        )
+        evaluator = problem.build_once(_native_kernel, compiler, count)
     except CompilerError as error:
         if require_compiler:
             raise
         LOG.warning("the objective is interpreted, many times slower: %s", error)
-        evaluator = problem.built("interpreted kernel", lambda: InterpretedKernel(kernel))
+        evaluator = problem.build_once(_interpreted_kernel)
         used = 1  # the virtual machine does not let go of Python's lock
     again = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
     return CompiledObjective(problem, evaluator, used, again)
+
+
+def _native_kernel(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:
+    kernel = kernel_of(problem)
+    native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
+    return _verified(native, problem, kernel)
+
+
+def _interpreted_kernel(problem: GaitProblem) -> InterpretedKernel:
+    return InterpretedKernel(kernel_of(problem))
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:

@@ -42,7 +42,7 @@ class Kernel:
 
 def kernel_of(problem: GaitProblem) -> Kernel:
     """Kernel of a problem, built once for all copies that differ in parameter values only."""
-    return problem.built("kernel", lambda: _kernel(problem))
+    return problem.build_once(_kernel)
 
 
 def _kernel(problem: GaitProblem) -> Kernel:

@@ -64,10 +64,11 @@ class KktFunctions:
 
 def kkt_functions(problem: GaitProblem) -> KktFunctions:
     """First-order conditions of a problem, built once for all copies that differ in parameter values only."""
-    return problem.built("kkt", lambda: _build(nlp_model(problem)))
+    return problem.build_once(_build)
 
 
-def _build(model: NlpModel) -> KktFunctions:
+def _build(problem: GaitProblem) -> KktFunctions:
+    model = nlp_model(problem)
     w, p = model.nlp["x"], model.nlp["p"]
     n, ties = model.variables, len(model.tie_upper)
     row_lower, row_upper = model.row_bounds(p[:-1])

@@ -87,7 +87,7 @@ class IpoptSettings(Solver):
     def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
         """See ``Solver``."""
         compiled = pays(problem, solves) if self.compiled is None else self.compiled
-        return replace(self, hessian=self.hessian or problem.hessian, compiled=compiled)
+        return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled)
 
     def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
@@ -101,7 +101,7 @@ class IpoptSettings(Solver):
         """
         chosen = self.settled(problem, solves)
         try:
-            return problem.built(f"ipopt {chosen}", lambda: Ipopt(problem, chosen))
+            return problem.build_once(Ipopt, chosen)
         except CompilerError as error:
             if self.compiled:
                 raise

@@ -90,7 +90,7 @@ class CasadiSolver(Solver):
             InputError: the solver does not run here.
         """
         model = nlp_model(problem)
-        solver, watch, create_s = problem.built(f"nlpsol {self.name}", lambda: self._made(problem))
+        solver, watch, create_s = problem.build_once(_build_solver, self)
         widths, bounds = model.widths, model.bounds(problem)
         primal = model.start(problem, x0, widths[0])
         iterations, evaluations, stats = 0, Evaluations(), {}
@@ -125,15 +125,16 @@ class CasadiSolver(Solver):
             time_s=time.perf_counter() - started,
         )
 
-    def _made(self, problem: GaitProblem) -> tuple[ca.Function, IterationWatch, float]:
-        """The solver of a problem's NLP, what watches it, and the time that it took to make them [s]."""
-        self.check(problem)
-        started = time.perf_counter()
-        nlp = nlp_model(problem).nlp
-        watch = IterationWatch(nlp)
-        options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **self.quiet}
-        with _silent():
-            return ca.nlpsol(self.name, self.name, nlp, options), watch, time.perf_counter() - started
+
+def _build_solver(problem: GaitProblem, settings: CasadiSolver) -> tuple[ca.Function, IterationWatch, float]:
+    """Return the solver of a problem's NLP, the watch of its iterations, and the time to build them [s]."""
+    settings.check(problem)
+    started = time.perf_counter()
+    nlp = nlp_model(problem).nlp
+    watch = IterationWatch(nlp)
+    options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **settings.quiet}
+    with _silent():
+        return ca.nlpsol(settings.name, settings.name, nlp, options), watch, time.perf_counter() - started
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,13 +16,15 @@ from nlp_gait.formulation import (
     Array,
     Assembly,
     Constraint,
+    Display,
     GaitProblem,
     Objective,
     Parameter,
     Point,
+    RowsOverTime,
     Signals,
+    SolverHints,
     Start,
-    Stretch,
     Variable,
 )
 from nlp_gait.formulation.assembly import parameters
@@ -151,17 +153,17 @@ class WalkingCycle:
         )
 
     @property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def rows_over_time(self) -> tuple[RowsOverTime, ...]:
         """Both phases as functions of time."""
-        found: list[Stretch] = []
+        found: list[RowsOverTime] = []
         begins: tuple[str, ...] = ()
         for name, phase in self.phases.items():
-            for stretch in phase.stretch(name, begins):
+            for one in phase.rows_over_time(name, begins):
                 found.append(
                     replace(
-                        stretch,
+                        one,
                         assemble=partial(self._assemble_at, name),
-                        means=tuple(f"{name}_{index}" for index in stretch.means),
+                        means=tuple(f"{name}_{index}" for index in one.means),
                     )
                 )
             begins = (*begins, phase.duration)
@@ -214,9 +216,8 @@ def cycle_problem(name: str, owner: str, cycle: WalkingCycle, start: Start | Non
         objective=cycle.objective,
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
-        motion=lambda at: joined(cycle.signals(at)),
-        start=start,
-        durations=tuple(TIMES.values()),
+        display=Display(motion=lambda at: joined(cycle.signals(at)), durations=tuple(TIMES.values())),
+        hints=SolverHints(start=start),
     )
 
 

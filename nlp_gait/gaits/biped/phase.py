@@ -19,12 +19,12 @@ from nlp_gait.formulation import (
     NumericPoint,
     Parameter,
     Point,
+    RowsOverTime,
     Signals,
-    Stretch,
     Variable,
     in_space,
 )
-from nlp_gait.formulation.motion.playback import PLAYED
+from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader, Loads, PlannedInstant, Planner
 from nlp_gait.gaits.biped.parts import REACH_MARGIN, Part
@@ -137,7 +137,7 @@ class Phase:
             traces=dict(zip(traces, seen, strict=True)),
         )
 
-    def stretch(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[Stretch, ...]:
+    def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """The phase as functions of time; none with finite differences, which are of its samples.
 
         Args:
@@ -155,7 +155,7 @@ class Phase:
             return start, start + max(values[self.duration], LEAST_DURATION)
 
         return (
-            Stretch(
+            RowsOverTime(
                 name=name,
                 assemble=assemble,
                 times=times,
@@ -200,7 +200,7 @@ class Phase:
         if not attitude.shape[0]:
             return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
         arrays["attitude"] = _numbers(attitude)
-        return Signals(joints=self.joints, arrays=arrays, columns={**COLUMNS, "attitude": PLAYED["attitude"]})
+        return Signals(joints=self.joints, arrays=arrays, columns={**COLUMNS, "attitude": SIMULATED["attitude"]})
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Assembly, GaitProblem, Parameter, Point, Start
+from nlp_gait.formulation import Assembly, Display, GaitProblem, Parameter, Point, SolverHints, Start
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.phase import Phase
@@ -60,8 +60,6 @@ def problem_of(
         objective=phase.goal.objective,
         assemble=assemble,
         grid=phase.grid,
-        motion=phase.signals,
-        start=start,
-        durations=(phase.duration,),
-        searchable=searchable,
+        display=Display(motion=phase.signals, durations=(phase.duration,)),
+        hints=SolverHints(start=start, searchable=searchable),
     )

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.formulation import Array, GaitProblem, InstantPoint, Playback, Point, Start, Variable
+from nlp_gait.formulation import Array, GaitProblem, InstantPoint, Point, SimulationModel, Start, Variable
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.parts import (
@@ -155,5 +155,7 @@ def with_body(
         repeats: a gait is one step, whose mirror image is the next one.
     """
     played = replace(body.biped.model, armatures_kgm2=armatures_kgm2)
-    playback = Playback(robot=played, gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats)
-    return replace(problem, robot=body.biped.full, skeleton=skeleton(body.biped.full), playback=playback)
+    simulation_model = SimulationModel(robot=played, gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats)
+    full = body.biped.full
+    display = replace(problem.display, robot=full, skeleton=skeleton(full), simulation_model=simulation_model)
+    return replace(problem, display=display)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from nlp_gait.formulation import GaitProblem, Playback, Start
+from nlp_gait.formulation import GaitProblem, SimulationModel, Start
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.parts import BalanceMargins, JointLimits, Margins, Part, Reach, TorqueChange
 from nlp_gait.gaits.biped.phase import Phase
@@ -31,7 +31,7 @@ def phase_problem(
 ) -> GaitProblem:
     """Problem of one phase of NAO; ``robot`` is its name or file, the others are those of ``problem_of``."""
     problem = problem_of(name, title, phase, start=start, searchable=searchable)
-    return with_robot(replace(problem, stretches=phase.stretch()), robot, phase.robot.armatures_kgm2)
+    return with_robot(replace(problem, rows_over_time=phase.rows_over_time()), robot, phase.robot.armatures_kgm2)
 
 
 def with_robot(
@@ -47,5 +47,6 @@ def with_robot(
     """
     full = load_robot(robot)
     played = replace(nao(robot, rotational_inertia=True), armatures_kgm2=armatures_kgm2)
-    playback = Playback(robot=played, gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats)
-    return replace(problem, robot=full, skeleton=skeleton(full), playback=playback)
+    simulation_model = SimulationModel(robot=played, gravity=GRAVITY, heat_loss=HEAT_LOSS.name, repeats=repeats)
+    display = replace(problem.display, robot=full, skeleton=skeleton(full), simulation_model=simulation_model)
+    return replace(problem, display=display)

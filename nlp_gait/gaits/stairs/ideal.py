@@ -12,14 +12,25 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Grid, NumericPoint, Objective, Signals, maker, parameters
+from nlp_gait.formulation import (
+    Array,
+    Display,
+    GaitProblem,
+    Grid,
+    NumericPoint,
+    Objective,
+    Signals,
+    SolverHints,
+    maker,
+    parameters,
+)
 from nlp_gait.formulation.blocks import Block, Layout
 from nlp_gait.gaits.stairs.formulas.gait import Stair, StairPlan
 from nlp_gait.gaits.stairs.formulas.loads import JOINTS, MOVING
 from nlp_gait.gaits.stairs.formulas.posture import posture
 from nlp_gait.gaits.stairs.ideal_model import AXES, IdealModel
-from nlp_gait.gaits.stairs.playback import Performance, playback, standing
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.simulation_model import Performance, simulation_model, standing
 from nlp_gait.gaits.stairs.skeleton import skeleton
 from nlp_gait.gaits.stairs.stair import (
     ANGLE_LIMITS,
@@ -149,12 +160,8 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         objective=Objective(name="effort", unit="1"),
         assemble=model.assemble,
         grid=Grid(intervals=intervals),
-        motion=motion,
-        skeleton=skeleton,
-        playback=playback(performance, repeats=True),
-        start=start,
-        starts=3,
-        searchable=False,
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance, repeats=True)),
+        hints=SolverHints(start=start, starts=3, searchable=False),
     )
 
 

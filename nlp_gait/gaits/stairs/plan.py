@@ -16,13 +16,15 @@ from nlp_gait.formulation import (
     Array,
     Assembly,
     Constraint,
+    Display,
     GaitProblem,
     Grid,
     NumericPoint,
     Objective,
     Point,
+    RowsOverTime,
     Signals,
-    Stretch,
+    SolverHints,
     Variable,
     maker,
     parameters,
@@ -31,8 +33,8 @@ from nlp_gait.gaits.stairs.formulas.gait import PHASES
 from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.gaits.stairs.governing import GIVEN_PARAMETERS, GOVERNING, GOVERNING_VARIABLES, REACH_MARGIN
 from nlp_gait.gaits.stairs.plan_samples import GROUND_SHARE, PlannedStep, PlanSamples, grid_at, reach_function
-from nlp_gait.gaits.stairs.playback import Performance, playback, standing, whole_force
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.simulation_model import Performance, simulation_model, standing, whole_force
 from nlp_gait.gaits.stairs.skeleton import skeleton
 from nlp_gait.gaits.stairs.stair import (
     ANGLE_LIMITS,
@@ -147,13 +149,11 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         own_parameters=PARAMETERS,
         objective=OBJECTIVES[minimise],
         assemble=assemble,
-        start=_start,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        motion=motion,
-        skeleton=skeleton,
-        playback=playback(performance),
-        stretches=tuple(
-            Stretch(
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance)),
+        hints=SolverHints(start=_start),
+        rows_over_time=tuple(
+            RowsOverTime(
                 name=name,
                 assemble=partial(_at_phases, step, i),
                 times=partial(_phase_times, i),

@@ -15,11 +15,13 @@ from nlp_gait.formulation import (
     Array,
     Assembly,
     Columns,
+    Display,
     GaitProblem,
     NumericPoint,
     Objective,
     Point,
     Signals,
+    SolverHints,
     Variable,
     maker,
     parameters,
@@ -27,8 +29,8 @@ from nlp_gait.formulation import (
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
 from nlp_gait.gaits.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
-from nlp_gait.gaits.stairs.playback import Performance, driven, playback
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.simulation_model import Performance, driven, simulation_model
 from nlp_gait.gaits.stairs.skeleton import skeleton
 from nlp_gait.gaits.stairs.stair import COLUMNS, STAIR_PARAMETERS, rows, within
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -157,12 +159,8 @@ def stairs_track(
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
         assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
-        start=start,
-        starts=1,
-        amplifies_rounding=True,
-        motion=motion,
-        skeleton=skeleton,
-        playback=playback(performance),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance)),
+        hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
     )
 
 

@@ -223,7 +223,7 @@ def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("lanes", LANES[1:])
 def test_the_tracked_step_is_the_same_on_every_lane_count(lanes: int) -> None:
     """There a rounding error decides steps of the quantised controller: with vector functions 5 % of candidates differ."""
-    assert problem_named("stairs-track").amplifies_rounding
+    assert problem_named("stairs-track").hints.amplifies_rounding
     X = candidates(problem_named("stairs-track"), 240)
     one, several = objective_of("stairs-track", 1), objective_of("stairs-track", lanes)
     assert all(np.array_equal(a, b) for a, b in zip(one(X), several(X), strict=True))

@@ -90,7 +90,7 @@ def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkey
     problem = spec.load()
     assert default_speeds(problem) == "speed_m_s=0.0141:0.141:10"  # NAO's times the root of 0.40452 m / 0.2029 m
     x = (problem.lower + problem.upper) / 2
-    x[[problem.variable_index(name) for name in problem.durations]] = 0.8, 0.6
+    x[[problem.variable_index(name) for name in problem.display.durations]] = 0.8, 0.6
     found = SweepPoint(
         at={"speed_m_s": 0.07},
         feasible=True,

@@ -18,6 +18,7 @@ from compare.study.record import RunRecord
 from compare.study.study import RECORDS
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
+from nlp_gait.formulation import Display
 from nlp_gait.simulation.drive import DRIVES, Drive
 from tests.compare.records import DSP_X, record
 
@@ -98,7 +99,7 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
-    still = SimpleNamespace(problem=SimpleNamespace(playback=None))
+    still = SimpleNamespace(problem=SimpleNamespace(display=Display()))
     monkeypatch.setattr(engine, "gait_of", lambda _: still)
     assert play_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
@@ -139,7 +140,7 @@ def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
 ) -> None:
     pytest.importorskip("mujoco")
     loaded = task._load
-    monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), playback=None))
+    monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), display=Display()))
     refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
     assert refused.exit_code == 1 and "no gait of nao-dsp can be played; leave out --engine" in refused.stderr
     assert not (tmp_path / "study.json").exists()

@@ -44,8 +44,8 @@ def signals(walk: Result) -> Signals:
 
 
 def test_the_cycle_is_one_step_at_a_constant_height_and_goes_on_mirrored(walk: Result, signals: Signals) -> None:
-    hip, robot = signals.arrays["hip"], walk.problem.playback.robot  # type: ignore[union-attr]
-    assert walk.x == pytest.approx((0.8, 0.6, 0.1), abs=1e-12) and walk.problem.playback.repeats  # type: ignore[union-attr]
+    hip, robot = signals.arrays["hip"], walk.problem.display.simulation_model.robot  # type: ignore[union-attr]
+    assert walk.x == pytest.approx((0.8, 0.6, 0.1), abs=1e-12) and walk.problem.display.simulation_model.repeats  # type: ignore[union-attr]
     assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.1, 0, 0), abs=1e-9)
     # The middle of both hips is where the file has it below the root.
     middle = humanoid(walk.problem.options["robot"]).middle_m[2]  # type: ignore[arg-type]
@@ -57,7 +57,7 @@ def test_the_cycle_is_one_step_at_a_constant_height_and_goes_on_mirrored(walk: R
 
 
 def oracles(walk: Result, signals: Signals, samples: Array) -> list[Standing]:
-    robot = walk.problem.playback.robot  # type: ignore[union-attr]
+    robot = walk.problem.display.simulation_model.robot  # type: ignore[union-attr]
     model, foot = floating_model(robot), robot.feet["left"]
     found = []
     for k in samples:
@@ -85,7 +85,7 @@ def test_torques_and_zmp_are_pinocchios(walk: Result, signals: Signals) -> None:
 
 def test_the_whole_bodys_zmp_is_the_planned_one(walk: Result, signals: Signals) -> None:
     """Under the middle of the left sole, then straight to that of the right one."""
-    robot = walk.problem.playback.robot  # type: ignore[union-attr]
+    robot = walk.problem.display.simulation_model.robot  # type: ignore[union-attr]
     left, right = (signals.arrays[f"{side}_foot"][-1, :2] for side in ("left", "right"))
     foot = robot.feet["left"]
     offset = np.array([SOLE_AHEAD_M, (foot.left_m - foot.right_m) / 2])

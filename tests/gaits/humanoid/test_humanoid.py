@@ -54,9 +54,9 @@ def reachable(problem: GaitProblem, count: int) -> Array:
 
 @pytest.mark.slow
 def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
-    playback = problem.playback
-    assert playback is not None
-    robot = playback.robot
+    model = problem.display.simulation_model
+    assert model is not None
+    robot = model.robot
     oracle, ankle = floating_model(robot), robot.joint_to[robot.feet["left"].link].name
     for x in reachable(problem, 4):
         arrays = problem.signals(x).arrays
@@ -111,7 +111,7 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
     assert nao.value("torque_change_limit_Nm") == 1.2
     assert nao.value("heat_loss_W_per_Nm2") == pytest.approx(0.025, rel=1e-3)
     biped_scale = 0.4 / 0.2029
-    time = nao.durations[0]
+    time = nao.display.durations[0]
     i, j = nao.variable_index(time), other.variable_index(time)
     assert other.upper[j] / nao.upper[i] == pytest.approx(math.sqrt(biped_scale), rel=0.05)
     assert other.value("torque_change_limit_Nm") > 1.2 * biped_scale
@@ -125,8 +125,8 @@ def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str
     values = exact_model(problem).at(x, problem.p)
     assert math.isfinite(values.cost) and math.isfinite(values.violation)
     signals = problem.signals(x)
-    assert problem.skeleton is not None and problem.playback is not None
-    drawn = problem.skeleton(signals, problem.parameter_values)
+    assert problem.display.skeleton is not None and problem.display.simulation_model is not None
+    drawn = problem.display.skeleton(signals, problem.parameter_values)
     assert {limb.side for limb in drawn.limbs} >= {"left", "right"}
     for foot, limb in zip(("left_foot", "right_foot"), drawn.limbs, strict=False):
         np.testing.assert_allclose(limb.points[:, -1], signals.arrays[foot], atol=1e-12)

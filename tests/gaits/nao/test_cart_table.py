@@ -89,14 +89,14 @@ def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Result]) ->
     assert gait.problem.name == "recorded-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)
     assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.05, 0, 0), abs=1e-9)
     assert hip[:, 2] == pytest.approx(0.3, abs=1e-6)
-    assert gait.problem.playback is not None and gait.problem.playback.repeats
+    assert gait.problem.display.simulation_model is not None and gait.problem.display.simulation_model.repeats
 
 
 @pytest.mark.slow
 def test_another_robot_walks_on_its_own_legs() -> None:
     gait = cart_table_walk(nao_on_a_table("nao-v6", 2), STEPS, passes=1)
-    assert gait.problem.options["robot"] == "nao-v6" and gait.problem.robot is not None
-    assert gait.problem.robot.name == nao("nao-v6", rotational_inertia=True).name
+    assert gait.problem.options["robot"] == "nao-v6" and gait.problem.display.robot is not None
+    assert gait.problem.display.robot.name == nao("nao-v6", rotational_inertia=True).name
 
 
 @pytest.mark.parametrize(

@@ -156,8 +156,8 @@ def test_joints_that_no_gait_moves_are_locked(tmp_path: Path) -> None:
     problem = load("nao-ssp", robot=written(tmp_path, raw))
     x = (problem.lower + problem.upper) / 2
     assert np.isfinite(evaluated(problem, x).cost)
-    assert problem.skeleton is not None  # without a neck it is drawn as any biped
-    drawn = problem.skeleton(problem.signals(x), problem.parameter_values)
+    assert problem.display.skeleton is not None  # without a neck it is drawn as any biped
+    drawn = problem.display.skeleton(problem.signals(x), problem.parameter_values)
     assert {limb.side for limb in drawn.limbs} == {"left", "right"}
 
 

@@ -132,7 +132,7 @@ def test_nonsense_is_refused(features: str, error: type[Exception], said: str) -
 
 def test_both_are_played_with_the_rotors_that_the_gait_was_planned_with() -> None:
     for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
-        plain, heavy = load(name).playback, load(name, motors="rotor").playback
+        plain, heavy = load(name).display.simulation_model, load(name, motors="rotor").display.simulation_model
         assert plain is not None and not plain.robot.armatures_kgm2
         assert heavy is not None and heavy.robot.armatures_kgm2["LKneePitch"] == pytest.approx(4.2e-7 * 130.85**2)
         assert heavy.robot.armatures_kgm2["RAnkleRoll"] == pytest.approx(4.2e-7 * 201.3**2)

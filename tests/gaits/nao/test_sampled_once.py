@@ -49,7 +49,7 @@ def test_two_calls_for_a_cycle() -> None:
 
 
 def test_a_derived_problem_does_not_evaluate_its_phase_again() -> None:
-    problem = load("nao-ssp", motors="limits").derived(
+    problem = load("nao-ssp", motors="limits").derive(
         change=lambda gait, point, ops: replace(gait, objective=gait.objective + point["single_support_time_s"])
     )
     assert mapped(problem) == ["map11_sample"]

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.formulation import NumericPoint, Point, Signals, Stretch
+from nlp_gait.formulation import NumericPoint, Point, RowsOverTime, Signals
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.recorded.limits import GROUND_TOLERANCE
 from nlp_gait.gaits.biped.recorded.motion import Motion
@@ -40,7 +40,7 @@ class RecordedPhase(Phase):
         turned = np.ptp(self.recorded.q, axis=0)
         return tuple(name for name, range_rad in zip(self.joints, turned, strict=True) if range_rad > MOVES)
 
-    def stretch(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[Stretch, ...]:
+    def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """None: between the samples of a recording nothing is known."""
         return ()
 

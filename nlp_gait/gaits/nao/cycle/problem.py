@@ -73,7 +73,9 @@ def nao_cycle(
         return start_at_speed(names, parameters, rng)
 
     problem = cycle_problem("nao-cycle", "NAO", cycle, sharing.start_of(names, start if at_given_speed else None))
-    return with_robot(replace(problem, stretches=cycle.stretches), robot, cycle.robot.armatures_kgm2, repeats=True)
+    return with_robot(
+        replace(problem, rows_over_time=cycle.rows_over_time), robot, cycle.robot.armatures_kgm2, repeats=True
+    )
 
 
 def walking_cycle(motors: Motors, sharing: Sharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:

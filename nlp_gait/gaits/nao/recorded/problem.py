@@ -12,7 +12,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Assembly, GaitProblem, Grid, Point, load
+from nlp_gait.formulation import Assembly, Display, GaitProblem, Grid, Point, load
 from nlp_gait.gaits.biped.double_support import double_support_margins, double_support_mean_margins, support_box
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.parts import Part
@@ -184,8 +184,7 @@ def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem
         objective=phase.goal.objective,
         assemble=assemble,
         grid=grid,
-        motion=phase.signals,
-        durations=(duration.name,),
+        display=Display(motion=phase.signals, durations=(duration.name,)),
     )
 
 

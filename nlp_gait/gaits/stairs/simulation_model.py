@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, NumericPoint, Playback, Signals
-from nlp_gait.formulation.motion.playback import PLAYED, Tread
-from nlp_gait.formulation.motion.steps import walk
+from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
+from nlp_gait.formulation.display import SIMULATED, Tread
+from nlp_gait.gaits.several_steps import walk
 from nlp_gait.gaits.stairs.bodies import JOINTS, joint_angles, joint_torques, rigid_bodies, torso_lean
 from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
 from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, points
@@ -42,7 +42,7 @@ class Performance(NamedTuple):
     double_support_s: float
 
 
-def playback(performance: Callable[[NumericPoint], Performance], *, repeats: bool = False) -> Playback:
+def simulation_model(performance: Callable[[NumericPoint], Performance], *, repeats: bool = False) -> SimulationModel:
     """How a step is played.
 
     Args:
@@ -58,7 +58,9 @@ def playback(performance: Callable[[NumericPoint], Performance], *, repeats: boo
         tread, rise = _stair(at)
         return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(steps + 1))
 
-    return Playback(robot=rigid_bodies(), gravity=GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True)
+    return SimulationModel(
+        robot=rigid_bodies(), gravity=GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
+    )
 
 
 def standing(
@@ -142,7 +144,7 @@ def _signals(step: Performance, rise: float) -> Signals:
         "left_bears": np.ones((len(step.t), 1)),
         "right_bears": rear[:, None].astype(float),
     }
-    return Signals(joints=JOINTS, arrays=arrays, columns=PLAYED)
+    return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
 
 
 def _standing_toe(load: Array, pressure: Array) -> Array:

@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, NumericPoint, Playback, Signals
-from nlp_gait.formulation.motion.playback import PLAYED
+from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
+from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
 from nlp_gait.gaits.walk12.model import GRAVITY, Zmp
 from nlp_gait.gaits.walk12.robot import PointMassBiped
@@ -39,7 +39,7 @@ AXES: tuple[Vector, ...] = ((0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1,
 PARTS = ("yaw", "roll", "thigh", "shank", "ankle", "foot")  # links behind these joints
 
 
-def playback(robot: PointMassBiped, zmp: Zmp) -> Playback:
+def simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
     """How steps of the biped are played."""
     bodies = rigid_bodies(robot)
 
@@ -65,9 +65,9 @@ def playback(robot: PointMassBiped, zmp: Zmp) -> Playback:
             "left_foot": walked["left_ankle"],
             "right_foot": walked["right_ankle"],
         }
-        return Signals(joints=JOINTS, arrays=arrays, columns=PLAYED)
+        return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
 
-    return Playback(robot=bodies, gravity=GRAVITY, repeats=True, motion=motion)
+    return SimulationModel(robot=bodies, gravity=GRAVITY, repeats=True, motion=motion)
 
 
 @cache

@@ -1,0 +1,82 @@
+"""What shows the gaits of a problem: time histories, stick figures, and what a physics engine needs to simulate them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from nlp_gait.formulation.assembly import NumericPoint
+from nlp_gait.formulation.motion.signals import Columns, Signals, in_space
+from nlp_gait.formulation.motion.skeleton import Skeleton
+
+# A ``nlp_gait.robots.Robot``. This package only passes it on, so it does not import it.
+RobotModel: TypeAlias = Any
+
+# What the engine needs of a motion in addition to the joints' q, qd and tau. The floor, or its lowest part, is at z = 0.
+SIMULATED = {
+    "zmp": in_space("m", "xy"),  # planned centre of pressure of everything that stands on the ground
+    "hip": in_space("m"),  # origin of the robot's root
+    "attitude": Columns(unit="1", labels=("w", "x", "y", "z")),  # of the root, a quaternion; upright if missing
+    "left_foot": in_space("m"),  # the sole under the ankle
+    "right_foot": in_space("m"),
+    # 1 where any part of the foot is on the ground, else 0; if missing, a foot is on the ground when its sole is.
+    "left_bears": Columns(unit="1"),
+    "right_bears": Columns(unit="1"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tread:
+    """Level part of a staircase, from its edge to the next one.
+
+    Attributes:
+        edge_m: x of its edge.
+        height_m: above the floor.
+    """
+
+    edge_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulationModel:
+    """What a physics engine needs of a problem.
+
+    Attributes:
+        robot: as the engine models it: links that never move are welded.
+        gravity: [m/s^2].
+        heat_loss: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat.
+        repeats: several steps can be simulated one after the other.
+        motion: from a point and a number of steps to time histories on a dense grid, in the robot's joints and with the arrays
+            of ``SIMULATED``; None if those of the problem are that already, and the next step is the mirror image.
+        ground: from a point and a number of steps to the stairs; None for a flat floor.
+        planar: the root moves in the sagittal plane only.
+    """
+
+    robot: RobotModel
+    gravity: float
+    heat_loss: str | None = None
+    repeats: bool = False
+    motion: Callable[[NumericPoint, int], Signals] | None = None
+    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None
+    planar: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Display:
+    """What shows the gaits of a problem; no solver reads it.
+
+    Attributes:
+        motion: time histories at a point of numbers.
+        skeleton: stick figures from time histories and the parameters by name.
+        simulation_model: what a physics engine needs.
+        robot: whose joints move, if it is a tree of rigid links.
+        durations: variables with the duration of each phase, in order.
+    """
+
+    motion: Callable[[NumericPoint], Signals] | None = None
+    skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
+    simulation_model: SimulationModel | None = None
+    robot: RobotModel | None = None
+    durations: tuple[str, ...] = ()
