@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-TYPE_CHECKING = (
-    False  # in place of typing's, whose import takes longer than all that Ctrl-C waits for; checkers know the name
-)
+# In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 

@@ -1,11 +1,11 @@
-"""Entry point of the console script, which imports the command line once Ctrl-C is taken care of."""
+"""Entry point of the console script, which handles Ctrl-C before it imports the command line."""
 
-from compare.starting import end_at_interrupts
+from nlp_gait.interrupts import exit_on_interrupt
 
 
 def main() -> None:
     """Run the command line."""
-    end_at_interrupts()
+    exit_on_interrupt()
     from compare.cli import main as run
 
     run()

@@ -4,21 +4,24 @@
 functions to search algorithms.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
-from nlp_gait.errors import GaitError
-
+# In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
     from nlp_gait.backends.solvers.registry import solver
+    from nlp_gait.errors import GaitError
     from nlp_gait.formulation import GaitProblem, load, problem_names
     from nlp_gait.formulation.solution import Solution
 
 # Imported when first used: a search needs no NLP solver, a solve no kernel, and the command line begins at once.
 _LATER = {
+    "GaitError": "nlp_gait.errors",
     "GaitProblem": "nlp_gait.formulation",
     "load": "nlp_gait.formulation",
     "problem_names": "nlp_gait.formulation",
@@ -45,7 +48,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """What is imported or read when first used."""
+    """Import or read a public name when it is first used."""
+    from importlib import import_module
+
     if name == "__version__":
         from importlib.metadata import version
 

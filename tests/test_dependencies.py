@@ -13,7 +13,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # A room imports from itself and from rooms before it only.
 ROOMS = (
+    "nlp_gait.interrupts",
     "nlp_gait.errors",
+    "nlp_gait.processes",
     "nlp_gait.disk",
     "nlp_gait.files",
     "nlp_gait.columns",
@@ -31,7 +33,6 @@ ROOMS = (
     "nlp_gait.export",
     "nlp_gait.gaitbench",
     "metaheuristics",
-    "compare.starting",
     "compare.judge",
     "compare.study",
     "compare.analysis",

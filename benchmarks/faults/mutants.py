@@ -68,6 +68,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/gaitbench/definitions.py": ("tests/gaitbench/test_instances.py",),
     "nlp_gait/disk.py": ("tests/faults/test_disk.py", "tests/faults/test_power_cuts.py"),
     "compare/study/apart.py": ("tests/compare/study/test_apart.py",),
+    "nlp_gait/processes.py": ("tests/compare/study/test_apart.py", "tests/backends/test_starts.py"),
     "compare/study/imported.py": ("tests/compare/study/test_imported.py",),
     "compare/study/steps.py": ("tests/compare/study/test_steps.py",),
     "compare/logs": ("tests/compare/logs/test_logs.py",),

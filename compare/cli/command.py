@@ -22,9 +22,9 @@ from typing import Any, TypeVar, get_type_hints
 import typer
 
 from compare.cli.common import end_interrupted, fail, say_error
-from compare.starting import raised_interrupts
 from metaheuristics import SearchError
 from nlp_gait.errors import GaitError
+from nlp_gait.interrupts import raise_interrupts
 
 R = TypeVar("R")
 
@@ -41,7 +41,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     @functools.wraps(function)
     def run(**given: Any) -> R:
         try:
-            with raised_interrupts():
+            with raise_interrupts():
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
                 result = function(**given)

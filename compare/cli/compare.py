@@ -20,9 +20,9 @@ from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
 from metaheuristics.adapters.egobox import BayesianOptimisation
-from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
+from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from compare.cli.common import end_interrupted
-from nlp_gait.backends.interrupts import Interrupted
+from nlp_gait.interrupts import Interrupted
 
 R = TypeVar("R")
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.drawing.figures import new_figure, style
-from nlp_gait.backends.interrupts import held_interrupts
 from nlp_gait.files import new_file
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
+from nlp_gait.interrupts import delay_interrupts
 from nlp_gait.simulation.film.video import Frame
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def frames(skeleton: Skeleton) -> Iterator[Frame]:
         figure.set_dpi(FRAME_DPI)
         canvas: Any = FigureCanvasAgg(figure)
         for k in range(len(skeleton.t)):
-            with held_interrupts():  # Matplotlib's compiled code makes errors of its own of it
+            with delay_interrupts():  # Matplotlib's compiled code makes errors of its own of it
                 figure.clear()
                 _draw_frame(figure, skeleton, k)
                 canvas.draw()
@@ -59,7 +59,7 @@ def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
         OutputError: the file cannot be written.
     """
     times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
-    with style(), new_file(path) as file, held_interrupts():
+    with style(), new_file(path) as file, delay_interrupts():
         figure = poses_figure(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
         figure.savefig(file, format="png", dpi=SHEET_DPI)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nlp_gait.backends.interrupts import held_interrupts
 from nlp_gait.files import new_file, write_text
+from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,7 +120,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
     write_text(paths[1], svg_text(figure))
     figure.set_layout_engine("none")  # it stands; finding it again takes as long as drawing
-    with style(), new_file(paths[0]) as file, held_interrupts():
+    with style(), new_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths
 
@@ -128,7 +128,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
 def svg_text(figure: Figure) -> str:
     """Figure as an SVG file; equal figures give equal text."""
     text = io.StringIO()
-    with held_interrupts(), style():  # Matplotlib's compiled code makes errors of its own of Ctrl-C
+    with delay_interrupts(), style():  # Matplotlib's compiled code makes errors of its own of Ctrl-C
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     return text.getvalue()
 

@@ -21,13 +21,13 @@ import numpy as np
 
 from compare.study.steps import Steps, as_json
 from nlp_gait.backends.identity import fingerprint, sha256_of
-from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers import ipopt, stages
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
+from nlp_gait.interrupts import never
 from nlp_gait.progress import Progress, ignore_progress
 
 KEPT, MADE = b"k", b"m"

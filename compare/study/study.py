@@ -20,10 +20,10 @@ from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
 from nlp_gait.backends.identity import HASH
-from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
+from nlp_gait.interrupts import Interrupted
 from nlp_gait.notebook import html_table
 
 __all__ = ["Study", "check_study", "read_records", "record_file", "run_study"]

@@ -14,9 +14,9 @@ from typing import TypeVar
 from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
-from nlp_gait.backends.interrupts import children_ignore_interrupts, remembered_interrupts
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import refusing
+from nlp_gait.interrupts import block_interrupts_in_children, remember_interrupts
 
 T = TypeVar("T")
 
@@ -48,7 +48,7 @@ def run_jobs(
     # A problem that was given itself holds symbols and functions that cannot leave this process.
     here = {position for position, (task, _) in enumerate(jobs) if alone or not isinstance(task.problem.name, str)}
     for position in sorted(here):
-        with remembered_interrupts() as check:
+        with remember_interrupts() as check:
             record = attempt(*jobs[position], run)
             check()
         yield position, record
@@ -89,7 +89,7 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
     results: Generator[tuple[int, T], None, None] | None = None
     try:
-        with children_ignore_interrupts():
+        with block_interrupts_in_children():
             folder = os.getcwd() if workers > 0 else None  # another machine has other folders
             results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
         for result in results:  # noqa: UP028  `yield from` would close them before what is below

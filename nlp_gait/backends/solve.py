@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
-from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import InputError, checked_count, shown
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
+from nlp_gait.interrupts import Interrupted, defer_interrupts
 
 # A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
@@ -64,7 +64,7 @@ def solve(
     points = _start_points(problem, starts, seed, x0)
     ready = (solver or IpoptSettings()).ready_for(problem, starts)
     outcomes: list[Outcome] = []
-    with deferred_interrupts() as interrupted:
+    with defer_interrupts() as interrupted:
         for outcome in run_starts(ready, problem, points, interrupted, workers):
             outcomes.append(outcome)
             if progress is not None:

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.interrupts import Interrupted, never
 from nlp_gait.backends.solvers.solver import Solver, judged
 from nlp_gait.backends.starts import available_workers
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
+from nlp_gait.interrupts import Interrupted, never
 from tests.backends.toys import corner, toy
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="starts are forked on Linux only")

@@ -18,14 +18,19 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import nlp_gait
-from compare import starting
 from compare.cli import app
 from compare.study.record import read_record
 from compare.study.steps import Steps
-from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, remembered_interrupts
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
+from nlp_gait.interrupts import (
+    Interrupted,
+    defer_interrupts,
+    exit_on_interrupt,
+    raise_interrupts,
+    remember_interrupts,
+)
 from tests.backends.toys import corner, toy
 from tests.faults.processes import ROOT, start
 
@@ -86,7 +91,7 @@ def test_solve_within_the_first_start_keeps_where_it_was(monkeypatch: pytest.Mon
 
 
 def test_a_second_press_is_not_deferred() -> None:
-    with pytest.raises(KeyboardInterrupt), deferred_interrupts() as pressed:
+    with pytest.raises(KeyboardInterrupt), defer_interrupts() as pressed:
         signal.raise_signal(signal.SIGINT)
         assert pressed()
         signal.raise_signal(signal.SIGINT)
@@ -96,7 +101,7 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     """As under nohup, and for what a shell runs in the background."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with deferred_interrupts() as pressed, remembered_interrupts() as check:
+        with defer_interrupts() as pressed, remember_interrupts() as check:
             signal.raise_signal(signal.SIGINT)
             check()
             assert not pressed()
@@ -319,9 +324,10 @@ def test_ctrl_c_ends_the_process_outside_of_a_command_only(monkeypatch: pytest.M
     ended: list[object] = []
     monkeypatch.setattr(os, "_exit", ended.append)
     monkeypatch.setattr(os, "write", lambda *what: ended.append(what))
-    before = signal.signal(signal.SIGINT, starting._end)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(KeyboardInterrupt), starting.raised_interrupts():
+        exit_on_interrupt()
+        with pytest.raises(KeyboardInterrupt), raise_interrupts():
             signal.raise_signal(signal.SIGINT)
         assert ended == []
         signal.raise_signal(signal.SIGINT)

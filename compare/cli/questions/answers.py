@@ -10,8 +10,8 @@ import typer
 
 from compare.cli.common import end_interrupted, print_result, print_table, say, stdout
 from compare.cli.options import RESULTS, AsJson
-from nlp_gait.backends.interrupts import deferred_interrupts
 from nlp_gait.files import writable_folder
+from nlp_gait.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
     from compare.questions.answer import Answer
@@ -43,7 +43,7 @@ class Output:
         if finished is not None and finished.sentence:
             say(finished.sentence)
         written: list[Path] = []
-        with deferred_interrupts() as pressed:  # it takes a moment; pressed again, Ctrl-C does not wait
+        with defer_interrupts() as pressed:  # it takes a moment; pressed again, Ctrl-C does not wait
             try:
                 written = answer.write(self.out)
             finally:

@@ -11,11 +11,11 @@ import numpy as np
 from compare.questions.kept import Finished
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.interrupts import Interrupted
 from nlp_gait.progress import Progress, ignore_progress
 
 # Each variant with the features of ``nao_motors``; the first is the paper's.

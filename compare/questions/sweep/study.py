@@ -15,11 +15,11 @@ from compare.questions.kept import Finished
 from compare.study.record import RunRecord, record_from
 from compare.study.runner import attempt, run_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
-from nlp_gait.backends.interrupts import Interrupted, remembered_interrupts
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Solution
+from nlp_gait.interrupts import Interrupted, remember_interrupts
 from nlp_gait.progress import Progress, ignore_progress
 
 MOST_POINTS = 10_000  # of an axis, and of the whole grid
@@ -186,7 +186,7 @@ def _searched(tasks: Sequence[Task], finished: Finished, progress: Progress) -> 
 
 
 def _run(task: Task) -> dict[str, Any]:
-    with remembered_interrupts() as check:
+    with remember_interrupts() as check:
         record = attempt(task) if task.is_own_code else run_task(task)
         check()
     return record.to_json()

@@ -11,12 +11,12 @@ from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import exact_model
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.biped.cycle import SPEED
 from nlp_gait.gaits.humanoid.cycle import SPEED_M_S
+from nlp_gait.interrupts import Interrupted
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import plan_of

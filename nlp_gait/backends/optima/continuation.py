@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nlp_gait.backends.interrupts import Interrupted, deferred_interrupts, never
 from nlp_gait.backends.solve import MOST_STARTS, solution_of
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -14,6 +13,7 @@ from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import checked_count
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome, Solution
+from nlp_gait.interrupts import Interrupted, defer_interrupts, never
 
 
 class Continuation:
@@ -96,7 +96,7 @@ def solve_both_ways(
     """
     order = range(len(problems))
     outcomes: list[list[Outcome]] = [[] for _ in problems]
-    with deferred_interrupts() as interrupted:
+    with defer_interrupts() as interrupted:
         for path_seed, direction in ((seed, order), (seed + 1, order[::-1])):
             path = Continuation(starts=starts, seed=path_seed, solver=solver, solves=2 * len(problems))
             for k in direction:

@@ -12,7 +12,6 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
-from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.derivatives import derivatives_of, pays
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
@@ -23,6 +22,7 @@ from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Outcome
+from nlp_gait.interrupts import defer_interrupts, never
 
 LOG = logging.getLogger("nlp_gait")
 
@@ -176,7 +176,7 @@ class Ipopt(StagedSolver):
         always[len(model.row_names) :] = True
         cold = WorkingSet(model.nlp, self.functions(), options, self._of_ipopt, self.watch, always)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
-        with deferred_interrupts() as asked:
+        with defer_interrupts() as asked:
             self.watch.begin(asked, time.perf_counter() + self.time_limit_s)
             cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
         if asked():

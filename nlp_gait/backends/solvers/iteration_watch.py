@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 import casadi as ca
 from casadi import MX
 
-from nlp_gait.backends.interrupts import never
+from nlp_gait.interrupts import never
 
 INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
 REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limit"}

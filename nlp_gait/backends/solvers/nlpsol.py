@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import nlp_model
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
@@ -25,6 +24,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.formulation.solution import Evaluations, Outcome
+from nlp_gait.interrupts import defer_interrupts, never
 
 PROBE_TIME_LIMIT_S = 60.0
 PROBE = """
@@ -96,7 +96,7 @@ class CasadiSolver(Solver):
         iterations, evaluations, stats = 0, Evaluations(), {}
         started = time.perf_counter()
         alone = stop is never and self.watched
-        with deferred_interrupts() if alone else contextlib.nullcontext(stop) as asked:
+        with defer_interrupts() if alone else contextlib.nullcontext(stop) as asked:
             watch.begin(asked, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
                 with _silent():

@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Best, Evaluations, Outcome
+from nlp_gait.interrupts import never
 
 # Forward differences in the scaled variables: the square root of the machine's precision.
 STEP = 1.5e-8

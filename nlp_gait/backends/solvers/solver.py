@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.interrupts import never
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
+from nlp_gait.interrupts import never
 
 
 class Solver(Protocol):

@@ -10,13 +10,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from nlp_gait.backends.interrupts import deferred_interrupts, never
 from nlp_gait.backends.nlp import WIDTHS, NlpModel
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, counted, judged
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
+from nlp_gait.interrupts import defer_interrupts, never
 
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 # Sigmoid widths of further stages, which are tried only if the exact functions find the point infeasible.
@@ -88,7 +88,7 @@ class StagedSolver(Solver):
         bounds = model.bounds(problem)
         iterations, evaluations = 0, Evaluations()
         started = time.perf_counter()
-        with deferred_interrupts() if stop is never else nullcontext(stop) as asked:
+        with defer_interrupts() if stop is never else nullcontext(stop) as asked:
             self.watch.begin(asked, started + self.time_limit_s)
             for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
                 method = self.cold if cold and stage == 0 else self.warm

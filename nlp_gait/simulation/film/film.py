@@ -9,8 +9,8 @@ from contextlib import ExitStack, closing
 import numpy as np
 from PIL import Image
 
-from nlp_gait.backends.interrupts import held_interrupts
 from nlp_gait.errors import InputError
+from nlp_gait.interrupts import delay_interrupts
 from nlp_gait.simulation.film.caption import PAPER, Captions, Strip, pasted
 from nlp_gait.simulation.film.recording import Recording
 from nlp_gait.simulation.film.stage import Stage, View, stairs
@@ -66,7 +66,7 @@ def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str =
             strip = Strip(left=left, top=height - strip_height, width=share, height=strip_height)
             parts.append((left, recording, stage, Captions(recording, moved, strip, line, most_power, end_s)))
         for k in range(max(len(recording.t) for recording in recordings)):
-            with held_interrupts():  # a driver of graphics is not left in the middle of a picture
+            with delay_interrupts():  # a driver of graphics is not left in the middle of a picture
                 picture = Image.new("RGB", size, PAPER)
                 for left, recording, stage, captions in parts:
                     own = min(k, len(recording.t) - 1)

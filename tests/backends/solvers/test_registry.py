@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from compare.questions.certainty.multistart import multistart
-from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.optima.continuation import Continuation, best_success, solve_both_ways
 from nlp_gait.backends.optima.optimum import optimum
 from nlp_gait.backends.solve import solve
@@ -21,6 +20,7 @@ from nlp_gait.backends.solvers.solver import Solver, judged
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
+from nlp_gait.interrupts import never
 from tests.backends.toys import corner, toy
 
 # Of the objective of the toy: fatrop relaxes bounds by 1e-8 of them, SLSQP differentiates by differences.

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.interrupts import never
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import QUIET
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.backends.solvers.working_set import WorkingSet
 from nlp_gait.formulation import load
+from nlp_gait.interrupts import never
 
 SIDES = 200
 NAMES = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")

@@ -18,8 +18,8 @@ from compare.questions.walk.report import INDEXES, walk_answer
 from compare.questions.walk.study import Gait, default_speeds, optimal_gaits
 from compare.report.document import Figure
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.interrupts import Interrupted
 from nlp_gait.formulation import load_result
+from nlp_gait.interrupts import Interrupted
 from tests.robots.crooked import crooked
 
 # Fewer samples than those of ten intervals: what is tested here is what is done with the gaits.

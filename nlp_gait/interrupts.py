@@ -1,0 +1,139 @@
+"""Ctrl-C: while the command line starts, around code that would swallow it, and in child processes.
+
+The command line imports this module before everything else, so it imports nothing that takes time.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, with the partial result; it propagates as every KeyboardInterrupt does.
+
+    Attributes:
+        sentence: how far the work had come.
+        partial: the result so far; may be empty.
+    """
+
+    def __init__(self, sentence: str, partial: object) -> None:
+        super().__init__(sentence, partial)  # both, else it cannot be pickled
+        self.sentence = sentence
+        self.partial = partial
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def never() -> bool:
+    """Return False: the default of every argument ``stop``."""
+    return False
+
+
+def exit_on_interrupt() -> None:
+    """Let Ctrl-C end the process with one line and status 130, except inside ``raise_interrupts``."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored, as under nohup
+        signal.signal(signal.SIGINT, _exit)
+
+
+def _exit(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"nlp-gait: interrupted\n")
+    os._exit(130)
+
+
+@contextmanager
+def raise_interrupts() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt inside, where ``exit_on_interrupt`` was called before."""
+    if signal.getsignal(signal.SIGINT) is not _exit:
+        yield
+        return
+    with _handle_interrupts(signal.default_int_handler):
+        yield
+
+
+@contextmanager
+def defer_interrupts() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns whether Ctrl-C was pressed inside; pressed again, it raises KeyboardInterrupt at once.
+
+    For compiled code that would swallow the exception: CasADi takes it for a failed evaluation and continues.
+    """
+    presses = 0
+
+    def count(number: int, frame: FrameType | None) -> None:
+        nonlocal presses
+        presses += 1
+        if presses > 1:
+            raise KeyboardInterrupt
+
+    count.defers = True  # type: ignore[attr-defined]
+    with _handle_interrupts(count):
+        yield lambda: presses > 0
+
+
+@contextmanager
+def delay_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C until the end of a block that takes a moment; pressed again, it raises KeyboardInterrupt at once.
+
+    Inside ``defer_interrupts`` nothing is raised at the end of the block.
+    """
+    if getattr(signal.getsignal(signal.SIGINT), "defers", False):
+        yield
+        return
+    with defer_interrupts() as pressed:
+        yield
+        if pressed():
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def remember_interrupts() -> Iterator[Callable[[], None]]:
+    """Yield a function that raises KeyboardInterrupt again if something inside has swallowed the one of Ctrl-C."""
+    pressed = False
+
+    def remember(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if pressed:
+            raise KeyboardInterrupt
+
+    with _handle_interrupts(remember):
+        yield check
+
+
+@contextmanager
+def block_interrupts_in_children() -> Iterator[None]:
+    """Block Ctrl-C, which a terminal sends to all processes, in those started inside: their parent ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # started inside, with the first worker, it would unblock Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _handle_interrupts(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Use another handler inside: in the main thread only, and not where Ctrl-C is ignored, as under nohup."""
+    import threading
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before in (signal.SIG_IGN, None):
+        yield
+        return
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
