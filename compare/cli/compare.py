@@ -13,8 +13,9 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, say_error, stdout
-from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, names_in
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, name_all, parse_names
 from compare.cli.report import plain_plays, play_best, print_plays
+from compare.cli.search_options import SearchOptions
 from compare.study.settings import SolverSpec, as_named, read_settings
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms
@@ -100,9 +101,9 @@ def compare(
             raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
         settings = as_named(known, f"the study in {str(out)!r}")
     else:
-        specs = [options.spec_of(name) for name in problems or DEFAULT_PROBLEMS]
+        specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = chosen_solvers(algorithms, starts, searches)
-        settings = searches.study(specs, solvers, max(starts, 1))
+        settings = searches.make_study(specs, solvers, max(starts, 1))
     study = Study(
         tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
@@ -202,7 +203,7 @@ def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
 
     Bayesian optimisation is one of all only where it can use up the budget.
     """
-    names = names_in(algorithms)
+    names = parse_names(algorithms)
     if ALL in names:
         every = [*ALL_GRADIENT, *installed_algorithms()]
         if searches.evaluations > MOST_OF_BAYES and BAYES in every and BAYES not in names:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,13 +22,14 @@ from compare.cli.common import (
     print_written,
     stdout,
 )
-from compare.cli.options import AnyProblem, AsJson, numbers_in
+from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
 from compare.judge import Evaluation
+from nlp_gait.errors import InputError
 from nlp_gait.files import csv_text, write_text
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.gaits.nao.recorded.problem import Recorded
+    from nlp_gait.gaits.biped.recorded.motion import RecordedGait
 
 SHOWN_VIOLATIONS = 10
 
@@ -65,7 +67,7 @@ def evaluate(
     if (x is None) == (motion is None):
         fail("give a point with --x, or a motion with --motion")
     if motion is not None:
-        _evaluate_motion(problem.recorded(motion, touch_down), engine, signals, as_json)
+        _evaluate_motion(_read_motion(problem, motion, touch_down), engine, signals, as_json)
         return
     assert x is not None  # one of both is given; for the type checker
     loaded = problem.spec().load()
@@ -79,7 +81,7 @@ def evaluate(
         points = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
         print_result(as_json, points, [] if target is None else [target], lambda: _print_many(judged))
         return
-    point = loaded.check_x(numbers_in(x))
+    point = loaded.check_x(parse_x(x))
     if signals is not None:
         if loaded.display.motion is None:
             fail(f"problem {problem.name!r} has no signals")
@@ -97,7 +99,28 @@ def evaluate(
         print_written(*(path for path in (signals, table) if path is not None))
 
 
-def _evaluate_motion(gait: Recorded, engine: bool, signals: Path | None, as_json: bool) -> None:
+def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
+    """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
+    from nlp_gait.export.motions import read_gait
+    from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
+    from nlp_gait.robots import load_robot
+
+    options = {"--option": problem.option, "--fix": problem.fix, "--derivatives": problem.derivatives}
+    for flag, value in options.items():
+        if value:
+            raise InputError(f"{flag} has no effect on a given motion; leave it out")
+    robot = problem.robot or "nao-v5"
+    gait: RecordedGait = resolve(RECORDED_GAITS, problem.name or next(iter(RECORDED_GAITS)))(
+        read_gait(motion, load_robot(robot)),
+        robot=robot,
+        gait=problem.name,
+        touch_down_s=touch_down_s,
+        **({} if problem.intervals is None else {"intervals": problem.intervals}),
+    )
+    return replace(gait, problem=gait.problem.with_values(**parse_values(problem.values, "--set")))
+
+
+def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_json: bool) -> None:
     from compare.questions.recorded import judge_gait
     from nlp_gait.export.tables import write_npz
 
@@ -115,8 +138,8 @@ def _print_gait(judged: JudgedGait) -> None:
         f"{name} {value:.4g} s" for name, value in zip(gait.problem.display.durations, gait.x, strict=False)
     )
     stdout.print(f"{gait.gait}: step {1000 * gait.step_m:.1f} mm, {times}", soft_wrap=True)
-    for remark in judged.remarks:
-        stdout.print(remark, soft_wrap=True)
+    for note in judged.notes:
+        stdout.print(note, soft_wrap=True)
     print_table(
         "Beside the optimum at the same step and time",
         ("index", "this gait", "optimum"),

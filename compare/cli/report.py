@@ -12,7 +12,8 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
-from compare.cli.options import AsCsv, AsJson, Code, DriveOptions, name_all
+from compare.cli.options import AsCsv, AsJson, Code, name_all
+from compare.cli.simulation_options import DriveOptions
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     name_all(code)
-    plays = play_best(folder, told_apart(read_records(folder)), servos.chosen()) if engine else []
+    plays = play_best(folder, told_apart(read_records(folder)), servos.make()) if engine else []
     written = rebuild_report(folder, weighting, as_csv=as_csv)
     print_result(as_json, plain_plays(plays), written, lambda: print_plays(plays))
 

@@ -12,7 +12,8 @@ from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, print_json, print_rows, progress_bar, say, stdout
 from compare.cli.compare import print_summaries
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AsJson, Jobs, NamedProblem, SearchOptions
+from compare.cli.options import AsJson, Jobs, NamedProblem
+from compare.cli.search_options import SearchOptions
 from compare.study.settings import SolverSpec
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def search(
 
     spec = problem.spec()
     solver = SolverSpec(algorithm=algorithm, runs=searches.runs, polish=searches.polish)
-    tasks = searches.study([spec], [solver]).tasks()
+    tasks = searches.make_study([spec], [solver]).tasks()
     with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
         records, stopped = until_interrupted(
             lambda: run_study(

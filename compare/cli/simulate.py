@@ -22,7 +22,8 @@ from compare.cli.common import (
     progress_bar,
     stdout,
 )
-from compare.cli.options import AsJson, ConditionOptions, DriveOptions, FilmOptions, StoredGait
+from compare.cli.options import AsJson, StoredGait
+from compare.cli.simulation_options import ConditionOptions, DriveOptions, FilmOptions
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
@@ -86,7 +87,7 @@ def simulate(
     size = picture_size(film.size)
     target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else writable_folder(out)
-    drive, conditions = servos.chosen(), world.chosen()
+    drive, conditions = servos.make(), world.make()
     gaits = [(stored.result, stored.load())]
     gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
     plans = [plan_of(gait, steps) for _, gait in gaits]

@@ -23,7 +23,7 @@ from compare.cli.common import (
     stdout,
 )
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, numbers_in
+from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
 from nlp_gait.backends.identity import problem_part
 from nlp_gait.formulation.solution import Solution
 
@@ -59,7 +59,7 @@ def solve(
 
     target = None if out is None else output_file(out)
     loaded = problem.spec().load()
-    first = None if x0 is None else loaded.check_x(numbers_in(x0))
+    first = None if x0 is None else loaded.check_x(parse_x(x0))
     chosen = registry.solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
     starts = loaded.hints.starts if starts is None else starts
     with progress_bar(f"{solver} starts", starts) as advance:

@@ -11,7 +11,7 @@ from compare.bench.tasks import BASELINE, RUNS, bench_tasks
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stderr, stdout
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AsJson, Jobs, names_in
+from compare.cli.options import AsJson, Jobs, parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
 
@@ -52,7 +52,7 @@ def bench(
     from nlp_gait import gaitbench
     from nlp_gait.backends.kernel.compiled import available_cores
 
-    chosen = gaitbench.names(suite) if instances is None else tuple(names_in(instances))
+    chosen = gaitbench.names(suite) if instances is None else tuple(parse_names(instances))
     for id in chosen:
         gaitbench.load(id)  # says what is unknown
     known = shipped()

@@ -9,7 +9,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import interruptible
-from compare.cli.options import Seed, names_in
+from compare.cli.options import Seed, parse_names
 from compare.cli.questions.answers import Output
 
 
@@ -42,7 +42,7 @@ def motions(
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
 
-    study = tasks(problem, orders=names_in(orders), free_orders=names_in(free_orders), robot=robot, starts=starts)
+    study = tasks(problem, orders=parse_names(orders), free_orders=parse_names(free_orders), robot=robot, starts=starts)
     finished = Finished(output.out, say)
     with interruptible(output.out), progress_bar("motions", len(study)) as advance:
         found = run(study, output.out, seed=seed, finished=finished, progress=advance)

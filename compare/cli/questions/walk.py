@@ -10,8 +10,9 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import fail, progress_bar, say
 from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AnyCycle, DriveOptions, Seed
+from compare.cli.options import AnyCycle, Seed
 from compare.cli.questions.answers import Output
+from compare.cli.simulation_options import DriveOptions
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
@@ -63,13 +64,13 @@ def walk(
     from compare.study.engine import STEPS
     from nlp_gait.simulation.engine import mujoco
 
-    drive = servos.chosen()
+    drive = servos.make()
     steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
         mujoco()  # if it is missing, say so before the work
     if problem.name not in CYCLES:
         raise InputError(f"walk takes a walking cycle, {' or '.join(CYCLES)}; got {problem.name!r}")
-    spec = replace(problem, option=["objective=power", *(problem.option or ())]).spec_of(problem.name)
+    spec = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name)
     own = spec.load()
     axis, planners = parse_axis(default_speeds(own) if over is None else over), checked_planners(baseline or (), own)
     finished = Finished(output.out, say)

@@ -13,8 +13,8 @@ from nlp_gait import load
 from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
 from nlp_gait.formulation import Result
-from nlp_gait.gaits.nao.recorded.motion import JointAngles
-from nlp_gait.gaits.nao.recorded.problem import recorded
+from nlp_gait.gaits.biped.recorded.motion import JointAngles
+from nlp_gait.gaits.nao.recorded.problem import make_recorded_gait
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
@@ -58,8 +58,8 @@ def test_tighter_limits_are_named(gait: Path) -> None:
     ("arguments", "words"),
     [
         (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
-        (["evaluate", "--x", "1,2"], "name the problem, for example nao-ssp; only --motion and --check know theirs"),
-        (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no meaning for a motion"),
+        (["evaluate", "--x", "1,2"], "name the problem, for example nao-ssp; it may be left out only with --motion and --check"),
+        (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no effect on a given motion"),
         (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
     ],
 )
@@ -67,16 +67,16 @@ def test_wrong_use_is_one_sentence(arguments: list[str], words: str, gait: Path)
     assert words in one_sentence(*(a.replace("{gait}", str(gait)) for a in arguments))
 
 
-def test_what_cannot_be_is_a_remark(gait: Path) -> None:
+def test_missing_results_are_explained(gait: Path) -> None:
     """A step on the spot has no optimum; a torso that leans at the beginning is not played."""
     angles = read_gait(gait, load_robot("nao-v5"))
     q = np.array(angles.q)
     q[:, [angles.joints.index(name) for name in ("LHipPitch", "RHipPitch")]] -= (
         0.1  # the torso leans over straight legs
     )
-    leaning = recorded(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
+    leaning = make_recorded_gait(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
     judged = judge_gait(leaning)
-    assert any("the torso leans by" in remark for remark in judged.remarks) and judged.engine is None
+    assert any("the torso leans by" in note for note in judged.notes) and judged.engine is None
     still = JointAngles(owner="still", joints=angles.joints, t=angles.t, q=np.tile(angles.q[0], (len(angles.t), 1)))
-    standing = judge_gait(recorded(still, gait="nao-ssp"), in_engine=False)
-    assert standing.optimum is None and any("no optimum of nao-ssp" in remark for remark in standing.remarks)
+    standing = judge_gait(make_recorded_gait(still, gait="nao-ssp"), in_engine=False)
+    assert standing.optimum is None and any("no optimum of nao-ssp" in note for note in standing.notes)

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.cli.options import DriveOptions
+from compare.cli.simulation_options import DriveOptions
 from compare.questions.sweep.study import SweepPoint, parse_axis
 from compare.questions.walk.planners import PLANNERS, rivals
 from compare.questions.walk.report import INDEXES, walk_answer
@@ -66,7 +66,7 @@ def test_pictures_are_drawn_with_and_without_a_gait(gaits: list[Gait]) -> None:
 
 def test_other_planners_take_the_same_footsteps(gaits: list[Gait]) -> None:
     """Least power is the floor of all; the textbook breaks a limit it does not know, the optimum of torques none."""
-    drive = DriveOptions().chosen()
+    drive = DriveOptions().make()
     cart, torque = rivals(SPEC, gaits[1:], PLANNERS, starts=1, seed=0, steps=0, drive=drive)
     for rival in (cart, torque):
         assert rival.indexes["energy_J_per_m"] > gaits[1].indexes["energy_J_per_m"]

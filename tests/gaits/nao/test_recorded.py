@@ -14,9 +14,9 @@ from nlp_gait.errors import GaitError
 from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
 from nlp_gait.formulation import Result
+from nlp_gait.gaits.biped.recorded.motion import JointAngles, RecordedGait
 from nlp_gait.gaits.nao.body import GRAVITY, JOINTS
-from nlp_gait.gaits.nao.recorded.motion import JointAngles
-from nlp_gait.gaits.nao.recorded.problem import Recorded, recorded
+from nlp_gait.gaits.nao.recorded.problem import make_recorded_gait
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 from tests.pinocchio_oracle import floating_model, stand
@@ -46,14 +46,14 @@ def written(folder: Path, name: str, period_ms: int = 10) -> Path:
     return path
 
 
-def judged(gait: Recorded) -> Evaluation:
+def judged(gait: RecordedGait) -> Evaluation:
     return evaluate(gait.problem, np.array(gait.x))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-cycle"])
 def test_a_planned_gait_that_comes_back_is_judged_as_it_was(name: str, tmp_path: Path) -> None:
-    gait = recorded(read_gait(written(tmp_path, name, 5 if name == "nao-cycle" else 10), ROBOT))
+    gait = make_recorded_gait(read_gait(written(tmp_path, name, 5 if name == "nao-cycle" else 10), ROBOT))
     assert gait.gait == name and not gait.motion.mirrored and gait.lean_deg < 1e-4
     own, before = judged(gait), evaluate(planned(name).problem, planned(name).x)
     share = 20 * SHARE if name == "nao-cycle" else SHARE
@@ -74,7 +74,7 @@ def test_its_own_limits_are_found_broken(tmp_path: Path) -> None:
     x = low.check_x((0.24, 0.0, 0.0, 0.3, 0.0025, 0.0, 0.0, 0.01, 0.3))
     path = tmp_path / "fast.csv"
     write_as("csv", path, Result(problem=low, x=x), 5)
-    broken = {row.name for row in judged(recorded(read_gait(path, ROBOT))).violations}
+    broken = {row.name for row in judged(make_recorded_gait(read_gait(path, ROBOT))).violations}
     assert {"hip_z_start", "hip_z_end", "hip_vx_start", "swing_height", "bounds[single_support_time_s]"} <= broken
     assert not any(name.startswith(("foot_stands", "feet_apart", "hip_vx_end")) for name in broken)
 
@@ -89,7 +89,7 @@ def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     columns = [angles.joints.index(partner(name)) for name in angles.joints]
     signs = np.array([mirror_sign(ROBOT, name) for name in angles.joints])
     turned = JointAngles(owner="turned", joints=angles.joints, t=angles.t + 3.0, q=signs * angles.q[:, columns])
-    gait, straight = recorded(turned), recorded(angles)
+    gait, straight = make_recorded_gait(turned), make_recorded_gait(angles)
     assert gait.motion.mirrored and gait.gait == "nao-ssp"
     assert judged(gait).indexes["power_W"] == pytest.approx(judged(straight).indexes["power_W"], rel=1e-9)
 
@@ -100,7 +100,7 @@ def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1.2, 60)
     base = angles_of_stance()
     waves = 0.1 * np.sin(np.outer(t, rng.uniform(2.0, 5.0, len(JOINTS))) + rng.uniform(0, 6, len(JOINTS)))
-    gait = recorded(JointAngles(owner="waves", joints=JOINTS, t=t, q=base + waves), gait="nao-ssp")
+    gait = make_recorded_gait(JointAngles(owner="waves", joints=JOINTS, t=t, q=base + waves), gait="nao-ssp")
     assert gait.lean_deg > 1.0
     signals, model = gait.problem.signals(gait.x), floating_model(ROBOT)
     ankle = np.array(gait.motion.stance.support)
@@ -120,7 +120,7 @@ def angles_of_stance() -> np.ndarray:
 
 def test_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     """The hip's velocity comes from the joints' rates through the chain of links."""
-    gait = recorded(angles_of(written(tmp_path, "nao-ssp")))
+    gait = make_recorded_gait(angles_of(written(tmp_path, "nao-ssp")))
     x = planned("nao-ssp").x
     rows = {row.name: row.value for row in judged(gait).constraints}
     for row, variable in (("hip_vx_start", 3), ("hip_vx_end", 4), ("hip_vy_start", 5), ("hip_vz_end", 2)):
@@ -137,7 +137,7 @@ def test_arms_may_be_left_out_and_degrees_are_read(tmp_path: Path) -> None:
     for t, row in zip(angles.t, np.degrees(angles.q[:, [angles.joints.index(n) for n in legs]]), strict=True):
         lines.append(",".join(map(repr, [float(t), *row.tolist()])))
     (tmp_path / "legs.csv").write_text("\n".join(lines))
-    gait = recorded(angles_of(tmp_path / "legs.csv"))
+    gait = make_recorded_gait(angles_of(tmp_path / "legs.csv"))
     assert len(gait.motion.held) == 10 and gait.motion.duration_s == pytest.approx(2.0)
     knee = JOINTS.index("LKneePitch")
     np.testing.assert_allclose(gait.motion.q[:, knee], angles.q[:, angles.joints.index("LKneePitch")], atol=1e-12)
@@ -157,17 +157,17 @@ def test_arms_may_be_left_out_and_degrees_are_read(tmp_path: Path) -> None:
 def test_a_file_that_is_no_motion_is_refused(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text(text)
     with pytest.raises(GaitError, match=message):
-        recorded(angles_of(tmp_path / "m.csv"))
+        make_recorded_gait(angles_of(tmp_path / "m.csv"))
 
 
 def test_a_gait_that_it_is_not_is_refused(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-ssp"))
     with pytest.raises(GaitError, match="shows nao-ssp, not nao-cycle"):
-        recorded(angles, gait="nao-cycle")
+        make_recorded_gait(angles, gait="nao-cycle")
     with pytest.raises(GaitError, match="limits of nao-ssp, nao-dsp, nao-cycle, got 'walk12'"):
-        recorded(angles, gait="walk12")
+        make_recorded_gait(angles, gait="walk12")
     with pytest.raises(GaitError, match="touch-down must be within"):
-        recorded(angles, touch_down_s=9.0)
+        make_recorded_gait(angles, touch_down_s=9.0)
     short = JointAngles(owner="short", joints=angles.joints, t=angles.t[:3], q=angles.q[:3])
     with pytest.raises(GaitError, match="has 3 rows; a motion needs 5"):
-        recorded(short)
+        make_recorded_gait(short)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from casadi import DM
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.biped.recorded.stance import Stance
 from nlp_gait.robots.mirror import mirror_sign
 
@@ -21,6 +22,23 @@ STILL = 1e-5  # [m]; a foot that is nearer than this to where it ends has landed
 LEAST_SHARE = 0.02  # of the time; a shorter phase is none
 CLOSED = 1e-3  # [rad]; a motion whose end is nearer than this to the mirror image of its beginning can go on
 FINE = 400  # instants at which a whole motion is looked at
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointAngles:
+    """Angles of some joints over time.
+
+    Attributes:
+        owner: the file, for messages.
+        joints: names of the columns.
+        t: (T,) ascending [s].
+        q: (T, J) [rad].
+    """
+
+    owner: str
+    joints: tuple[str, ...]
+    t: Array
+    q: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,3 +121,26 @@ class Motion:
         near, far = np.sqrt(distance[[last, before]])
         late = 0.0 if far <= near else near * (self.t[last] - self.t[before]) / (far - near)
         return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedGait:
+    """A gait from elsewhere, as a problem whose only variables are its times.
+
+    Attributes:
+        gait: name of the problem whose limits it is judged by.
+        problem: the recorded gait; its variables are the durations of its phases, and of a cycle the step length.
+        x: (n,) its own durations and step.
+        motion: on the left foot.
+        step_m: from foot to foot.
+        lean_deg: of the torso at the beginning.
+        make_planned: makes the planned problem with the same robot, step and durations; InputError if there is none.
+    """
+
+    gait: str
+    problem: GaitProblem
+    x: tuple[float, ...]
+    motion: Motion
+    step_m: float
+    lean_deg: float
+    make_planned: Callable[[], GaitProblem]

@@ -7,10 +7,11 @@ from casadi import SX
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps
 from nlp_gait.gaits.biped.recorded.cycle import Cycles
+from nlp_gait.gaits.biped.recorded.motion import JointAngles
 from nlp_gait.gaits.nao.body import GRAVITY, JOINTS, nao, upright_plan
 from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.gaits.nao.problem import with_robot
-from nlp_gait.gaits.nao.recorded.motion import LEFT_OUT, JointAngles, of_all_joints, stance_of
+from nlp_gait.gaits.nao.recorded.motion import LEFT_OUT, of_all_joints, stance_of
 from nlp_gait.gaits.nao.recorded.problem import cycle_judge
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
 

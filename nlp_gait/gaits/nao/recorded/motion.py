@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.biped.recorded.motion import FINE, LEAST_ROWS, LIFTED, Motion
+from nlp_gait.gaits.biped.recorded.motion import FINE, LEAST_ROWS, LIFTED, JointAngles, Motion
 from nlp_gait.gaits.biped.recorded.stance import Stance
 from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, JOINTS
 from nlp_gait.gaits.nao.legs import leg_geometry
@@ -17,23 +15,6 @@ from nlp_gait.robots.mirror import partner
 
 # Joints of the arms that a file may leave out: they are held as in the paper, section 3.1 and in the middle of Table 3.
 LEFT_OUT = HELD_ARM_ANGLES | {"LShoulderPitch": 1.5, "RShoulderPitch": 1.5, "LElbowRoll": -0.53, "RElbowRoll": 0.53}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class JointAngles:
-    """Angles of some joints over time.
-
-    Attributes:
-        owner: the file, for messages.
-        joints: names of the columns.
-        t: (T,) ascending [s].
-        q: (T, J) [rad].
-    """
-
-    owner: str
-    joints: tuple[str, ...]
-    t: Array
-    q: Array
 
 
 def of_all_joints(angles: JointAngles) -> Array:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -18,7 +16,7 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.parts import Part
 from nlp_gait.gaits.biped.recorded.cycle import Half, Judge, on_grids
 from nlp_gait.gaits.biped.recorded.limits import HipLimits, StandingLimits, SwingLimits, mean_place
-from nlp_gait.gaits.biped.recorded.motion import Motion
+from nlp_gait.gaits.biped.recorded.motion import JointAngles, Motion, RecordedGait
 from nlp_gait.gaits.biped.recorded.phase import RecordedPhase
 from nlp_gait.gaits.biped.single_support import single_support_mean_margins
 from nlp_gait.gaits.nao.body import JOINTS, PLANNED_JOINTS, nao
@@ -29,62 +27,22 @@ from nlp_gait.gaits.nao.double_support import DURATION, standing
 from nlp_gait.gaits.nao.free_joints import KNEES
 from nlp_gait.gaits.nao.legs import hip_variables
 from nlp_gait.gaits.nao.problem import paper_parts, with_robot
-from nlp_gait.gaits.nao.recorded.motion import JointAngles, motion_of
+from nlp_gait.gaits.nao.recorded.motion import motion_of
 from nlp_gait.gaits.nao.single_support import OWN_VARIABLES, single_support_loads, single_support_margins
 from nlp_gait.robots import Robot
 
-Gait = Literal["nao-ssp", "nao-dsp", "nao-cycle"]
-GAITS: tuple[Gait, ...] = ("nao-ssp", "nao-dsp", "nao-cycle")
+GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Recorded:
-    """A gait from elsewhere.
-
-    Attributes:
-        gait: problem whose limits it is judged by.
-        problem: the recorded gait; its variables are the times of its phases, and of a cycle the step length.
-        x: (n,) its own times and step.
-        motion: on the left foot.
-        step_m: from foot to foot.
-        lean_deg: of the torso at the beginning.
-    """
-
-    gait: Gait
-    problem: GaitProblem
-    x: tuple[float, ...]
-    motion: Motion
-    step_m: float
-    lean_deg: float
-
-    def planned(self) -> GaitProblem:
-        """The planned problem at the same robot, step and times.
-
-        Raises:
-            InputError: a step backwards, or none.
-        """
-        options = {key: self.problem.options[key] for key in ("robot", "intervals")}
-        if self.gait == "nao-cycle":
-            problem = load(self.gait, **options)
-        else:
-            problem = load(self.gait, step_length_m=self.step_m, **options)
-        fixed = dict(zip(self.problem.names, self.x, strict=True))
-        wider: dict[str, float] = {}
-        for name, value in fixed.items():  # its own limits say that it is beyond them; the optimum is at the same time
-            low, high = problem.value(f"{name}.lower"), problem.value(f"{name}.upper")
-            wider |= {f"{name}.lower": min(low, value), f"{name}.upper": max(high, value)}
-        return problem.with_values(**wider).fix(**fixed)
-
-
-def recorded(
+def make_recorded_gait(
     angles: JointAngles,
     *,
     robot: str = "nao-v5",
     intervals: int = 10,
     gait: str | None = None,
     touch_down_s: float | None = None,
-) -> Recorded:
-    """A gait from angles over time.
+) -> RecordedGait:
+    """Make a gait from angles over time.
 
     Args:
         angles: of the whole gait; its last instant is its end.
@@ -104,7 +62,7 @@ def recorded(
         phases = {gait.removeprefix("nao-"): (0.0, motion.duration_s)}
     else:
         phases = motion.phases(touch_down_s)
-    found: Gait = "nao-cycle" if len(phases) > 1 else "nao-ssp" if "ssp" in phases else "nao-dsp"
+    found = "nao-cycle" if len(phases) > 1 else "nao-ssp" if "ssp" in phases else "nao-dsp"
     if gait not in (None, found):
         raise InputError(
             f"{angles.owner} shows {found}, not {gait}: the right foot lands at no time before the end; name it with --touch-down"
@@ -122,14 +80,28 @@ def recorded(
     else:
         step, times = float(foot[1, 0]), tuple(part.duration_s for part in parts.values())
     cosine = float(motion.stance.places(motion.q[0])[4])
-    return Recorded(
+    problem = on_grids(built, intervals, {"robot": robot, "intervals": intervals})
+    x = (*times, step) if found == "nao-cycle" else times
+    return RecordedGait(
         gait=found,
-        problem=on_grids(built, intervals, {"robot": robot, "intervals": intervals}),
-        x=(*times, step) if found == "nao-cycle" else times,
+        problem=problem,
+        x=x,
         motion=motion,
         step_m=step,
         lean_deg=float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))),
+        make_planned=partial(_planned_problem, found, problem, x, step),
     )
+
+
+def _planned_problem(gait: str, recorded: GaitProblem, x: Sequence[float], step_m: float) -> GaitProblem:
+    options = {key: recorded.options[key] for key in ("robot", "intervals")}
+    problem = load(gait, **options) if gait == "nao-cycle" else load(gait, step_length_m=step_m, **options)
+    fixed = dict(zip(recorded.names, x, strict=True))
+    wider: dict[str, float] = {}
+    for name, value in fixed.items():  # a recorded duration may violate its bounds; the optimum has the same duration
+        low, high = problem.value(f"{name}.lower"), problem.value(f"{name}.upper")
+        wider |= {f"{name}.lower": min(low, value), f"{name}.upper": max(high, value)}
+    return problem.with_values(**wider).fix(**fixed)
 
 
 def _phase(model: Robot, parts: Mapping[str, Motion], grid: Grid) -> GaitProblem:

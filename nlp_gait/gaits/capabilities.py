@@ -1,0 +1,28 @@
+"""Functions that some problems provide beyond their mathematics, as ``module:function``, imported when first used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pkgutil import resolve_name
+from typing import Any
+
+from nlp_gait.errors import InputError
+
+_NAO_RECORDED = "nlp_gait.gaits.nao.recorded.problem:make_recorded_gait"
+_NAO_FITTED = "nlp_gait.gaits.nao.single_support_free:fitted_start"
+# Makes a gait from recorded joint angles, by the problem whose limits judge it; the first is the default.
+RECORDED_GAITS = {"nao-ssp": _NAO_RECORDED, "nao-dsp": _NAO_RECORDED, "nao-cycle": _NAO_RECORDED}
+# Makes the body of the textbook's cart-table walk, by the walking cycle whose limits judge it.
+CART_TABLE_BODIES = {
+    "nao-cycle": "nlp_gait.gaits.nao.cycle.cart_table:nao_on_a_table",
+    "humanoid-cycle": "nlp_gait.gaits.humanoid.cart_table:humanoid_on_a_table",
+}
+# Fits free joints to a planned motion, by the problem with free joints.
+FITTED_STARTS = {"nao-ssp-free": _NAO_FITTED, "nao-dsp-free": _NAO_FITTED}
+
+
+def resolve(functions: Mapping[str, str], problem: str) -> Any:
+    """Return the function that a problem provides; InputError if it provides none."""
+    if problem not in functions:
+        raise InputError(f"problem {problem!r} does not provide this; these do: {', '.join(functions)}")
+    return resolve_name(functions[problem])
