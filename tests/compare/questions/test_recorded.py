@@ -58,7 +58,10 @@ def test_tighter_limits_are_named(gait: Path) -> None:
     ("arguments", "words"),
     [
         (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
-        (["evaluate", "--x", "1,2"], "name the problem, for example nao-ssp; it may be left out only with --motion and --check"),
+        (
+            ["evaluate", "--x", "1,2"],
+            "name the problem, for example nao-ssp; it may be left out only with --motion and --check",
+        ),
         (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no effect on a given motion"),
         (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
     ],
