@@ -22,7 +22,7 @@ from typing import Any, TypeVar, get_type_hints
 import typer
 
 from compare.cli.common import end_interrupted, fail, say_error
-from metaheuristics import SearchError
+from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
 from nlp_gait.interrupts import raise_interrupts
 

@@ -12,16 +12,17 @@ from typing import Any
 
 import numpy as np
 
-import metaheuristics
-import nlp_gait
 from compare.study.definition import group_of, source_of
 from metaheuristics.interface import Algorithm
+from metaheuristics.preparation import check_limits
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
+from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 from nlp_gait.backends.identity import SOURCE, problem_part, sha256_of
 from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import PROBLEMS, check_options
+from nlp_gait.formulation.registry import PROBLEMS, check_options, load
 from nlp_gait.references import check_reference, installed, is_own, load_object, short_name, source_sha256
 from nlp_gait.robots.loading import is_robot_file, robot_content
 
@@ -31,12 +32,12 @@ LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])
 PYMOO = "pymoo:"  # before the names of that package's algorithms, which are no modules' names
 FUNCTION = "function"  # kind of a plain function in settings
 # Stands for an algorithm of one's own in checks before its code runs.
-UNREAD: Any = metaheuristics.PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
+UNREAD: Any = PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
 
 def solver_names() -> tuple[str, ...]:
     """Names of all solvers that a study can run; other packages' algorithms need the extra ``algorithms``."""
-    return (*GRADIENT_SOLVERS, *metaheuristics.ALGORITHMS, *metaheuristics.ADAPTERS)
+    return (*GRADIENT_SOLVERS, *ALGORITHMS, *ADAPTERS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +90,7 @@ class ProblemSpec:
 
 @lru_cache(maxsize=16)
 def _load(name: str, options: tuple[tuple[str, Any], ...], contents: tuple[str, ...]) -> GaitProblem:
-    return nlp_gait.load(name, **dict(options))
+    return load(name, **dict(options))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,11 +219,11 @@ class Task:
             OwnCodeError: its code cannot be found or fails.
         """
         if not isinstance(self.algorithm, str):
-            return metaheuristics.as_algorithm(self.algorithm, self.title, self.settings)
+            return as_algorithm(self.algorithm, self.title, self.settings)
         if self.is_own_code:
             own = load_object(self.algorithm, "algorithm")
-            return metaheuristics.as_algorithm(own, self.title, self.settings)
-        return metaheuristics.algorithm(self.algorithm, **self.settings)
+            return as_algorithm(own, self.title, self.settings)
+        return algorithm(self.algorithm, **self.settings)
 
     def solver(self) -> Solver:
         """NLP solver with its settings and the limits that it heeds.
@@ -256,11 +257,9 @@ def check_task(task: Task) -> None:
     if not task.is_search:
         task.solver().check(problem)
     else:
-        metaheuristics.handling(task.handling.name, **task.handling.settings)
-        algorithm = UNREAD if task.is_own_code else task.search()
-        metaheuristics.check_limits(
-            algorithm, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s
-        )
+        handling(task.handling.name, **task.handling.settings)
+        search = UNREAD if task.is_own_code else task.search()
+        check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
     if task.start:
         if task.is_search:
             raise InputError(f"{task.title!r} takes no start point; NLP solvers do")
@@ -274,7 +273,7 @@ def plain_problem(problem: GaitProblem) -> dict[str, Any]:
 
 def plain_settings(settings: Any) -> dict[str, Any]:
     """Settings with their class name, as plain data; of an object that is no data class what is plain among its attributes."""
-    if isinstance(settings, metaheuristics.PlainFunction):
+    if isinstance(settings, PlainFunction):
         return {**plain_settings(settings.function), **settings.settings}
     if inspect.isroutine(settings):
         return {"kind": FUNCTION, "function": settings.__qualname__}

@@ -6,11 +6,12 @@ import math
 import time
 from collections.abc import Callable
 
-import metaheuristics
-import nlp_gait
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import Task, plain_settings
+from metaheuristics.minimize import minimize
+from metaheuristics.registry import handling
+from nlp_gait.backends.kernel.compiled import compile_objective
 
 
 def search_run(task: Task, callback: Callable[..., None] | None = None) -> RunRecord:
@@ -23,15 +24,15 @@ def search_run(task: Task, callback: Callable[..., None] | None = None) -> RunRe
     started = time.perf_counter()
     problem = task.problem.load()
     built = time.perf_counter()
-    objective = nlp_gait.compile_objective(problem, threads=1)  # processes run side by side already
+    objective = compile_objective(problem, threads=1)  # processes run side by side already
     compiled = time.perf_counter()
     sign, stop = problem.objective.sign, task.stop
-    result = metaheuristics.minimize(
+    result = minimize(
         objective,
         task.search(),
         evaluations=stop.evaluations,
         seed=task.run_seed,
-        handling=metaheuristics.handling(task.handling.name, **task.handling.settings),
+        handling=handling(task.handling.name, **task.handling.settings),
         target=None if stop.target is None else sign * stop.target,
         stagnation=stop.stagnation,
         time_limit_s=stop.time_limit_s,
