@@ -15,7 +15,7 @@ import numpy as np
 
 import nlp_gait
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import Array, GaitProblem
 
 SMALL = 1e-6
@@ -30,7 +30,7 @@ TABLE = "{:<16}{:>8}" + "{:>11}" * len(COLUMNS) + "{:>13}"
 
 def largest_differences(problem: GaitProblem, points: int) -> tuple[dict[str, float], int]:
     """Largest relative difference by function, and how many points gave a result that is not finite."""
-    model, rng = nlp_model(problem), np.random.default_rng(0)
+    model, rng = build_nlp(problem), np.random.default_rng(0)
     p = np.append(problem.p, model.widths[0])
     ours = CompiledNlp(model.nlp, p).functions
     usual = ca.nlpsol("usual", "ipopt", model.nlp, {"print_time": False})

@@ -16,7 +16,7 @@ from benchmarks.casadi_code import compiled_functions
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, CompiledNlp
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
 from nlp_gait.formulation import GaitProblem
 
@@ -34,7 +34,7 @@ ITERATIONS = 5
 def iteration(rounds: int) -> list[Row]:
     """All functions of one iteration at a new point, and the time to compile them."""
     problem = nlp_gait.load("nao-ssp")
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     p = np.append(problem.p, model.widths[0])
     with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {FOLDER_VARIABLE: folder}):
         started, worked = time.perf_counter(), _processor_s()

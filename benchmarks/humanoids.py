@@ -18,8 +18,8 @@ import numpy as np
 import metaheuristics
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.humanoid.body import GRAVITY
 from nlp_gait.robots.biped import NAO_LEG_M, biped_of
@@ -80,7 +80,7 @@ def oracle(files: dict[str, str]) -> Iterator[str]:
 
 def reachable(problem: GaitProblem) -> tuple[Array, float]:
     """Random candidates whose legs reach their feet, and how many of all do."""
-    model, rng = exact_model(problem), np.random.default_rng(0)
+    model, rng = build_exact_model(problem), np.random.default_rng(0)
     rows = [i for i, name in enumerate(model.row_names) if name.startswith("closure")]
     found: list[Array] = []
     draws = 0
@@ -100,7 +100,7 @@ def starts(files: dict[str, str]) -> Iterator[str]:
     for name, file in files.items():
         problem = nlp_gait.load("humanoid-ssp", robot=file)
         solution = nlp_gait.solve(problem, starts=STARTS, seed=0)
-        x, model, nlp = np.array(list(solution.x.values())), exact_model(problem), nlp_model(problem)
+        x, model, nlp = np.array(list(solution.x.values())), build_exact_model(problem), build_nlp(problem)
         values = model.at(x, problem.p)
         rows = [i for i, row in enumerate(model.row_names) if row.startswith("closure")]
         width = nlp.widths[-1]
@@ -168,7 +168,7 @@ def steps(files: dict[str, str]) -> Iterator[str]:
         problem = problem.fix(single_support_time_s=time_s)
         solution = nlp_gait.solve(problem, starts=2, seed=0)
         x = np.array(list(solution.x.values()))
-        indexes, hip = exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
+        indexes, hip = build_exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
         plan = plan_of(Result(problem=problem, x=x))
         m = measure(plan, play(plan), Drive())
         fate = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"upright, tilt {m.largest_tilt_deg:.1f} deg"
@@ -210,7 +210,7 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         problem = nlp_gait.load("humanoid-cycle", robot=file, objective="power")
         solution = nlp_gait.solve(problem, starts=4, seed=0)
         x = np.array(list(solution.x.values()))
-        indexes = exact_model(problem).at(x, problem.p).indexes
+        indexes = build_exact_model(problem).at(x, problem.p).indexes
         robot, played = problem.display.robot, "-"
         assert robot is not None
         if solution.success:

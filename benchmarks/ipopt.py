@@ -11,7 +11,7 @@ from casadi import MX, SX
 import nlp_gait
 from benchmarks.rows import Row
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
-from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.nlp import NlpModel, build_nlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Angle, Exact
@@ -88,7 +88,7 @@ def _naive(problem: GaitProblem) -> tuple[ca.Function, dict[str, object]]:
 def compiled_derivatives(starts: int) -> list[Row]:
     """One start of the first stage with interpreted and with compiled derivatives."""
     problem = nlp_gait.load("nao-ssp")
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     interpreted = ca.nlpsol("interpreted", "ipopt", model.nlp, LIFTED)
     started = time.perf_counter()
     native = CompiledNlp(model.nlp, np.append(problem.p, WIDTH))

@@ -15,14 +15,14 @@ from benchmarks.casadi_code import compiled_functions
 from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
-from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
-from nlp_gait.symbolic.economy import economical
+from nlp_gait.symbolic.simplification import simplify
 
 BATCH = 1000
 
@@ -35,7 +35,7 @@ def candidates(problem: GaitProblem, count: int) -> Array:
 def paths(rounds: int) -> list[Row]:
     """The objective with its violation by every path, one core, batch 1000."""
     problem = nlp_gait.load("nao-ssp")
-    kernel, X = kernel_of(problem), candidates(problem, BATCH)
+    kernel, X = build_kernel(problem), candidates(problem, BATCH)
     objective = nlp_gait.compile_objective(problem, require_compiler=True, threads=1)
     scalar = nlp_gait.compile_objective(problem, require_compiler=True, threads=1, lanes=1)
     by_hand = ByHand()
@@ -134,13 +134,13 @@ def _torques(rounds: int, robot: Robot, moving: Sequence[str], upright: Collecti
     still = dict.fromkeys(JOINTS, SX(0))
     tree = tree_from(robot, robot.feet["left"].link)
     torque, _ = newton_euler(tree, held | parts[0], still | parts[1], still | parts[2], GRAVITY, upright=upright)
-    outputs = economical([vertcat(*(torque[name] for name in JOINTS))])
+    outputs = simplify([vertcat(*(torque[name] for name in JOINTS))])
     empty = SX.sym("p", 0)
     kernel = Kernel(
         function=Function("kernel", [state, empty], [SX(0), *outputs]),
         bounds=Function("bounds", [empty], [SX.inf(22), SX.inf(22)]),
         weights=np.zeros(22),
-        model=kernel_of(nlp_gait.load("nao-ssp")).model,
+        model=build_kernel(nlp_gait.load("nao-ssp")).model,
     )
     native = NativeKernel(kernel, find_compiler(), native_lanes())
 

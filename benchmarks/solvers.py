@@ -23,7 +23,7 @@ SAME_OPTIMUM = 1e-4  # relative
 def few_rows(starts: int, name: str = "nao-ssp", required: float | None = None) -> list[Row]:
     """Process time of a start of IPOPT that begins with the rows that matter, and with all rows, from the same points in turn."""
     problem = nlp_gait.load(name)
-    solvers = {few: IpoptSettings(compiled=True, few_rows=few).ready_for(problem) for few in (True, False)}
+    solvers = {few: IpoptSettings(compiled=True, few_rows=few).prepare(problem) for few in (True, False)}
     rng = np.random.default_rng(0)
     times: dict[bool, list[float]] = {few: [] for few in solvers}
     ends: dict[bool, list[Outcome]] = {few: [] for few in solvers}

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from nlp_gait.backends.exact import exact_model, violated_rows
+from nlp_gait.backends.exact import build_exact_model, find_violated_rows
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.proofs.guarantee import Guarantee, guarantee
@@ -56,7 +56,7 @@ class Evaluation:
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:
         """Violated rows, worst first."""
-        return violated_rows(self.constraints)
+        return find_violated_rows(self.constraints)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers; the robot stands beside the problem's name."""
@@ -75,12 +75,12 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         InputError: x has the wrong length or is not finite.
     """
     point = problem.check_x(x)
-    exact = exact_model(problem)
+    exact = build_exact_model(problem)
     values = exact.at(point, problem.p)
     parts = DENSE_INTERVALS if problem.grid is None else problem.grid.parts
     factor = math.ceil(DENSE_INTERVALS / parts)
     dense = problem.dense(factor)
-    dense_values = None if dense is None else exact_model(dense).at(point, dense.p)
+    dense_values = None if dense is None else build_exact_model(dense).at(point, dense.p)
     objective = problem.objective
     return Evaluation(
         problem=problem.address,
@@ -93,7 +93,9 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         violation=values.violation,
         feasible=values.violation <= FEASIBILITY_TOLERANCE,
         dense=None if dense_values is None else dense_values.indexes,
-        dense_violations=() if dense is None or dense_values is None else exact_model(dense).violated(dense_values),
+        dense_violations=()
+        if dense is None or dense_values is None
+        else build_exact_model(dense).violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
         guaranteed=guarantee(problem, point) if values.violation <= FEASIBILITY_TOLERANCE else None,
     )

@@ -1,7 +1,7 @@
 """Biped gait problems, written once as symbolic CasADi models.
 
-``load`` makes a problem; ``solve`` gives it to IPOPT, or to another NLP ``solver``; ``compile_objective`` gives its exact
-functions to search algorithms.
+``load`` makes a problem; ``solve`` gives it to IPOPT, or to another NLP solver (``make_solver``); ``compile_objective`` gives its
+exact functions to search algorithms.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
-    from nlp_gait.backends.solvers.registry import solver
+    from nlp_gait.backends.solvers.registry import make_solver
     from nlp_gait.errors import GaitError
     from nlp_gait.formulation import GaitProblem, load, problem_names
     from nlp_gait.formulation.solution import Solution
@@ -30,7 +30,7 @@ _LATER = {
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
     "Solution": "nlp_gait.formulation.solution",
     "solve": "nlp_gait.backends.solve",
-    "solver": "nlp_gait.backends.solvers.registry",
+    "make_solver": "nlp_gait.backends.solvers.registry",
 }
 
 __all__ = [
@@ -43,7 +43,7 @@ __all__ = [
     "load",
     "problem_names",
     "solve",
-    "solver",
+    "make_solver",
 ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 
 
@@ -43,5 +43,5 @@ class Evaluation:
 
 def evaluated(problem: GaitProblem, x: Array | Sequence[float]) -> Evaluation:
     """The exact functions at x (n,) and the current parameter values."""
-    model = exact_model(problem)
+    model = build_exact_model(problem)
     return Evaluation(**model.at(x, problem.p)._asdict(), row_names=model.row_names)

@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import LANE_COUNTS, compile_objective
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.formulation import Array, GaitProblem
@@ -33,7 +33,7 @@ def candidates(problem: GaitProblem, count: int) -> Array:
 
 def interpreted(problem: GaitProblem, X: Array) -> tuple[Array, Array]:
     """Cost and violation by CasADi's virtual machine."""
-    exact = exact_model(problem).function.map(BLOCK)
+    exact = build_exact_model(problem).function.map(BLOCK)
     p = np.repeat(problem.p[:, None], BLOCK, axis=1)
     parts = [exact(X[i : i + BLOCK].T, p)[:2] for i in range(0, len(X), BLOCK)]
     cost, violation = (np.concatenate([np.array(part[k]).ravel() for part in parts]) for k in (0, 1))

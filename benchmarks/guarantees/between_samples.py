@@ -15,7 +15,7 @@ from statistics import median
 import numpy as np
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem, registry
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.guarantee import guarantee
@@ -36,7 +36,7 @@ INSTANCES = {
 
 def feasible_gaits(problem: GaitProblem, best: Array, count: int, rng: np.random.Generator) -> list[Array]:
     """Random points between the best known one and anywhere in the box that are feasible on the samples."""
-    model, found = exact_model(problem), []
+    model, found = build_exact_model(problem), []
     while len(found) < count:
         share = rng.uniform(0.0, 1.0) ** 2
         x = best + share * (rng.uniform(problem.lower, problem.upper) - best)
@@ -49,7 +49,7 @@ def contradictions(problem: GaitProblem, gaits: list[Array], samples: int) -> tu
     """What a grid says against the guarantees, CPU seconds of each guarantee, and how many hold."""
     factor = -(-(samples - 1) // problem.grid.parts)
     dense = problem.dense(factor)
-    model = exact_model(dense)
+    model = build_exact_model(dense)
     found, seconds, holding = [], [], 0
     stems, places = np.unique([row_of(name) for name in model.row_names], return_inverse=True)
     order = np.argsort(places, kind="stable")

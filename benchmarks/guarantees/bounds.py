@@ -32,7 +32,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.trajectories import Motion, at_rest, cubic_of_sums, stack
+from nlp_gait.symbolic.trajectories import Motion, cubic_of_sums, resting_point, stack
 from nlp_gait.symbolic.world_frame import world_frame_dynamics
 
 STEP_M, PHASE, REACH_MARGIN = 0.06, 0.3, 0.01
@@ -82,7 +82,7 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
         hip = hip_motion(at, stance.hip_x, stance.hip_y, time, phase)
     path = (SX(end) for end in stance.swing_x)
     swing = swing_foot(*path, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], time, phase)
-    ankles = {"L": at_rest((*stance.support_xy, foot.ankle_height_m)), "R": swing}
+    ankles = {"L": resting_point((*stance.support_xy, foot.ankle_height_m)), "R": swing}
     arms = arm_joints(ARM_SWING, time, phase)
     if in_world:
         frames = upright_frames(robot, hip, ankles, arms, 1 - REACH_MARGIN)

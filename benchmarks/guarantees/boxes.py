@@ -8,7 +8,7 @@ import numpy as np
 
 import nlp_gait
 from benchmarks.guarantees.between_samples import feasible_gaits
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import bounds_of
@@ -23,7 +23,7 @@ POINTS = 100
 def lost(problem: GaitProblem, best: Array, count: int, rng: np.random.Generator) -> int:
     """How many random boxes around feasible points are dropped or cut so that their point is gone, or get too high a bound."""
     points = np.array(feasible_gaits(problem, best, min(count, POINTS), rng))
-    costs = np.array([exact_model(problem).at(x, problem.p).cost for x in points])
+    costs = np.array([build_exact_model(problem).at(x, problem.p).cost for x in points])
     bounds = bounds_of(problem)
     low, high = bounds.whole[0].T
     which = rng.integers(0, len(points), count)

@@ -60,7 +60,7 @@ def solve(
     target = None if out is None else output_file(out)
     loaded = problem.spec().load()
     first = None if x0 is None else loaded.check_x(parse_x(x0))
-    chosen = registry.solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
+    chosen = registry.make_solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
     starts = loaded.hints.starts if starts is None else starts
     with progress_bar(f"{solver} starts", starts) as advance:
         solution, stopped = until_interrupted(

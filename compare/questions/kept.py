@@ -140,18 +140,18 @@ class _KeptSolver(Solver):
     def __init__(self, solver: Solver, finished: Finished, solves: int = 1) -> None:
         self._solver, self._finished, self._solves = solver, finished, solves
 
-    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Solver:
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> Solver:
         self._solver.check(problem)
         return _KeptSolver(self._solver, self._finished, solves)
 
-    def settled(self, problem: GaitProblem, solves: int = 1) -> Solver:
-        return self._solver.settled(problem, solves)
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        return self._solver.choose_settings(problem, solves)
 
     def check(self, problem: GaitProblem) -> None:
         self._solver.check(problem)
 
-    def plain(self) -> dict[str, Any]:
-        return self._solver.plain()
+    def to_dict(self) -> dict[str, Any]:
+        return self._solver.to_dict()
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         found = self._kept(problem, {"x0": _numbers(x0)}, stop, lambda ready: ready.run(problem, x0, stop))
@@ -169,11 +169,11 @@ class _KeptSolver(Solver):
         stop: Callable[[], bool],
         run: Callable[[Solver], Outcome | None],
     ) -> Outcome | None:
-        settings = self._solver.settled(problem, self._solves)
-        inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.plain(), **start}
+        settings = self._solver.choose_settings(problem, self._solves)
+        inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.to_dict(), **start}
 
         def compute() -> Any:
-            outcome = run(self._solver.ready_for(problem, self._solves))
+            outcome = run(self._solver.prepare(problem, self._solves))
             if stop():
                 raise _Interrupted(outcome)
             return None if outcome is None else _plain(outcome)

@@ -163,7 +163,7 @@ def _build_solvers(tasks: Sequence[Task]) -> None:
     for _, group in groupby(sorted(named, key=_solver_of), key=_solver_of):
         runs = list(group)
         with suppress(GaitError):  # each run says it, in its record
-            runs[0].solver().ready_for(runs[0].problem.load(), PLANNED_RUNS)
+            runs[0].solver().prepare(runs[0].problem.load(), PLANNED_RUNS)
 
 
 def _solver_of(task: Task) -> tuple[str, str]:

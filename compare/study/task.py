@@ -18,7 +18,7 @@ from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
 from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 from nlp_gait.backends.identity import SOURCE, problem_part, sha256_of
-from nlp_gait.backends.solvers.registry import SOLVERS, setting_names, solver
+from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
@@ -187,7 +187,7 @@ class Task:
         }
         if self.is_search:
             parts |= {"handling": asdict(self.handling), "stop": asdict(self.stop)}
-        elif "evaluations" in setting_names(str(self.algorithm)):
+        elif "evaluations" in list_settings(str(self.algorithm)):
             parts["stop"] = asdict(self.stop)
         elif self.stop.time_limit_s is not None:
             parts["stop"] = {"time_limit_s": self.stop.time_limit_s}
@@ -232,12 +232,12 @@ class Task:
             InputError: a time limit that it cannot heed, or a setting that is not allowed.
         """
         name = str(self.algorithm)
-        known = setting_names(name)
+        known = list_settings(name)
         if self.stop.time_limit_s is not None and "time_limit_s" not in known:
             raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
         heeded = {limit: value for limit, value in limits.items() if limit in known and value is not None}
-        return solver(name, **{**heeded, **self.settings})
+        return make_solver(name, **{**heeded, **self.settings})
 
 
 def check_task(task: Task) -> None:

@@ -15,7 +15,7 @@ from compare.analysis.published import published
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import drawn_gait, gaits_figure
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, Result, load, problem_names
 from nlp_gait.formulation.registry import PROBLEMS, problem_maker
 from nlp_gait.formulation.solution import ConstraintValue
@@ -121,7 +121,7 @@ def _best(problem: GaitProblem, found: Difficulty | None) -> str:
     title = f"## Best known {objective.name}"
     if found is None or found.best is None:
         return f"{title}\n\nNot measured yet: `python -m benchmarks.difficulty {problem.name}`."
-    best, exact = found.best, exact_model(problem)
+    best, exact = found.best, build_exact_model(problem)
     value = objective.sign * exact.at(problem.check_x(best.x), problem.p).cost
     if not math.isclose(value, best.objective, rel_tol=SAME):
         raise ValueError(
@@ -169,7 +169,7 @@ def _binding(problem: GaitProblem, best: Best | None) -> str:
 
 def _rows(problem: GaitProblem) -> str:
     """Groups of rows with their numbers and bounds; bounds depend on parameters alone."""
-    exact = exact_model(problem)
+    exact = build_exact_model(problem)
     values = exact.rows(exact.at(problem.lower, problem.p))[: -len(problem.names)]
     over = {c.name: c.over for c in problem.assemble(problem.symbols(), Exact()).constraints}
     groups: dict[str, list[ConstraintValue]] = {}

@@ -70,7 +70,7 @@ class ExactModel:
 
     def violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
         """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
-        return violated_rows(self._named(values, np.flatnonzero(~(_excess(values) <= FEASIBILITY_TOLERANCE))))
+        return find_violated_rows(self._named(values, np.flatnonzero(~(_excess(values) <= FEASIBILITY_TOLERANCE))))
 
     def _named(self, values: ExactValues, chosen: Iterable[int]) -> tuple[ConstraintValue, ...]:
         """Some rows, by their positions."""
@@ -88,12 +88,12 @@ class ExactModel:
         )
 
 
-def exact_model(problem: GaitProblem) -> ExactModel:
+def build_exact_model(problem: GaitProblem) -> ExactModel:
     """Exact function of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_build)
 
 
-def violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:
+def find_violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:
     """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
     violated = [row for row in rows if not row.violation <= FEASIBILITY_TOLERANCE]
     return tuple(sorted(violated, key=lambda row: -math.inf if math.isnan(row.violation) else -row.violation))

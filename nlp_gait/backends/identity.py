@@ -6,7 +6,7 @@ import hashlib
 import json
 from typing import Any
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.references import source_sha256
 
@@ -29,7 +29,7 @@ def fingerprint(problem: GaitProblem) -> dict[str, Any]:
 
 
 def _hash_mathematics(problem: GaitProblem) -> str:
-    return hashlib.sha256(exact_model(problem).function.serialize().encode()).hexdigest()
+    return hashlib.sha256(build_exact_model(problem).function.serialize().encode()).hexdigest()
 
 
 def problem_part(problem: GaitProblem) -> dict[str, Any]:

@@ -84,7 +84,7 @@ class NlpModel:
         }
 
 
-def nlp_model(problem: GaitProblem) -> NlpModel:
+def build_nlp(problem: GaitProblem) -> NlpModel:
     """NLP of a problem, built once for all copies that differ in parameter values only.
 
     Raises:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlp_gait.backends.exact import ExactValues, exact_model, violated_rows
+from nlp_gait.backends.exact import ExactValues, build_exact_model, find_violated_rows
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
@@ -62,14 +62,14 @@ def solve(
     _check_kinds(problem, fix, solver, progress)
     problem = problem.fix(**(fix or {}))
     points = _start_points(problem, starts, seed, x0)
-    ready = (solver or IpoptSettings()).ready_for(problem, starts)
+    ready = (solver or IpoptSettings()).prepare(problem, starts)
     outcomes: list[Outcome] = []
     with defer_interrupts() as interrupted:
         for outcome in run_starts(ready, problem, points, interrupted, workers):
             outcomes.append(outcome)
             if progress is not None:
                 progress(outcome)
-    solution = solution_of(problem, outcomes, seed)
+    solution = make_solution(problem, outcomes, seed)
     if interrupted():
         sentence = f"interrupted in start {len(outcomes)} of {starts}"
         raise Interrupted(sentence, replace(solution, status=f"{sentence}; {solution.status}"))
@@ -82,10 +82,10 @@ def _check_kinds(problem: object, fix: object, solver: object, progress: object)
         raise InputError(f"problem must be a problem from load, or the name of one, got {shown(problem)}")
     if fix is not None and not (isinstance(fix, Mapping) and all(isinstance(name, str) for name in fix)):
         raise InputError(f"fix must be values by variable name, got {shown(fix)}")
-    makes_runs = all(callable(getattr(solver, method, None)) for method in ("run", "ready_for"))
+    makes_runs = all(callable(getattr(solver, method, None)) for method in ("run", "prepare"))
     if solver is not None and (isinstance(solver, type) or not makes_runs):
         raise InputError(
-            f"solver must be one with its settings, as nlp_gait.solver('ipopt') or IpoptSettings() make it, got {shown(solver)}"
+            f"solver must be made by nlp_gait.make_solver('ipopt'), IpoptSettings() or the like, got {shown(solver)}"
         )
     if progress is not None and not callable(progress):
         raise InputError(f"progress must be a function of one start's outcome, got {shown(progress)}")
@@ -101,12 +101,12 @@ def _start_points(
     return points
 
 
-def solution_of(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:
+def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:
     """Solution from all starts: the cheapest that succeeded, else the cheapest feasible, else the least infeasible one."""
     best = min(outcomes, key=lambda outcome: outcome.rank)
-    exact = exact_model(problem)
+    exact = build_exact_model(problem)
     values = exact.at(best.x, problem.p)
-    violations = violated_rows(exact.rows(values))
+    violations = find_violated_rows(exact.rows(values))
     status = best.status
     if not best.success:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
@@ -144,7 +144,7 @@ def _active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[Activ
 
     Equations of the problem always hold and are left out; a variable that is fixed has a price.
     """
-    exact, unit = exact_model(problem), problem.objective.unit
+    exact, unit = build_exact_model(problem), problem.objective.unit
     rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
     slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
     weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.formulation import Array, GaitProblem
@@ -66,7 +66,7 @@ def run_starts(
             return
     count = min(workers or 1, len(points))
     if count > 1:
-        exact_model(problem)  # every run needs it: built before the fork
+        build_exact_model(problem)  # every run needs it: built before the fork
         yield from run_in_forks(
             lambda k, is_ending: solver.run(problem, points[k], is_ending), len(points), count, stop
         )

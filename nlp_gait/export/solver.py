@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.backends.derivatives.assembly import NlpPlan, plan_of
+from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import FLAGS
-from nlp_gait.backends.derivatives.source import nlp_source, table
+from nlp_gait.backends.derivatives.source import table, write_nlp_source
 from nlp_gait.backends.derivatives.straight_line import number
-from nlp_gait.backends.derivatives.structure import structure_of
-from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.derivatives.structure import split_nlp
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
@@ -48,8 +48,8 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
         CompilerError: the NLP holds what has no C++ here.
         OutputError: the folder cannot be written to.
     """
-    model = nlp_model(problem)
-    found = plan_of(structure_of(model.nlp))
+    model = build_nlp(problem)
+    found = make_nlp_plan(split_nlp(model.nlp))
     prefix = f"{problem.name.replace('-', '_')}_nlp"
     words = _words(problem, model, found, prefix)
     source = _source(problem, model, found, prefix)
@@ -77,7 +77,7 @@ def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) 
             "#ifndef LANES\n#define LANES 1  // pairs of a sample and a direction at a time: 1, 2, 4 or 8\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
             "namespace {  // so that several problems can stand in one program",
-            nlp_source(found).replace('extern "C" EXPORT', "static"),
+            write_nlp_source(found).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(
                 _constant("double", f"{prefix}_{name}", map(number, values.tolist()))

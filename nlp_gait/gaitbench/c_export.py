@@ -6,8 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from nlp_gait.backends.kernel.compiler import native_source
-from nlp_gait.backends.kernel.kernel_source import kernel_of, kernel_source
+from nlp_gait.backends.kernel.compiler import read_native_source
+from nlp_gait.backends.kernel.kernel_source import build_kernel, write_kernel_source
 from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.formulation import Array
@@ -31,7 +31,7 @@ def export_objective(instance: Instance, folder: Path) -> list[Path]:
         OutputError: the folder cannot be written to.
     """
     instance = Instance(instance.id)
-    sides = OneSidedRows(kernel_of(instance.gait_problem), instance.gait_problem)
+    sides = OneSidedRows(build_kernel(instance.gait_problem), instance.gait_problem)
     prefix = make_prefix(instance.id)
     words = _make_words(instance, sides, prefix)
     return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, words, make_cpp_source(instance, sides))
@@ -45,7 +45,7 @@ def make_prefix(id: str) -> str:
 def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
     """Return the C++ file: the kernel over lanes, the instance's constants, the functions of the header."""
     problem = instance.gait_problem
-    kernel = kernel_of(problem)
+    kernel = build_kernel(problem)
     lower, upper = kernel.row_bounds(problem)
     prefix = make_prefix(instance.id)
     constants = {
@@ -63,7 +63,7 @@ def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
             "#ifndef LANES\n#define LANES 1  // points at a time: 1, 2, 4 or 8\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
             "namespace {  // so that a program can have several instances",
-            kernel_source(kernel.function).replace('extern "C" EXPORT', "static"),
+            write_kernel_source(kernel.function).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(f"static const double {name}[] = {_numbers(values)};" for name, values in constants.items()),
             f"static const int instance_rows[] = {{{', '.join(map(str, sides.row.tolist()))}}};",
@@ -72,7 +72,7 @@ def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
             *(f'extern "C" const char* const {prefix}_{name}[] = {_texts(values)};' for name, values in names.items()),
             f"#define SIDES {len(sides.names)}",
             f"#define FUNCTION {prefix}_evaluate",
-            native_source("nlp_gait.gaitbench", "objective.hpp"),
+            read_native_source("nlp_gait.gaitbench", "objective.hpp"),
         ]
     )
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.errors import InputError, check_name
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
@@ -184,7 +184,7 @@ class Instance:
     @cached_property
     def _sides(self) -> OneSidedRows:
         with _BUILDING:
-            return OneSidedRows(kernel_of(self.gait_problem), self.gait_problem)
+            return OneSidedRows(build_kernel(self.gait_problem), self.gait_problem)
 
     @cached_property
     def _derivatives(self) -> ca.Function:
@@ -223,6 +223,6 @@ def _load(id: str, unit_cube: bool) -> Instance:
 
 def _build_derivatives(problem: GaitProblem) -> ca.Function:
     x, p = ca.MX.sym("x", len(problem.names)), ca.MX.sym("p", len(problem.parameters))
-    cost, g = kernel_of(problem).function(x, p)
+    cost, g = build_kernel(problem).function(x, p)
     own = g[: g.shape[0] - len(problem.names)]
     return ca.Function("derivatives", [x, p], [ca.gradient(cost, x), ca.densify(ca.jacobian(own, x))])

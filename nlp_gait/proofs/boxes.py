@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.kernel_source import kernel_of
+from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.affine import AffineFunction, Forms
@@ -57,7 +57,7 @@ class BoxBounds:
             InputError: an operation that cannot be enclosed.
             CompilerError: there is no compiler, or it fails.
         """
-        kernel = kernel_of(problem)
+        kernel = build_kernel(problem)
         n, self._rows = len(problem.names), len(kernel.model.row_names) - len(problem.names)
         lower, upper = kernel.row_bounds(problem)
         slack = FEASIBILITY_TOLERANCE * kernel.model.row_scales

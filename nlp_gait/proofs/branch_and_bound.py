@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file
@@ -123,7 +123,7 @@ def certify(
     if not (tolerance > 0.0 and time_limit_s > 0.0):
         raise InputError(f"tolerance and time limit must be positive, got {tolerance}, {time_limit_s} s")
     x = problem.check_x(incumbent)
-    at = exact_model(problem).at(x, problem.p)
+    at = build_exact_model(problem).at(x, problem.p)
     if not at.violation <= FEASIBILITY_TOLERANCE:
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()

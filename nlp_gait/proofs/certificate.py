@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import problem_part, sha256_of
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
@@ -123,7 +123,7 @@ def check(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
     x = problem.check_x(np.array(proof.x))
     if (np.maximum(problem.lower - x, x - problem.upper) > FEASIBILITY_TOLERANCE * problem.scale).any():
         raise InputError("the certificate's incumbent is outside the bounds of its variables")
-    at = exact_model(problem).at(x, problem.p)
+    at = build_exact_model(problem).at(x, problem.p)
     objective = problem.objective.sign * at.cost
     if not proof.closed:
         raise InputError("the certificate is of a proof that has not ended: there is nothing to check but its bound")

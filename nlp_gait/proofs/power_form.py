@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -275,7 +275,7 @@ def _check(problem: GaitProblem, parts: _Assembled) -> None:
     Raises:
         InputError: they differ by more than rounding.
     """
-    model, rng = exact_model(problem), np.random.default_rng(SEED)
+    model, rng = build_exact_model(problem), np.random.default_rng(SEED)
     function = ca.Function("figures", [parts.outputs.z], list(parts.figures.values()))
     reached = [k for k, name in enumerate(model.row_names) if name.startswith("reach[")]
     seen = 0

@@ -22,7 +22,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
-from nlp_gait.symbolic.trajectories import Motion, at_rest, cubic_of_sums, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 from nlp_gait.symbolic.world_frame import (
     PartedWrench,
     chain_frames,
@@ -206,7 +206,7 @@ class LegParts(NamedTuple):
 
 def _leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant) -> LegParts:
     geometry, yaw = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
-    at_hip = plus(hip, at_rest(geometry.hip_m))
+    at_hip = add_motions(hip, resting_point(geometry.hip_m))
     frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, cosine)
     apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
     rates = leg_rates(apart, geometry.thigh_m, geometry.tibia_m, cosine)

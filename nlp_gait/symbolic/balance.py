@@ -88,7 +88,7 @@ def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, flo
     return ca.vertcat(*rubbing), ca.vertcat(*pressing), ca.vertcat(*turning)
 
 
-def combined_zmp(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
+def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
     """ZMP of several feet on one flat ground.
 
     Args:

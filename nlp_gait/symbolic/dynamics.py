@@ -61,7 +61,7 @@ def newton_euler(
     """
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
-    inertias = regrouped_inertias(tree, shares)
+    inertias = regroup_inertias(tree, shares)
     forces, moments = _forward(tree, inertias, rotations, qd, qdd, gravity, upright)
     for i, body in enumerate(tree):
         if body.link.name in shares:  # force and moment are linear in mass and inertia
@@ -84,7 +84,7 @@ def newton_euler(
     return torques, Wrench(forces[0], moments[0])
 
 
-def regrouped_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[Inertia]:
+def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[Inertia]:
     """Inertias that give the same torques and the same wrench on the ground with fewer operations.
 
     Matter on a joint's axis moves alike whether it belongs to the body before or behind the joint, and gives no torque

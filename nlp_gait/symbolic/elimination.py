@@ -46,7 +46,7 @@ class Factors:
         return ca.vertcat(*x)
 
 
-def sound_order(matrices: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
+def choose_pivots(matrices: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
     """Order of elimination whose pivots stay away from zero for all of some matrices of numbers, with little work.
 
     Args:
@@ -110,12 +110,12 @@ def _work(pattern: Array, order: Sequence[tuple[int, int]]) -> int:
     return work
 
 
-def factorised(matrix: SX, order: Sequence[tuple[int, int]], least_pivot: float) -> Factors:
+def factorise(matrix: SX, order: Sequence[tuple[int, int]], least_pivot: float) -> Factors:
     """A matrix (n, n) taken apart in a given order, finite for every matrix.
 
     Args:
         matrix: expressions; zeros among them cost nothing.
-        order: see ``sound_order``.
+        order: see ``choose_pivots``.
         least_pivot: a pivot nearer to zero is taken as this far from it.
     """
     n = len(order)

@@ -15,8 +15,8 @@ import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
-from nlp_gait.symbolic.elimination import Factors, factorised, sound_order
-from nlp_gait.symbolic.leg_poses import flat_foot_poses
+from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
+from nlp_gait.symbolic.leg_poses import sample_flat_foot_poses
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -102,7 +102,7 @@ def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmo
         torso.place.velocity + swept,
         torso.place.acceleration + ca.cross(torso.spin_rate, arm) + ca.cross(torso.spin, swept),
     )
-    q = ops.root(leg_root(leg, steps, ops, margin), ca.vertcat(hip.position, ca.vec(torso.rotation)))
+    q = ops.root(make_leg_root(leg, steps, ops, margin), ca.vertcat(hip.position, ca.vec(torso.rotation)))
     bent = q if ops.exact else _kept_bent(leg, q, margin)
     chain = _chain(leg, ca.cos(bent), ca.sin(bent))
     off = _misfit(leg, chain, hip.position, torso.rotation)
@@ -127,7 +127,7 @@ def _kept_bent(leg: Leg, q: SX, margin: SX) -> SX:
     return ca.vertcat(q[:3], knee, q[4:])
 
 
-def leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
+def make_leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
     """The leg's six equations: inputs are the hip centre from the foot's origin (3,) [m] and the torso's rotation (9,)."""
 
     def residual(q: SX, inputs: SX) -> SX:
@@ -185,7 +185,7 @@ def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[
     return ca.vertcat(*(cos for cos, _ in turns)), ca.vertcat(*(sin for _, sin in turns))
 
 
-def reach_of(leg: Leg, q: SX) -> SX:
+def compute_reach(leg: Leg, q: SX) -> SX:
     """Cosine of the knee's angle from straight, as in ``LegMotion``, for angles (6,) that are given [rad]."""
     return _knee_cosine(leg, ca.sumsqr(_chain(leg, ca.cos(q), ca.sin(q)).hip - _ankle(leg)))
 
@@ -296,7 +296,7 @@ def _jacobian(leg: Leg, chain: _Chain) -> SX:
 
 
 def _factors(leg: Leg, chain: _Chain, least_pivot: float = LEAST_PIVOT) -> Factors:
-    return factorised(_jacobian(leg, chain), _order(leg), least_pivot)
+    return factorise(_jacobian(leg, chain), _order(leg), least_pivot)
 
 
 @lru_cache(maxsize=64)
@@ -307,10 +307,10 @@ def _order(leg: Leg) -> tuple[tuple[int, int], ...]:
     matrix = _jacobian(leg, _chain(leg, ca.cos(q), ca.sin(q)))
     function = ca.Function("matrix", [q], [ca.densify(matrix)])
     angles = ca.Function("angles", [inputs], [ca.atan2(sines, cosines)])
-    poses = np.array(angles.map(ORDER_POSES)(flat_foot_poses(leg, ORDER_POSES)))
+    poses = np.array(angles.map(ORDER_POSES)(sample_flat_foot_poses(leg, ORDER_POSES)))
     matrices = np.array([function(pose).full() for pose in poses.T])
     pattern = [[not matrix[i, j].is_zero() for j in range(LEG_JOINT_COUNT)] for i in range(LEG_JOINT_COUNT)]
-    return sound_order(matrices, np.array(pattern))
+    return choose_pivots(matrices, np.array(pattern))
 
 
 def _bias(chain: _Chain, qd: SX) -> tuple[SX, SX]:

@@ -18,7 +18,7 @@ LARGEST_PITCH, LARGEST_ROLL = math.radians(28.0), math.radians(15.0)
 LEAN_PITCH, LEAN_ROLL = 0.3, 0.15
 
 
-def flat_foot_poses(leg: Leg, count: int = POSES) -> Array:
+def sample_flat_foot_poses(leg: Leg, count: int = POSES) -> Array:
     """(12, N) hip centres from the foot's origin [m] and rotations of the torso, column by column, over flat soles."""
     rng = np.random.default_rng(SEED)
     distance = rng.uniform(*DISTANCES, count) * leg.length_m

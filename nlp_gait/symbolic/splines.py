@@ -23,7 +23,7 @@ DEGREE = 5  # positions have four continuous derivatives, so torques and their r
 FIXED = 2
 
 
-def coefficient_count(spans: int) -> int:
+def count_coefficients(spans: int) -> int:
     """Number of coefficients of one curve; 0 spans stand for no spline at all."""
     return spans + DEGREE - 2 * FIXED if spans else 0
 
@@ -62,7 +62,7 @@ def basis(spans: int, phase: SX, order: int) -> SX:
     return ca.vertcat(*values[FIXED : len(values) - FIXED])
 
 
-def finer(coefficients: Array, spans: int) -> Array:
+def refine_spline(coefficients: Array, spans: int) -> Array:
     """Coefficients of the same curve with more spans, which are averages of the given ones.
 
     Args:
@@ -71,17 +71,17 @@ def finer(coefficients: Array, spans: int) -> Array:
     """
     m = coefficients.shape[0]
     if m == 0:
-        return np.zeros((coefficient_count(spans), *coefficients.shape[1:]))
+        return np.zeros((count_coefficients(spans), *coefficients.shape[1:]))
     phases = np.linspace(0.0, 1.0, 4 * (spans + DEGREE))
-    return fitted(basis_table(m - 1, phases).T @ coefficients, spans, phases)
+    return fit_spline(tabulate_basis(m - 1, phases).T @ coefficients, spans, phases)
 
 
-def fitted(values: Array, spans: int, phases: Array) -> Array:
+def fit_spline(values: Array, spans: int, phases: Array) -> Array:
     """(m, k) coefficients of the splines that are nearest to values (n, k) at phases (n,), in the sense of least squares."""
-    return np.asarray(np.linalg.lstsq(basis_table(spans, phases).T, values, rcond=None)[0], dtype=float)
+    return np.asarray(np.linalg.lstsq(tabulate_basis(spans, phases).T, values, rcond=None)[0], dtype=float)
 
 
-def basis_table(spans: int, phases: Array, order: int = 0) -> Array:
+def tabulate_basis(spans: int, phases: Array, order: int = 0) -> Array:
     """(m, n) derivatives of the basis functions at phases (n,)."""
     return np.array(_basis_function(spans, order).map(len(phases))(phases[None, :]).full())
 

@@ -78,7 +78,7 @@ def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX)
     return Motion(height * (1 - offset**2), -2 * height * offset * rate, -2 * height * (rate**2 + offset * bend))
 
 
-def through(function: Callable[[SX], SX], argument: Motion) -> Motion:
+def map_motion(function: Callable[[SX], SX], argument: Motion) -> Motion:
     """Motion of a smooth function of a moving quantity, by the chain rule with automatic differentiation.
 
     Args:
@@ -92,17 +92,17 @@ def through(function: Callable[[SX], SX], argument: Motion) -> Motion:
     return Motion(*ca.substitute([value, slope, bend], [q], [argument.position]))
 
 
-def plus(first: Motion, second: Motion) -> Motion:
+def add_motions(first: Motion, second: Motion) -> Motion:
     """Sum of two motions of one shape and unit."""
     return Motion(*(a + b for a, b in zip(first, second, strict=True)))
 
 
-def constant(value: float) -> Motion:
+def constant_motion(value: float) -> Motion:
     """A quantity that does not move."""
     return Motion(SX(value), SX(0), SX(0))
 
 
-def at_rest(place: Sequence[float]) -> Motion:
+def resting_point(place: Sequence[float]) -> Motion:
     """A point (n,) that does not move."""
     return Motion(SX(DM(list(place))), SX(len(place), 1), SX(len(place), 1))
 

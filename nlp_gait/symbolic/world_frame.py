@@ -19,7 +19,7 @@ from nlp_gait.robots.tree import Body
 from nlp_gait.symbolic.dynamics import Wrench
 from nlp_gait.symbolic.inverse_kinematics import knee_cosine
 from nlp_gait.symbolic.kinematics import axis_rotation
-from nlp_gait.symbolic.trajectories import Motion, through
+from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
 class Frame(NamedTuple):
@@ -74,7 +74,7 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
         lower = _pitched((out - x) / tibia, (length - down) / tibia, forward, left, upward)
         return ca.horzcat(forward, left, upward, upper, lower, out * forward - down * upward)
 
-    moved = through(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
+    moved = map_motion(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
     rolled, upper, lower = (Motion(*(part[:, 3 * i : 3 * i + 3] for part in moved)) for i in range(3))
     knee = Motion(*(h + part[:, 9] for h, part in zip(hip, moved, strict=True)))
     return LegFrames(Frame(rolled, hip), Frame(upper, hip), Frame(lower, knee), Frame(rolled, ankle))
@@ -103,7 +103,7 @@ def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Mo
             found.append(ca.horzcat(rotation, position))
         return ca.horzcat(*found)
 
-    moved = through(columns, Motion(*(ca.vertcat(*(angles[name][order] for name in names)) for order in range(3))))
+    moved = map_motion(columns, Motion(*(ca.vertcat(*(angles[name][order] for name in names)) for order in range(3))))
     frames = {}
     for i, joint in enumerate(joints):
         axes = Motion(*(part[:, 4 * i : 4 * i + 3] for part in moved))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import ExactValues, exact_model
+from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.formulation import Constraint, GaitProblem, load
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -14,7 +14,7 @@ from tests.backends.toys import corner, row, row_violations, toy
 
 
 def evaluate(problem: GaitProblem, x: tuple[float, ...]) -> ExactValues:
-    return exact_model(problem).at(x, problem.p)
+    return build_exact_model(problem).at(x, problem.p)
 
 
 def test_cost_rows_and_violation_by_hand() -> None:
@@ -29,8 +29,8 @@ def test_cost_rows_and_violation_by_hand() -> None:
 def test_a_candidate_outside_the_bounds_violates_them_in_units_of_their_range() -> None:
     out = evaluate(toy(corner), (3.0, 1.0))
     assert out.violation == pytest.approx(1.0 / 4.0)
-    assert exact_model(toy(corner)).row_names == ("row", "bounds[x]", "bounds[y]")
-    assert exact_model(toy(corner)).row_units == ("m", "m", "m")
+    assert build_exact_model(toy(corner)).row_names == ("row", "bounds[x]", "bounds[y]")
+    assert build_exact_model(toy(corner)).row_units == ("m", "m", "m")
 
 
 def test_a_two_sided_row_counts_both_ways() -> None:
@@ -53,7 +53,7 @@ def test_what_is_maximised_costs_its_negative_and_is_indexed_as_it_is() -> None:
 def test_values_of_parameters_reach_the_function_without_building_it_anew() -> None:
     problem = toy(corner)
     other = problem.with_values(**{"limit": 1.0, "x.lower": 0.5})
-    assert exact_model(other) is exact_model(problem)
+    assert build_exact_model(other) is build_exact_model(problem)
     assert evaluate(other, (0.0, 1.5)).violation == pytest.approx(10.0 + 0.5 / 4.0)
 
 
@@ -69,7 +69,7 @@ def test_violated_rows_are_named_worst_first() -> None:
 def test_the_rows_of_a_nao_phase_are_all_there_and_named(name: str, rows: int) -> None:
     """11 samples of 10 angles, 2 knees and 2 margins, 10 changes of 22 torques, 2 means, and the variables' bounds."""
     assert rows - len(load(name).names) == 11 * (10 + 2 + 2) + 10 * 22 + 2
-    exact = exact_model(load(name))
+    exact = build_exact_model(load(name))
     assert len(exact.row_names) == len(set(exact.row_names)) == len(exact.row_units) == rows
     assert {"joint_angle[LKneePitch, 3]", "torque_change[RWristYaw, 9]", "dbm_x[10]", "dbm_y_mean"} < set(
         exact.row_names

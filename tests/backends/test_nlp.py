@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import LiftedSenseError
 from nlp_gait.formulation import Constraint, load
@@ -27,7 +27,7 @@ ROUNDING = 1e-9
 def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
     """Along random directions, at a start point whose knees are bent."""
     problem = load(name)
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     x, f, g = model.nlp["x"], model.nlp["f"], model.nlp["g"]
     values = ca.Function("values", [x, model.nlp["p"]], [f, g])
     slopes = ca.Function("slopes", [x, model.nlp["p"]], [ca.gradient(f, x), ca.jacobian(g, x)])
@@ -49,7 +49,7 @@ def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
 def test_with_lifted_variables_at_their_exact_values_the_nlp_is_the_exact_problem(name: str) -> None:
     """At a reachable point, and away from the jump that single support smooths."""
     problem = load(name)
-    model, exact = nlp_model(problem), exact_model(problem)
+    model, exact = build_nlp(problem), build_exact_model(problem)
     x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: model.variables]
     if name == "nao-dsp":
         x[-1] = 1.0
@@ -95,7 +95,7 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
     exact = np.array([start.objective for start in solution.starts if start.success])
     grid = np.array(np.meshgrid(np.linspace(-2, 2, 81), np.linspace(-1, 3, 81))).reshape(2, -1).T
     problem = toy(mathematics)
-    at = [exact_model(problem).at(x, problem.p) for x in grid]
+    at = [build_exact_model(problem).at(x, problem.p) for x in grid]
     searched = [values.cost for values in at if values.violation <= ROUNDING]
     assert exact.min() == pytest.approx(min(searched), abs=1e-6)  # every optimum here lies on the grid
 
@@ -103,19 +103,19 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
 @pytest.mark.parametrize(("mathematics", "where"), BAD.values(), ids=BAD.keys())
 def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: str) -> None:
     with pytest.raises(LiftedSenseError, match=f"toy: .*{where}.*the lifted NLP would be wrong"):
-        nlp_model(toy(mathematics))
+        build_nlp(toy(mathematics))
 
 
 def test_the_sense_of_the_objective_counts() -> None:
     def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return ops.abs(x), ()
 
-    nlp_model(toy(mathematics, "minimise"))
+    build_nlp(toy(mathematics, "minimise"))
     with pytest.raises(LiftedSenseError):
-        nlp_model(toy(mathematics, "maximise"))
+        build_nlp(toy(mathematics, "maximise"))
 
 
 def test_copies_with_other_values_share_one_nlp() -> None:
     problem = toy(corner)
-    assert nlp_model(problem) is nlp_model(problem.with_values(limit=1.5)) is nlp_model(problem.fix(x=1.0))
-    assert nlp_model(problem) is not nlp_model(toy(corner))
+    assert build_nlp(problem) is build_nlp(problem.with_values(limit=1.5)) is build_nlp(problem.fix(x=1.0))
+    assert build_nlp(problem) is not build_nlp(toy(corner))

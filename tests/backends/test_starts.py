@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.solvers.solver import Solver, judged
+from nlp_gait.backends.solvers.solver import Solver, judge_point
 from nlp_gait.backends.starts import available_workers
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.formulation import Array, GaitProblem
@@ -44,7 +44,7 @@ class Scripted(Solver):
             self.at_others(stop)
         status = "was interrupted" if stop() else f"in process {os.getpid()}"
         nothing = Evaluations()
-        return judged(
+        return judge_point(
             self.name, problem, x0, x0, claimed=False, status=status, iterations=0, evaluations=nothing, time_s=0.0
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.export.solver import export_solver
 
 
@@ -27,7 +27,7 @@ def test_the_example_in_c_finds_casadis_numbers(tmp_path: Path) -> None:
     done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True, timeout=60)
     f, violation, slope, curvature, apart = (float(line[29:].split(",")[0]) for line in done.stdout.splitlines())
 
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     nlp, width = model.nlp, model.widths[-1]
     w, p = model.start(problem, (problem.lower + problem.upper) / 2, width), np.append(problem.p, width)
     total, x = nlp["f"] + ca.sum1(nlp["g"]), nlp["x"]

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from metaheuristics import ParticleSwarm
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, _private_folder, _warn_once, cache_folder
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, _private_folder, _warn_once, find_cache_folder
 from tests.faults.processes import ROOT
 
 RUN = CliRunner()
@@ -91,7 +91,7 @@ def test_a_user_without_a_home_compiles_in_a_temporary_folder(
     monkeypatch.setattr(Path, "home", no_home)
     monkeypatch.chdir(tmp_path)
     _warn_once.cache_clear()
-    folder = cache_folder()
+    folder = find_cache_folder()
     assert folder == _private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
     assert "Could not determine home directory." in caplog.text
 

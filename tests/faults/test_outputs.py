@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli.command import PLAIN, run_app
-from nlp_gait import load, solve, solver
+from nlp_gait import load, solve, make_solver
 from nlp_gait.backends.kernel.compiler import _find, find_compiler
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import one_sentence
@@ -136,5 +136,5 @@ def test_a_compiler_that_is_no_command_line_is_passed_over(named: str, monkeypat
 def test_slsqp_with_every_variable_fixed_ends_at_that_point() -> None:
     problem = load("walk12")
     x = problem.by_name((problem.lower + problem.upper) / 2)
-    found = solve(problem, fix=x, solver=solver("slsqp"))
+    found = solve(problem, fix=x, solver=make_solver("slsqp"))
     assert dict(found.x) == pytest.approx(x) and found.iterations == 0

@@ -174,7 +174,7 @@ ALLOWED = {
     "compare/drawing/figures.py",
     "compare/drawing/shown_figure.py",  # into memory
     "compare/papers/nao/nao_runs.py",
-    "compare/questions/certainty/branch_and_bound.py",
+    "nlp_gait/proofs/branch_and_bound.py",
     "nlp_gait/processes.py",  # /dev/null
 }
 WRITING = ("write_text", "write_bytes", "savefig", "savez", "savez_compressed", "replace", "rename", "mkdir", "touch")

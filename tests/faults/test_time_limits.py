@@ -15,7 +15,7 @@ from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.solvers import iteration_watch, nlpsol
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
-from nlp_gait.backends.solvers.registry import solver
+from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import InputError
 
 WALK = ProblemSpec(name="walk12")
@@ -65,7 +65,7 @@ def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -
 def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = nlp_gait.load("walk12")
     slow_iterations(monkeypatch, 0.02)
-    end = solver(name, time_limit_s=0.03).run(problem, problem.start_point(np.random.default_rng(0)))
+    end = make_solver(name, time_limit_s=0.03).run(problem, problem.start_point(np.random.default_rng(0)))
     assert (end.success, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
     record = attempt(Task(problem=WALK, algorithm=name, stop=Stop(time_limit_s=0.03)))
     assert record.status == "stopped at the time limit" and not record.success and record.x
@@ -76,7 +76,7 @@ def test_a_solver_that_cannot_heed_it_is_refused_by_name(tmp_path: Path) -> None
     with pytest.raises(InputError, match="fatrop cannot be stopped at a time limit; leave out fatrop, or the limit"):
         run_study(Study(tasks=(task,), folder=tmp_path))
     with pytest.raises(InputError, match="fatrop has no settings, got 'time_limit_s'"):
-        solver("fatrop", time_limit_s=1.0)
+        make_solver("fatrop", time_limit_s=1.0)
 
 
 def test_a_linear_solver_that_is_not_there_is_said_and_never_replaced() -> None:

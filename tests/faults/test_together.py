@@ -19,7 +19,7 @@ import pytest
 import nlp_gait
 from benchmarks.faults import together
 from compare.judge import evaluate
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.formulation import GaitProblem
 from tests.backends.toys import corner, toy
@@ -188,7 +188,7 @@ def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[],
     assert len(text) < 20_000
     again = pickle.loads(text)
     assert same(again, problem)
-    assert exact_model(pickle.loads(text)) is exact_model(again)  # built once
+    assert build_exact_model(pickle.loads(text)) is build_exact_model(again)  # built once
     assert copy.deepcopy(problem) is copy.copy(problem) is problem
 
 

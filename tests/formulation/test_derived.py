@@ -11,8 +11,8 @@ from casadi import MX
 
 import nlp_gait
 from compare.judge import evaluate
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -46,7 +46,7 @@ def walk() -> GaitProblem:
 
 def built(problem: GaitProblem) -> GaitProblem:
     """The problem after its functions were built, which a changed copy must not find."""
-    exact_model(problem), nlp_model(problem), problem.dense(2)
+    build_exact_model(problem), build_nlp(problem), problem.dense(2)
     return problem
 
 
@@ -64,7 +64,7 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
         changed = changed.derive(change=doubled)
     x = [1.5, 0.0]
     assert evaluated(problem, x).cost == 2.5 and evaluated(changed, x).cost == 5.0
-    assert nlp_model(changed) is not nlp_model(problem)
+    assert build_nlp(changed) is not build_nlp(problem)
     assert changed.values == ({"limit": 0.25} if "values" in how else {})
     f, _ = nlp_gait.compile_objective(changed)(np.array([x]))
     assert f[0] == pytest.approx(5.0)

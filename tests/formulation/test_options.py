@@ -12,7 +12,7 @@ import pytest
 
 from compare.judge import evaluate
 from compare.study.task import ProblemSpec, Task
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
 from nlp_gait.formulation.registry import PROBLEMS, problem_maker
@@ -85,7 +85,7 @@ def test_recorded_options_make_the_same_problem(name: str) -> None:
     problem = load(name, **others(name))
     again = load(problem.name, **problem.options)
     assert (again.options, again.grid) == (problem.options, problem.grid)
-    assert exact_model(again).row_names == exact_model(problem).row_names
+    assert build_exact_model(again).row_names == build_exact_model(problem).row_names
     x = problem.lower + 0.4 * (problem.upper - problem.lower)
     here, there = evaluated(problem, x), evaluated(again, x)
     for key in ("cost", "violation", "g", "lower", "upper"):

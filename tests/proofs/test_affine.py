@@ -9,7 +9,7 @@ from casadi import SX
 
 import nlp_gait
 from benchmarks.guarantees.enclosures import OPERATIONS, QUADRATIC, lost
-from nlp_gait.backends.kernel.kernel_source import kernel_of
+from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.proofs.affine import AffineFunction
 
@@ -31,7 +31,7 @@ def test_every_operation_holds_exact_values_at_random_points(name: str, quadrati
 @pytest.mark.parametrize("name", ["walk12", "nao-dsp"])
 def test_problems_hold_every_value_at_sampled_points_of_random_boxes(name: str) -> None:
     problem = nlp_gait.load(name, intervals=2)
-    kernel, rng = kernel_of(problem), np.random.default_rng(SEED)
+    kernel, rng = build_kernel(problem), np.random.default_rng(SEED)
     function, n = AffineFunction(kernel.function), len(problem.names)
     symbols = np.r_[np.arange(n), np.full(len(problem.p), -1)]
     finite = 0

@@ -16,7 +16,7 @@ from benchmarks.guarantees.boxes import lost
 from benchmarks.guarantees.nao import around as box_around
 from benchmarks.guarantees.nao import within
 from compare.analysis.proven import CERTIFICATES
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError, OwnCodeError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaitbench.facts import load_facts
@@ -65,9 +65,9 @@ def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: st
 def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
     problem, best = nlp_gait.load("nao-dsp"), np.array(load_facts()[GAITS["nao-dsp"]].best_x)
     gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
-    costs = [exact_model(problem).at(x, problem.p).cost for x in gaits]
+    costs = [build_exact_model(problem).at(x, problem.p).cost for x in gaits]
     wrong = gaits[int(np.argmin(np.abs(np.array(costs) / costs[0] - 1.03)))]
-    cost = exact_model(problem).at(wrong, problem.p).cost
+    cost = build_exact_model(problem).at(wrong, problem.p).cost
     assert 1.02 * costs[0] < cost < 1.04 * costs[0]
     half = 2.0**-7 * (problem.upper - problem.lower)
     ends = (
@@ -84,7 +84,7 @@ def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
     problem, best = around("nao-dsp", 2.0**-4)
     cheat = best.copy()
     cheat[5] *= 0.9  # less sway: too small a margin
-    at = exact_model(problem).at(cheat, problem.p)
+    at = build_exact_model(problem).at(cheat, problem.p)
     assert at.violation > 1e-5
     with pytest.raises(InputError, match="infeasible"):
         certify(problem, cheat)
@@ -147,7 +147,7 @@ def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pyte
 def test_a_wrong_incumbent_is_never_certified() -> None:
     problem, best = walk()
     wrong = best + 0.03 * (np.array([0.05, 0.05, 0.05, 0.05]) - best)
-    costs = [exact_model(problem).at(x, problem.p).cost for x in (best, wrong)]
+    costs = [build_exact_model(problem).at(x, problem.p).cost for x in (best, wrong)]
     assert costs[1] > costs[0] + 0.01 * abs(costs[0])  # worse than the tolerance allows
     found = certify(problem, wrong, tolerance=1e-3, time_limit_s=0.5)
     assert not found.closed and -found.bound <= costs[0]
@@ -159,7 +159,7 @@ def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> N
     file = certificate_file(PROBLEM, honest)
     assert check(file, paths=20).paths == 20
     valley = np.array([0.987, 0.0])  # the worse one
-    at = exact_model(PROBLEM).at(valley, PROBLEM.p).cost
+    at = build_exact_model(PROBLEM).at(valley, PROBLEM.p).cost
     forged = replace(honest, objective=at, bound=at * (1 - 1e-3), x=tuple(valley.tolist()))
     with pytest.raises(InputError, match="do not end"):
         check(replace(file, certificate=forged), paths=20)

@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import power_form as power_form_module
@@ -145,7 +145,7 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
 
 def test_boxes_that_hold_the_best_gait_keep_it_and_have_bounds_that_end_in_its_cost() -> None:
     problem, x = nlp_gait.load("nao-ssp"), np.array(load_facts()["ssp-v5"].best_x)
-    cost, form, z = exact_model(problem).at(x, problem.p).cost, power_form(problem), to_z(x)
+    cost, form, z = build_exact_model(problem).at(x, problem.p).cost, power_form(problem), to_z(x)
     half = np.diff(form.root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
     boxes = np.stack([np.maximum(form.root[:, 0], z - half), np.minimum(form.root[:, 1], z + half)], -1)
     found = form.assess(boxes, cost * (1 + 1e-6))

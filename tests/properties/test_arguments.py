@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import metaheuristics as search
-from nlp_gait import GaitError, IpoptSettings, compile_objective, load, solve, solver
+from nlp_gait import GaitError, IpoptSettings, compile_objective, load, solve, make_solver
 
 WRONG: tuple[Any, ...] = (
     None,
@@ -81,7 +81,7 @@ def test_one_typed_error_names_the_argument(argument: str) -> None:
 
 @pytest.mark.parametrize("settings", [IpoptSettings, "ipopt"])
 def test_a_solver_is_one_with_its_settings(settings: Any) -> None:
-    with pytest.raises(GaitError, match="nlp_gait.solver"):
+    with pytest.raises(GaitError, match="nlp_gait.make_solver"):
         solve(PROBLEM, solver=settings)
 
 

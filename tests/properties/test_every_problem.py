@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import WIDTHS, NlpModel, nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.registry import PROBLEMS
@@ -87,7 +87,9 @@ def test_a_violation_is_zero_if_and_only_if_every_row_holds(
         found = evaluated(candidate, x)
         excess = np.maximum(np.maximum(found.lower - found.g, found.g - found.upper), 0.0)
         assert (found.violation == 0.0) == (not found.broken)
-        assert found.violation == pytest.approx(float(excess @ (1 / exact_model(problem).row_scales)), rel=ROUNDING)
+        assert found.violation == pytest.approx(
+            float(excess @ (1 / build_exact_model(problem).row_scales)), rel=ROUNDING
+        )
 
 
 def relaxed(problem: GaitProblem) -> GaitProblem:
@@ -121,7 +123,7 @@ def solved(name: str) -> tuple[GaitProblem, Outcome]:
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solved(name)
     assert end.success and end.guess is not None
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     lifted = ca.Function("lifted", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"]])
     cost = float(lifted(end.guess.primal, np.append(problem.p, WIDTHS[-1])))
     assert cost == pytest.approx(end.cost, rel=SOLVED)
@@ -145,7 +147,7 @@ def test_no_start_ends_below_what_the_exact_functions_find_around_it(name: str) 
 def inside(name: str) -> tuple[NlpModel, Array, Array]:
     """NLP, a start point of its variables within the bounds, and its parameters with the widest sigmoid."""
     problem = problem_of(name)
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     start = model.start(problem, problem.start_point(np.random.default_rng(0)), WIDTHS[0])
     return model, start, np.append(problem.p, WIDTHS[0])
 
@@ -194,7 +196,7 @@ def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_row_and_index_has_its_own_name(name: str) -> None:
-    model = exact_model(problem_of(name))
+    model = build_exact_model(problem_of(name))
     for names in (model.row_names, model.index_names):
         assert len(set(names)) == len(names)
     assert len(model.row_names) == len(model.row_units) == len(model.row_scales)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from tests.referee import nao, stairs, stairs_ideal, walk12
 
@@ -45,7 +45,7 @@ def compared(problem: GaitProblem, referee: Referee, X: Array, of: str = "") -> 
         X: (P, n).
         of: only rows whose names begin so.
     """
-    model = exact_model(problem)
+    model = build_exact_model(problem)
     cost, _, g, _, _, indexes = (np.array(value) for value in model.function(X.T, problem.p))
     with np.errstate(invalid="ignore"):  # beyond the arc of the hip, between samples
         expected = referee(X)

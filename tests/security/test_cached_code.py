@@ -11,7 +11,7 @@ import pytest
 
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.kernel.library_cache import cache_folder, load_library
+from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_library
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
 
@@ -55,16 +55,16 @@ def test_a_library_or_folder_of_somebody_else_is_not_used(cache: Path) -> None:
     os.chown(library, 12345, -1)
     assert built().stat().st_uid == os.getuid()
     os.chown(cache, 12345, -1)
-    assert cache_folder() != cache
+    assert find_cache_folder() != cache
     assert built().parent != cache
 
 
 def test_a_folder_that_is_a_link_or_open_to_others_is_not_used(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     cache.symlink_to(tmp_path / "elsewhere")
-    assert cache_folder() != cache
+    assert find_cache_folder() != cache
     assert built().parent != cache and not list((tmp_path / "elsewhere").iterdir())
     cache.unlink()
     cache.mkdir()
     cache.chmod(0o777)
-    assert cache_folder() != cache
+    assert find_cache_folder() != cache

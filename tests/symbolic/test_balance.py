@@ -7,7 +7,7 @@ import pytest
 from casadi import DM, SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_point_masses, zmp_of_wrench
+from nlp_gait.symbolic.balance import LEAST_LOAD, combine_zmps, ground_load, zmp_of_point_masses, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench
 
 WEIGHT = 100.0
@@ -37,12 +37,12 @@ def test_the_load_is_the_vertical_force_but_in_free_fall() -> None:
 
 def test_two_feet_share_the_zmp_by_their_loads() -> None:
     zmps, loads = [SX(DM([0.0, 0.1])), SX(DM([0.4, -0.1]))], [SX(30.0), SX(10.0)]
-    assert numbers(combined_zmp(zmps, loads)) == pytest.approx([0.1, 0.05])
+    assert numbers(combine_zmps(zmps, loads)) == pytest.approx([0.1, 0.05])
 
 
 def test_feet_of_unequal_number_are_refused() -> None:
     with pytest.raises(ValueError, match="longer"):
-        combined_zmp([SX(2, 1)], [SX(1), SX(1)])
+        combine_zmps([SX(2, 1)], [SX(1), SX(1)])
 
 
 def points(vertical: tuple[float, float] = (0.0, 0.0)) -> tuple[DM, SX, SX]:

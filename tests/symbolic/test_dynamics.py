@@ -12,8 +12,8 @@ from casadi import SX
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import Body, tree_from, weld
-from nlp_gait.symbolic.balance import LEAST_LOAD, combined_zmp, ground_load, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regrouped_inertias
+from nlp_gait.symbolic.balance import LEAST_LOAD, combine_zmps, ground_load, zmp_of_wrench
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regroup_inertias
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 
 GRAVITY = 9.8
@@ -172,12 +172,12 @@ def test_in_free_fall_the_zmp_is_far_away_and_finite() -> None:
 
 def test_the_combined_zmp_is_the_load_weighted_mean_and_ignores_an_unloaded_foot() -> None:
     feet = [SX([0.0, 0.1]), SX([0.2, -0.1])]
-    assert np.array(ca.DM(combined_zmp(feet, [SX(10), SX(30)]))).ravel() == pytest.approx([0.15, -0.05])
-    assert np.array(ca.DM(combined_zmp(feet, [SX(10), SX(0)]))).ravel() == pytest.approx([0.0, 0.1])
+    assert np.array(ca.DM(combine_zmps(feet, [SX(10), SX(30)]))).ravel() == pytest.approx([0.15, -0.05])
+    assert np.array(ca.DM(combine_zmps(feet, [SX(10), SX(0)]))).ravel() == pytest.approx([0.0, 0.1])
 
 
 def test_regrouping_leaves_mass_in_the_first_body_only_and_none_along_the_axes() -> None:
-    first, *others = regrouped_inertias(TREE)
+    first, *others = regroup_inertias(TREE)
     assert first.mass == pytest.approx(ROBOT.mass_kg)
     for body, inertia in zip(TREE[1:], others, strict=True):
         assert body.joint is not None
@@ -188,9 +188,9 @@ def test_regrouping_leaves_mass_in_the_first_body_only_and_none_along_the_axes()
 
 
 def test_links_that_are_kept_neither_give_nor_take() -> None:
-    plain = {body.link.name: inertia for body, inertia in zip(TREE, regrouped_inertias(TREE), strict=True)}
+    plain = {body.link.name: inertia for body, inertia in zip(TREE, regroup_inertias(TREE), strict=True)}
     names = [body.link.name for body in TREE]
-    kept = dict(zip(names, regrouped_inertias(TREE, kept=["torso"]), strict=True))
+    kept = dict(zip(names, regroup_inertias(TREE, kept=["torso"]), strict=True))
     assert kept["torso"].mass == pytest.approx(ROBOT.links["torso"].mass_kg)
     for body in TREE[1:]:
         beside = "torso" in (body.link.name, TREE[body.parent].link.name)

@@ -22,7 +22,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics
-from nlp_gait.symbolic.leg_poses import flat_foot_poses
+from nlp_gait.symbolic.leg_poses import sample_flat_foot_poses
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion
 from tests.robots.crooked import crooked
@@ -61,7 +61,7 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Robot]:
 
 def pose(leg: Leg, k: int) -> tuple[Array, float, float]:
     """Place of the torso's origin over the foot's [m], roll and pitch, of one of the poses."""
-    column = flat_foot_poses(leg, POSES)[:, k]
+    column = sample_flat_foot_poses(leg, POSES)[:, k]
     rotation = column[3:].reshape(3, 3).T
     pitch, roll = float(np.arctan2(-rotation[2, 0], rotation[0, 0])), float(np.arctan2(-rotation[1, 2], rotation[1, 1]))
     return column[:3] - rotation @ leg.hip_m, roll, pitch
@@ -95,7 +95,7 @@ def test_the_guess_is_exact_where_hip_and_ankle_axes_meet(robots: dict[str, Robo
     meeting = np.array([*[leg.hip_m] * 3, leg.points[3], *[leg.ankle_m] * 2])
     turns = Rotation.from_rotvec(0.2 * np.random.default_rng(3).standard_normal((6, 3)))
     skew = replace(leg, points=meeting, axes=turns.apply(leg.axes))
-    left = residuals(skew, 0, flat_foot_poses(skew, POSES))
+    left = residuals(skew, 0, sample_flat_foot_poses(skew, POSES))
     assert np.mean(left < PLACE_TOLERANCE) > 0.6
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from nlp_gait.symbolic.splines import DEGREE, basis_table, coefficient_count, finer, fitted, spline
+from nlp_gait.symbolic.splines import DEGREE, count_coefficients, fit_spline, refine_spline, spline, tabulate_basis
 
 # The third derivative of 16 spans reaches 1e5; double precision leaves 1e-11 of it.
 TOLERANCE, DERIVATIVE_SHARE = 1e-12, 1e-11
@@ -29,16 +29,16 @@ def scipy_spline(coefficients: np.ndarray) -> BSpline:
 @pytest.mark.parametrize("spans", SPANS)
 @pytest.mark.parametrize("order", range(4))
 def test_derivatives_are_those_of_scipy(spans: int, order: int) -> None:
-    coefficients = np.random.default_rng(spans).normal(size=coefficient_count(spans))
+    coefficients = np.random.default_rng(spans).normal(size=count_coefficients(spans))
     expected = scipy_spline(coefficients)(PHASES, nu=order)
-    got = basis_table(spans, PHASES, order).T @ coefficients
+    got = tabulate_basis(spans, PHASES, order).T @ coefficients
     np.testing.assert_allclose(got, expected, rtol=0, atol=DERIVATIVE_SHARE * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("spans", SPANS)
 def test_a_motion_is_a_spline_in_time(spans: int) -> None:
     """Over 4 s, whose powers are exact."""
-    coefficients = np.random.default_rng(spans).normal(size=coefficient_count(spans))
+    coefficients = np.random.default_rng(spans).normal(size=count_coefficients(spans))
     phase = SX.sym("phase")
     motion = ca.Function("motion", [phase], list(spline(SX(ca.DM(coefficients)), SX(4.0), phase)))
     for s in (0.0, 0.2, 0.5, 0.77, 1.0):
@@ -52,34 +52,37 @@ def test_a_motion_is_a_spline_in_time(spans: int) -> None:
 def test_ends_and_their_velocities_stay(spans: int) -> None:
     ends = np.array([0.0, 1.0])
     for order in (0, 1):
-        assert np.abs(basis_table(spans, ends, order)).max() == 0.0
-    assert np.abs(basis_table(spans, ends, 2)).max() > 1.0
+        assert np.abs(tabulate_basis(spans, ends, order)).max() == 0.0
+    assert np.abs(tabulate_basis(spans, ends, 2)).max() > 1.0
 
 
 def test_no_coefficients_are_no_motion() -> None:
-    assert coefficient_count(0) == 0
+    assert count_coefficients(0) == 0
     assert all(part.shape == (2, 1) and part.is_zero() for part in spline(SX(0, 2), SX(1.0), SX(0.3)))
 
 
 @given(seed=seeds, spans=st.sampled_from(SPANS[:-1]), times=st.sampled_from([1, 2, 4]))
 def test_every_spline_is_one_with_more_spans_whose_coefficients_are_averages(seed: int, spans: int, times: int) -> None:
-    coefficients = np.random.default_rng(seed).normal(size=(coefficient_count(spans), 2))
-    more = finer(coefficients, times * spans)
-    assert more.shape == (coefficient_count(times * spans), 2)
+    coefficients = np.random.default_rng(seed).normal(size=(count_coefficients(spans), 2))
+    more = refine_spline(coefficients, times * spans)
+    assert more.shape == (count_coefficients(times * spans), 2)
     np.testing.assert_allclose(
-        basis_table(times * spans, PHASES).T @ more, basis_table(spans, PHASES).T @ coefficients, rtol=0, atol=TOLERANCE
+        tabulate_basis(times * spans, PHASES).T @ more,
+        tabulate_basis(spans, PHASES).T @ coefficients,
+        rtol=0,
+        atol=TOLERANCE,
     )
     assert np.abs(more).max() <= np.abs(coefficients).max() + TOLERANCE
 
 
 def test_a_curve_that_does_not_move_becomes_a_spline_of_zeros() -> None:
-    assert not finer(np.zeros((0, 3)), 4).any()
-    assert finer(np.zeros((0, 3)), 4).shape == (5, 3)
+    assert not refine_spline(np.zeros((0, 3)), 4).any()
+    assert refine_spline(np.zeros((0, 3)), 4).shape == (5, 3)
 
 
 def test_a_quintic_with_still_ends_is_found_by_fitting() -> None:
     """By hand: s^2 (1 - s)^2 (2 - 3 s)."""
     values = PHASES**2 * (1 - PHASES) ** 2 * (2 - 3 * PHASES)
-    found = fitted(values[:, None], 1, PHASES)
+    found = fit_spline(values[:, None], 1, PHASES)
     # Bernstein polynomials of degree 5 with still ends: 10 s^2 (1 - s)^3 and 10 s^3 (1 - s)^2.
     assert found[:, 0] == pytest.approx([0.2, -0.1], abs=TOLERANCE)

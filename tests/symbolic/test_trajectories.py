@@ -9,7 +9,7 @@ from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, stack, through
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, map_motion, parabola_lift, stack
 
 # Positions, velocities and times of order one in double precision.
 TOLERANCE = 1e-10
@@ -66,7 +66,7 @@ def test_derivatives_of_the_lift_are_those_of_its_height() -> None:
 
 
 def test_what_stands_still_has_no_derivatives_and_costs_nothing() -> None:
-    motion = stack(constant(1.5), constant(-2.0))
+    motion = stack(constant_motion(1.5), constant_motion(-2.0))
     assert [float(v) for v in ca.vertsplit(motion.position)] == [1.5, -2.0]
     assert motion.velocity.is_zero()
     assert motion.acceleration.is_zero()
@@ -83,7 +83,7 @@ def test_a_function_of_a_motion_by_the_chain_rule() -> None:
     motion = Motion(SX([2.0, 1.0]), SX([3.0, -1.0]), SX([10.0, 1.0]))
     position, velocity, acceleration = (
         [float(v) for v in ca.vertsplit(part)]
-        for part in through(lambda q: ca.vertcat(q[0] ** 2 * q[1], ca.sin(q[1])), motion)
+        for part in map_motion(lambda q: ca.vertcat(q[0] ** 2 * q[1], ca.sin(q[1])), motion)
     )
     sin, cos = np.sin(1.0), np.cos(1.0)
     assert position == pytest.approx([4.0, sin])

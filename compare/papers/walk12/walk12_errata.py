@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.papers.walk12.walk12_paper import F1MAX
 from compare.papers.walk12.walk12_runs import CORNER_M, walk
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
 
@@ -41,7 +41,7 @@ def corner_slopes() -> dict[str, float]:
     if dense is None:
         raise TypeError("walk12 has a grid that can be refined")
     problem = dense.with_values(**{"lambda": 0.15, "f1max": F1MAX})
-    function, corner = exact_model(problem).function, np.full(4, CORNER_M)
+    function, corner = build_exact_model(problem).function, np.full(4, CORNER_M)
 
     def f(x: np.ndarray) -> float:
         return -float(function(x, problem.p)[0])

@@ -67,7 +67,7 @@ def multistart(
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
     chosen = solver or IpoptSettings()
-    ready = chosen.ready_for(problem, starts)
+    ready = chosen.prepare(problem, starts)
     steps = Steps(out, progress, code=[sys.modules[__name__]], anew=anew)
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
     rows: list[list[Any]] = []

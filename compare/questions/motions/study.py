@@ -15,7 +15,7 @@ from compare.judge import evaluate
 from compare.questions.kept import Finished
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
 from compare.study.steps import Steps
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -25,7 +25,7 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.biped.curves import SPANS
 from nlp_gait.gaits.nao.single_support_free import fitted_start
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.symbolic.splines import finer
+from nlp_gait.symbolic.splines import refine_spline
 
 # A study of many variables may take longer than a single solve of few.
 TIME_LIMIT_S, ITERATIONS = 3600.0, 1000
@@ -163,7 +163,7 @@ def _embedded(x: Mapping[str, float], names: Sequence[str], spans: int) -> Array
         curves.setdefault(name.partition("[")[0], []).append(value)
     found = [np.array(curves[name]) for name in names if "[" not in name]
     for curve in dict.fromkeys(name.partition("[")[0] for name in names if "[" in name):
-        found.append(finer(np.array(curves.get(curve, [])), spans))
+        found.append(refine_spline(np.array(curves.get(curve, [])), spans))
     return np.concatenate(found)
 
 
@@ -172,7 +172,7 @@ def _objectives(task: MotionTask, x: Array) -> dict[str, float]:
     if task.trajectory != SMOOTH_ORDER or task.kind not in (PLANNED, SMOOTHED):
         return {}
     problems = [task.spec.with_options(objective=name).load() for name in SMOOTH]
-    return {f"{p.objective.name} [{p.objective.unit}]": exact_model(p).at(x, p.p).cost for p in problems}
+    return {f"{p.objective.name} [{p.objective.unit}]": build_exact_model(p).at(x, p.p).cost for p in problems}
 
 
 def limit(powers: Sequence[float]) -> float | None:

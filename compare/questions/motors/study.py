@@ -10,7 +10,7 @@ import numpy as np
 
 from compare.questions.kept import Finished
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -115,7 +115,7 @@ def motor_variants(
             x = problem.check_x(solution.x)
             unmoved = x if first is None else first
             moves = np.abs(x - unmoved) / problem.scale
-            unchanged = exact_model(problem).at(unmoved, problem.p)
+            unchanged = build_exact_model(problem).at(unmoved, problem.p)
             found.append(
                 Variant(
                     name=name,
@@ -125,7 +125,7 @@ def motor_variants(
                     power_W=solution.objective,
                     unchanged_power_W=unchanged.cost,
                     unchanged_violation=unchanged.violation,
-                    published_power_W=exact_model(published).at(x, published.p).cost,
+                    published_power_W=build_exact_model(published).at(x, published.p).cost,
                     x=solution.x,
                     moved=(float(moves.max()), problem.names[int(moves.argmax())]),
                     uses=limit_uses(limited[",rotor" if "rotor" in features else ""], x),
@@ -139,7 +139,7 @@ def motor_variants(
 
 def limit_uses(limited: GaitProblem, x: Array) -> dict[str, Use]:
     """Largest shares of the motors' limits that x (n,) uses, in a problem with ``motors=limits``."""
-    names, at = exact_model(limited).row_names, exact_model(limited).at(x, limited.p)
+    names, at = build_exact_model(limited).row_names, build_exact_model(limited).at(x, limited.p)
     uses = {}
     for kind, groups in USES.items():
         rows = [i for i, name in enumerate(names) if name.partition("[")[0] in groups]

@@ -11,7 +11,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated, point_at
 from compare.questions.pareto.search import REFERENCE, Scale, SearchFront
 from metaheuristics.array import Array
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -125,7 +125,7 @@ def challenge(
     excess: list[float] = []
     infeasible = moved = 0
     for point in lowest:
-        exact = exact_model(free).at(point.x, free.p)
+        exact = build_exact_model(free).at(point.x, free.p)
         if not exact.violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Array, Assembly, GaitProblem, Objective, Parameter, Point
@@ -46,7 +46,7 @@ class Margin:
 
     def value(self, problem: GaitProblem, x: Array) -> float:
         """Exact value at x (n,)."""
-        return exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
+        return build_exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
 
     def values(self, objective: CompiledObjective, X: Array) -> Array:
         """(P,) values of candidates (P, n)."""

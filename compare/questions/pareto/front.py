@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.questions.pareto.competing import REWARD, CompetingObjective, rewarding
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.optima.continuation import Continuation, best_success
-from nlp_gait.backends.solve import solution_of, solve
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
+from nlp_gait.backends.solve import make_solution, solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
@@ -82,7 +82,7 @@ def pareto_front(
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
     free = criterion.freed(problem)
     low, high = front_ends(free, criterion, starts, seed, solver)
-    ready = (solver or IpoptSettings()).ready_for(free, SOLVES)
+    ready = (solver or IpoptSettings()).prepare(free, SOLVES)
     rng = np.random.default_rng(seed)
     found: dict[float, list[Outcome]] = {}
 
@@ -111,7 +111,7 @@ def pareto_front(
         limited = criterion.limited(free, at)
         warm = (ready.run_from(limited, end) for end in neighbours)
         found[at] = [*found.get(at, []), *(end for end in warm if end is not None)]
-        if best_success(found[at]) is None:
+        if find_cheapest_feasible(found[at]) is None:
             for end in neighbours:
                 attempt(at, end.x)
         progress(f"{criterion.name} {at:.5g} {criterion.unit}")
@@ -126,7 +126,7 @@ def point_at(
     """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
     limited = criterion.limited(free, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
-    return _point(free, criterion, least, [(solver or IpoptSettings()).ready_for(free, SOLVES).run(limited, x0)])
+    return _point(free, criterion, least, [(solver or IpoptSettings()).prepare(free, SOLVES).run(limited, x0)])
 
 
 def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
@@ -156,7 +156,7 @@ def front_ends(
 
 def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
     """Middle of the longest gap between neighbours that were solved, and their ends."""
-    solved = [(at, end) for at in sorted(found) if (end := best_success(found[at])) is not None]
+    solved = [(at, end) for at in sorted(found) if (end := find_cheapest_feasible(found[at])) is not None]
     at = np.array([a for a, _ in solved])
     cost = np.array([end.cost for _, end in solved])
     lengths = np.hypot(np.diff(at) / np.ptp(at), np.diff(cost) / np.ptp(cost))
@@ -167,8 +167,8 @@ def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome
 def _point(
     free: GaitProblem, criterion: CompetingObjective, at: float, outcomes: Sequence[Outcome]
 ) -> FrontPoint | None:
-    solution = solution_of(criterion.limited(free, at), outcomes)
-    best = best_success(outcomes)
+    solution = make_solution(criterion.limited(free, at), outcomes)
+    best = find_cheapest_feasible(outcomes)
     if best is None:
         return None
     price = math.nan if best.guess is None else criterion.price(solution)
@@ -182,7 +182,7 @@ def _reached(free: GaitProblem, criterion: CompetingObjective, solution: Solutio
     return FrontPoint(
         demanded=value,
         value=value,
-        power_W=exact_model(free).at(x, free.p).cost,
+        power_W=build_exact_model(free).at(x, free.p).cost,
         violation=solution.violation,
         x=tuple(x.tolist()),
     )

@@ -15,7 +15,7 @@ from compare.questions.other_robot import is_mass, present_value, with_robot
 from compare.questions.prices.price import STANDS, Price, Prices, price_from
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.backends.optima.continuation import Continuation, best_success
+from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -69,7 +69,7 @@ def solved(problem: GaitProblem, starts: int, seed: int, solver: Solver | None =
     Raises:
         InputError: none converged to a feasible point, the solver gives no multipliers, or the problem is too large.
     """
-    near = best_success(Continuation(starts=starts, seed=seed, solver=solver).run(problem))
+    near = find_cheapest_feasible(Continuation(starts=starts, seed=seed, solver=solver).run(problem))
     if near is None:
         raise InputError(
             f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
@@ -104,7 +104,7 @@ def prices(
     """
     problem = spec.load()
     finished, chosen = finished or Finished(), solver or IpoptSettings()
-    asked = {"starts": starts, "seed": seed, "solver": chosen.name, "settings": chosen.plain()}
+    asked = {"starts": starts, "seed": seed, "solver": chosen.name, "settings": chosen.to_dict()}
     finished.asked("prices", problem, **asked, checks=checks)
     kept = _KeptPrices(finished, {**fingerprint(problem), **asked}, progress)
     progress("solving")

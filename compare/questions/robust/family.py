@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.questions.other_robot import present_value, robot_name, with_robot
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import ExactValues, exact_model
+from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
@@ -64,7 +64,7 @@ class Family:
 
     def values(self, corner: Corner, x: Array) -> ExactValues:
         """Exact values at x (n,) with a corner's robot."""
-        return exact_model(self.problem(corner)).at(x, self.nominal.p)
+        return build_exact_model(self.problem(corner)).at(x, self.nominal.p)
 
     def problem(self, corner: Corner) -> GaitProblem:
         """The problem with a corner's robot."""
@@ -79,7 +79,7 @@ class Family:
 
     def worst(self, x: Array, corners: Sequence[Corner]) -> Worst:
         """The worst that a gait meets in some corners; rows are compared in units of their scales."""
-        model = exact_model(self.nominal)
+        model = build_exact_model(self.nominal)
         largest = (-np.inf, 0, 0.0, self.centre)
         power = -np.inf
         for corner in corners:
@@ -99,7 +99,7 @@ class Family:
 
     def worst_corners(self, x: Array, known: Sequence[Corner], cost: float) -> list[Corner]:
         """New corners that break a limit at x, or cost more than is known: the worst by the rows' derivatives."""
-        model = exact_model(self.nominal)
+        model = build_exact_model(self.nominal)
         own = self.values(self.centre, x)
         slopes, cost_slopes = [], []
         for k in range(len(self._box)):

@@ -12,7 +12,7 @@ import numpy as np
 from compare.questions.kept import Finished
 from compare.questions.walk.study import CYCLE, Gait, result_of, walked
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
@@ -148,7 +148,7 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
                 walk = at(float(height))
             except InputError:  # a foot is out of reach
                 continue
-            energy = exact_model(walk.problem).at(walk.x, walk.problem.p).indexes["energy_J_per_m"]
+            energy = build_exact_model(walk.problem).at(walk.x, walk.problem.p).indexes["energy_J_per_m"]
             if energy >= best[0]:
                 break
             best = energy, float(height)
@@ -188,7 +188,7 @@ def _rival(
     result, note = planned
     if result is None:
         return Rival(planner=planner, at=at, indexes={}, broken=(), note=note)
-    exact = exact_model(result.problem)
+    exact = build_exact_model(result.problem)
     values = exact.at(result.x, result.problem.p)
     broken = tuple(f"{row.name} by {row.violation:.2g} {row.unit}" for row in exact.violated(values))
     walk = walked(result, steps, drive, finished) if steps else None

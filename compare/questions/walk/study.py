@@ -9,7 +9,7 @@ from typing import Any, cast
 from compare.questions.kept import Finished
 from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
@@ -91,7 +91,7 @@ def optimal_gaits(
 
     def gaits(points: Sequence[SweepPoint]) -> list[Gait]:
         results = [result_of(spec, point) for point in points]
-        indexes = [exact_model(result.problem).at(result.x, result.problem.p).indexes for result in results]
+        indexes = [build_exact_model(result.problem).at(result.x, result.problem.p).indexes for result in results]
         return [Gait(found=point, indexes=own) for point, own in zip(points, indexes, strict=True)]
 
     try:

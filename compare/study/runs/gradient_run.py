@@ -10,7 +10,7 @@ import numpy as np
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import IPOPT, Task
-from nlp_gait.backends.solve import solution_of
+from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError
 from nlp_gait.formulation.solution import Best
 
@@ -39,13 +39,13 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
         raise InputError(f"{start.algorithm}, run {start.run}, has no point to polish: {start.status}")
     else:
         x0 = problem.check_within(start.x)
-    outcome = solver.ready_for(problem, PLANNED_RUNS).run(problem, x0)
+    outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
     prepared_s = time.perf_counter() - started - outcome.time_s
     compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
-    settings = solver.plain()
+    settings = solver.to_dict()
     if outcome.linear_solver:
         settings["linear_solver"] = outcome.linear_solver
-    solution = solution_of(problem, [outcome])
+    solution = make_solution(problem, [outcome])
     evaluations, earlier = outcome.evaluations.by_kind(), list[Best]()
     before, before_s = (0, 0.0) if start is None else (start.evaluations["f"], start.time_s.solve)
     if start is not None:

@@ -48,7 +48,7 @@ class NlpPlan:
     hessian_place: int
 
 
-def plan_of(structure: Structure, *, second: bool = True) -> NlpPlan:
+def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
     """The plan of an NLP.
 
     Args:

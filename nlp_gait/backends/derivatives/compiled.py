@@ -13,9 +13,9 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.backends.derivatives.assembly import plan_of
-from nlp_gait.backends.derivatives.source import casadi_source
-from nlp_gait.backends.derivatives.structure import structure_of
+from nlp_gait.backends.derivatives.assembly import make_nlp_plan
+from nlp_gait.backends.derivatives.source import write_casadi_source
+from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError
@@ -56,7 +56,7 @@ class CompiledNlp:
         names = [*VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
 
         def source() -> str:
-            return casadi_source(plan_of(structure_of(nlp), second=second))
+            return write_casadi_source(make_nlp_plan(split_nlp(nlp), second=second))
 
         _, library = load_library(known, compiler, flags, names, source)
         self.functions = {name: ca.external(name, str(library)) for name in names}

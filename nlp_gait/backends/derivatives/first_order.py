@@ -6,7 +6,7 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.glue import Assembler
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Block, Call, Integers, Plan, Row
-from nlp_gait.backends.derivatives.sample import sample_derivatives
+from nlp_gait.backends.derivatives.sample import derive_sample
 from nlp_gait.backends.derivatives.structure import Stage
 
 
@@ -26,7 +26,7 @@ class Samples:
         patterns = [[assembler.columns(self.glue.entries[e * m + i]) for i in active] for e in range(count)]
         self.columns = [np.unique(np.concatenate([np.zeros(0, int), *each])) for each in patterns]
         most = max((len(each) for each in self.columns), default=0)
-        self.derivatives = sample_derivatives(stage.function, active, used, count, most)
+        self.derivatives = derive_sample(stage.function, active, used, count, most)
         self.by_column = self.derivatives.directional and most <= len(active)
         self.v = plan.room(count * len(used))
         value = plan.function(self.derivatives.value)

@@ -38,7 +38,7 @@ class SampleDerivatives:
     second: ca.Function
 
 
-def sample_derivatives(
+def derive_sample(
     function: ca.Function, active: Integers, used: Integers, count: int, directions: int
 ) -> SampleDerivatives:
     """Derivatives of a function in the form that is cheapest.

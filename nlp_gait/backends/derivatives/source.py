@@ -10,14 +10,14 @@ from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.operations import CODES, EXPRESSIONS
 from nlp_gait.backends.derivatives.plan import FIRST, SECOND, VALUES
 from nlp_gait.backends.derivatives.straight_line import number, straight_line
-from nlp_gait.backends.kernel.compiler import native_source
+from nlp_gait.backends.kernel.compiler import read_native_source
 
 UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "fabs",
          "log1p", "expm1")  # fmt: skip
 BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
 
 
-def nlp_source(found: NlpPlan) -> str:
+def write_nlp_source(found: NlpPlan) -> str:
     """C++ of an NLP's functions (see ``native/nlp.hpp``); the lane count is the macro LANES."""
     plan = found.plan
     m, n = found.jacobian.shape
@@ -49,8 +49,8 @@ def nlp_source(found: NlpPlan) -> str:
     return "\n".join(
         [
             "#include <stdlib.h>\n#include <string.h>",
-            native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-            native_source("nlp_gait.backends.derivatives", "operations.hpp"),
+            read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+            read_native_source("nlp_gait.backends.derivatives", "operations.hpp"),
             *(f"ONE_ARGUMENT({name})" for name in UNARY),
             *(f"TWO_ARGUMENTS({name})" for name in BINARY),
             *(f"enum {{ {name} = {size} }};" for name, size in sizes.items() if name != "HAS_SECOND"),
@@ -70,14 +70,14 @@ def nlp_source(found: NlpPlan) -> str:
             ),
             _calls(found),
             f"#define OPERATIONS {cases}",
-            native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
+            read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
         ]
     )
 
 
-def casadi_source(found: NlpPlan) -> str:
+def write_casadi_source(found: NlpPlan) -> str:
     """The same with CasADi's interface."""
-    return f"{nlp_source(found)}\n{native_source('nlp_gait.backends.derivatives', 'casadi.hpp')}"
+    return f"{write_nlp_source(found)}\n{read_native_source('nlp_gait.backends.derivatives', 'casadi.hpp')}"
 
 
 def _rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:

@@ -54,7 +54,7 @@ class Structure:
     rows: SX
 
 
-def structure_of(nlp: Mapping[str, MX]) -> Structure:
+def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     """An NLP taken apart.
 
     Args:

@@ -15,7 +15,7 @@ import numpy as np
 
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
 from nlp_gait.backends.kernel.interpreted import InterpretedKernel
-from nlp_gait.backends.kernel.kernel_source import Kernel, kernel_of
+from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.errors import CompilerError, InputError, checked_count, shown
 from nlp_gait.formulation import Array, GaitProblem
@@ -56,7 +56,7 @@ class CompiledObjective:
         again: Callable[..., CompiledObjective],
     ) -> None:
         """Use ``compile_objective`` instead; ``again`` makes this objective from its problem."""
-        kernel = kernel_of(problem)
+        kernel = build_kernel(problem)
         self.problem = problem
         self.names = problem.names
         self.lower = problem.lower
@@ -204,13 +204,13 @@ def compile_objective(
 
 
 def _native_kernel(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:
-    kernel = kernel_of(problem)
+    kernel = build_kernel(problem)
     native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
     return _verified(native, problem, kernel)
 
 
 def _interpreted_kernel(problem: GaitProblem) -> InterpretedKernel:
-    return InterpretedKernel(kernel_of(problem))
+    return InterpretedKernel(build_kernel(problem))
 
 
 def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:

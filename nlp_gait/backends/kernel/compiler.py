@@ -67,7 +67,7 @@ class Compiler:
             raise CompilerError(f"{Path(self.command[0]).name} exited with status 0, but wrote no library")
 
 
-def native_source(package: str, *names: str) -> str:
+def read_native_source(package: str, *names: str) -> str:
     """C++ of the files in a package's folder ``native``, one after the other."""
     native = files(package) / "native"
     return "\n".join((native / name).read_text(encoding="utf-8") for name in names)

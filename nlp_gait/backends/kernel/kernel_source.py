@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.exact import ExactModel, exact_model
-from nlp_gait.backends.kernel.compiler import native_source
+from nlp_gait.backends.exact import ExactModel, build_exact_model
+from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
 
@@ -40,13 +40,13 @@ class Kernel:
         return lower, upper
 
 
-def kernel_of(problem: GaitProblem) -> Kernel:
+def build_kernel(problem: GaitProblem) -> Kernel:
     """Kernel of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_kernel)
 
 
 def _kernel(problem: GaitProblem) -> Kernel:
-    model = exact_model(problem)
+    model = build_exact_model(problem)
     x, p = model.function.mx_in()
     cost, _, g, lower, upper, _ = model.function.call([x, p], True, False)
     return Kernel(
@@ -57,7 +57,7 @@ def _kernel(problem: GaitProblem) -> Kernel:
     )
 
 
-def kernel_source(function: ca.Function) -> str:
+def write_kernel_source(function: ca.Function) -> str:
     """C++ source; the lane count is the macro LANES.
 
     Args:
@@ -84,10 +84,10 @@ def assembled_source(numbers: str, generated: str, sizes: Mapping[str, int], loo
     """
     return "\n".join(
         [
-            native_source("nlp_gait.backends.kernel", numbers),
+            read_native_source("nlp_gait.backends.kernel", numbers),
             f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of {numbers}",
             re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generated),
             *(f"#define {name} {size}" for name, size in sizes.items()),
-            native_source("nlp_gait.backends.kernel", loop),
+            read_native_source("nlp_gait.backends.kernel", loop),
         ]
     )

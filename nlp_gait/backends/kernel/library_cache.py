@@ -73,14 +73,14 @@ def load_library(
 
 
 def _found(key: str) -> list[Path]:
-    folders = [cache_folder(), *_private_folder_made()]
+    folders = [find_cache_folder(), *_private_folder_made()]
     return [file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))]
 
 
 def _stored(built: Path, key: str) -> Path:
     """Where a new library was put: the first folder that takes it, under its final name at once."""
     name = f"{key}-{_digest(built)}{SUFFIX}"
-    for place in (cache_folder, _private_folder):
+    for place in (find_cache_folder, _private_folder):
         folder = place()
         try:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
@@ -100,7 +100,7 @@ def _stored(built: Path, key: str) -> Path:
     )
 
 
-def cache_folder() -> Path:
+def find_cache_folder() -> Path:
     """Folder of the user's cached libraries: ``$NLP_GAIT_CACHE``, else nlp-gait in ``$XDG_CACHE_HOME`` or ~/.cache.
 
     It is made if it can be. Where it is a link, belongs to somebody else, or cannot be made, a temporary folder of this

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import Compiler, lane_flags
-from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, kernel_source
+from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, write_kernel_source
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.formulation import Array
 
@@ -42,7 +42,7 @@ class NativeKernel:
             CompilerError: the compiler fails.
         """
         flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *SCALAR_FUNCTIONS[: int(scalar_functions)])
-        loaded, self.library = load_library(kernel_source(kernel.function), compiler, flags, SYMBOLS)
+        loaded, self.library = load_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
         self._evaluate = loaded.nlp_gait_evaluate
         self._evaluate.argtypes = [_POINTER, _INTEGER, *[_POINTER] * 8]
         loaded.nlp_gait_workspace_bytes.restype = _INTEGER

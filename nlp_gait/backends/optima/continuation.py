@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nlp_gait.backends.solve import MOST_STARTS, solution_of
+from nlp_gait.backends.solve import MOST_STARTS, make_solution
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
@@ -38,7 +38,7 @@ class Continuation:
 
     def solve(self, problem: GaitProblem) -> Solution:
         """Solution of the next problem on the path: a copy of the first one with other parameter values."""
-        return solution_of(problem, self.run(problem), self._seed)
+        return make_solution(problem, self.run(problem), self._seed)
 
     def run(
         self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Callable[[], bool] = never
@@ -50,23 +50,23 @@ class Continuation:
             earlier: runs of the same problem from elsewhere. Random starts are not repeated where they were in vain.
             stop: asked after each iteration whether to end at once.
         """
-        solver, near = self._solver.ready_for(problem, self._solves), self._neighbour
+        solver, near = self._solver.prepare(problem, self._solves), self._neighbour
         outcomes: list[Outcome] = []
         if near is not None:
             warm = solver.run_from(problem, near, stop)
             outcomes += [] if warm is None else [warm]
-            if best_success(outcomes) is None and not stop():
+            if find_cheapest_feasible(outcomes) is None and not stop():
                 outcomes.append(solver.run(problem, np.clip(near.x, problem.lower, problem.upper), stop))
-        in_vain = bool(earlier) and best_success(earlier) is None
-        if best_success(outcomes) is None and not in_vain and (near is None or not earlier):
+        in_vain = bool(earlier) and find_cheapest_feasible(earlier) is None
+        if find_cheapest_feasible(outcomes) is None and not in_vain and (near is None or not earlier):
             rng = np.random.default_rng(self._seed)
             points = [problem.start_point(rng) for _ in range(self._starts)]
             outcomes += run_starts(solver, problem, points, stop)
-        self._neighbour = best_success([*earlier, *outcomes]) or near
+        self._neighbour = find_cheapest_feasible([*earlier, *outcomes]) or near
         return outcomes
 
 
-def best_success(outcomes: Sequence[Outcome]) -> Outcome | None:
+def find_cheapest_feasible(outcomes: Sequence[Outcome]) -> Outcome | None:
     """Cheapest outcome that succeeded, if there is one."""
     return min((outcome for outcome in outcomes if outcome.success), key=lambda found: found.cost, default=None)
 
@@ -105,7 +105,7 @@ def solve_both_ways(
                 outcomes[k] += path.run(problems[k], outcomes[k], interrupted)
                 if progress is not None:
                     progress()
-    tried = [solution_of(p, found, seed + 1) if found else None for p, found in zip(problems, outcomes, strict=True)]
+    tried = [make_solution(p, found, seed + 1) if found else None for p, found in zip(problems, outcomes, strict=True)]
     solutions = [solution for solution in tried if solution is not None]
     if interrupted():
         raise Interrupted(f"interrupted after {len(solutions)} of {len(problems)} points", tried)

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.backends.nlp import NlpModel, nlp_model
+from nlp_gait.backends.nlp import NlpModel, build_nlp
 from nlp_gait.formulation import Array, GaitProblem
 
 # Singular values of the active rows, each of length 1, below this share of the largest are zero.
@@ -62,13 +62,13 @@ class KktFunctions:
         )
 
 
-def kkt_functions(problem: GaitProblem) -> KktFunctions:
+def build_kkt_functions(problem: GaitProblem) -> KktFunctions:
     """First-order conditions of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_build)
 
 
 def _build(problem: GaitProblem) -> KktFunctions:
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     w, p = model.nlp["x"], model.nlp["p"]
     n, ties = model.variables, len(model.tie_upper)
     row_lower, row_upper = model.row_bounds(p[:-1])
@@ -114,7 +114,7 @@ class KktStep:
     reason: str | None
 
 
-def kkt_step(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -> KktStep:
+def solve_kkt(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -> KktStep:
     """Solve the linearised first-order conditions in the row space and the null space of the active rows.
 
     Args:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.optima.kkt import KktFunctions, column, kkt_functions, kkt_step
+from nlp_gait.backends.optima.kkt import KktFunctions, build_kkt_functions, column, solve_kkt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -108,7 +108,7 @@ def optimum(problem: GaitProblem, near: Outcome) -> Optimum:
         raise InputError(
             f"{problem.name}: prices and sensitivities need multipliers, which {near.solver} does not give; solve with ipopt"
         )
-    functions, unknowns = kkt_functions(problem), len(near.guess.primal)
+    functions, unknowns = build_kkt_functions(problem), len(near.guess.primal)
     if unknowns > LARGEST:
         raise InputError(
             f"{problem.name} has {unknowns} variables; prices and sensitivities are made for at most {LARGEST}: "
@@ -135,7 +135,7 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
         gradient = column(functions.gradient(w, p, lam))
         hessian, jacobian = (np.array(part) for part in functions.matrices(w, p, lam))
         gap = (np.where(side > 0, upper, lower) - values)[active]
-        step = kkt_step(hessian, jacobian[active], -gradient, gap, functions.model.variables)
+        step = solve_kkt(hessian, jacobian[active], -gradient, gap, functions.model.variables)
         if not np.isfinite(step.w).all():
             reason = "Newton's method diverged"
             break
@@ -180,7 +180,7 @@ def _with_flat_lifts_held(found: Optimum) -> Optimum:
         return found
     hessian, jacobian = found.matrices
     nothing = np.zeros(len(found.active))
-    flat = kkt_step(hessian, jacobian[found.active], np.zeros(len(found.w)), nothing, n).flat
+    flat = solve_kkt(hessian, jacobian[found.active], np.zeros(len(found.w)), nothing, n).flat
     loose = np.flatnonzero(flat[n:])
     if not loose.size:
         return found

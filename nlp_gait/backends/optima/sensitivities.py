@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.kkt import column, kkt_functions, kkt_step
+from nlp_gait.backends.optima.kkt import build_kkt_functions, column, solve_kkt
 from nlp_gait.backends.optima.optimum import WEAK, Optimum
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -93,7 +93,7 @@ def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, Gai
 
 def _evaluated(optimum: Optimum, problem: GaitProblem) -> _Change:
     """What a change is the difference of, for another model at the same x, multipliers and parameter values."""
-    functions = kkt_functions(problem)
+    functions = build_kkt_functions(problem)
     own, other, n = optimum.functions.model, functions.model, optimum.functions.model.variables
     if own.row_names != other.row_names or own.lifted != other.lifted:
         raise InputError(f"{problem.name}: the other model has other constraints; sensitivities need the same ones")
@@ -114,7 +114,7 @@ def _sensitivities(optimum: Optimum, change: _Change) -> Sensitivities:
     model, side, active = optimum.functions.model, optimum.side, optimum.active
     hessian, jacobian = optimum.matrices
     held = (change.values - np.where(side[:, None] > 0, change.upper, change.lower))[active]
-    step = kkt_step(hessian, jacobian[active], -change.gradient, -held, model.variables)
+    step = solve_kkt(hessian, jacobian[active], -change.gradient, -held, model.variables)
     return Sensitivities(
         objective=optimum.problem.objective.sign * (change.cost + optimum.multipliers[active] @ held),
         x=model.scale[:, None] * step.w[: model.variables],

@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
-from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.solvers.derivatives import derivatives_of, pays
+from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.backends.solvers.derivatives import compilation_pays, get_derivatives
 from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
@@ -84,12 +84,12 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
-    def settled(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
         """See ``Solver``."""
-        compiled = pays(problem, solves) if self.compiled is None else self.compiled
+        compiled = compilation_pays(problem, solves) if self.compiled is None else self.compiled
         return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled)
 
-    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """IPOPT for a problem, made once for all its copies.
 
         Args:
@@ -99,22 +99,22 @@ class IpoptSettings(Solver):
         Raises:
             CompilerError: compiled functions are demanded, and there is no compiler or it fails.
         """
-        chosen = self.settled(problem, solves)
+        chosen = self.choose_settings(problem, solves)
         try:
             return problem.build_once(Ipopt, chosen)
         except CompilerError as error:
             if self.compiled:
                 raise
             LOG.warning("IPOPT's functions are interpreted: %s", error)
-            return replace(self, compiled=False).ready_for(problem)
+            return replace(self, compiled=False).prepare(problem)
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """See ``Solver``."""
-        return self.ready_for(problem).run(problem, x0, stop)
+        return self.prepare(problem).run(problem, x0, stop)
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         """See ``Solver``."""
-        return self.ready_for(problem).run_from(problem, near, stop)
+        return self.prepare(problem).run_from(problem, near, stop)
 
 
 class Ipopt(StagedSolver):
@@ -125,7 +125,7 @@ class Ipopt(StagedSolver):
     _native: CompiledNlp | None
 
     def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
-        self.model = model = nlp_model(problem)
+        self.model = model = build_nlp(problem)
         started = time.perf_counter()
         self.linear_solver = linear_solver(settings.linear_solver)
         self.time_limit_s = settings.time_limit_s
@@ -151,7 +151,7 @@ class Ipopt(StagedSolver):
         self._of_ipopt = ca.nlpsol("cold", "ipopt", nlp, options)
         warm_options: dict[str, Any] = {
             **options,
-            **derivatives_of(self._of_ipopt),
+            **get_derivatives(self._of_ipopt),
             "ipopt.mu_strategy": "monotone",
             "ipopt.mu_init": WARM_BARRIER,
             "ipopt.warm_start_init_point": "yes",

@@ -17,9 +17,9 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, IterationWatch
-from nlp_gait.backends.solvers.solver import Solver, counted, judged
+from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
@@ -78,7 +78,7 @@ class CasadiSolver(Solver):
         if reason is not None:
             raise InputError(f"NLP solver {self.name!r} does not run in this installation: {reason}")
 
-    def plain(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """See ``Solver``."""
         return {"kind": self.name}
 
@@ -89,7 +89,7 @@ class CasadiSolver(Solver):
         Raises:
             InputError: the solver does not run here.
         """
-        model = nlp_model(problem)
+        model = build_nlp(problem)
         solver, watch, create_s = problem.build_once(_build_solver, self)
         widths, bounds = model.widths, model.bounds(problem)
         primal = model.start(problem, x0, widths[0])
@@ -104,14 +104,14 @@ class CasadiSolver(Solver):
                 primal = np.array(result["x"]).ravel()
                 stats = solver.stats()
                 iterations += int(stats.get("iter_count") or 0)
-                evaluations += counted(stats)
+                evaluations += count_evaluations(stats)
                 if watch.reason:
                     break
         if stop is never and (watch.reason == INTERRUPTED or asked()):
             raise KeyboardInterrupt
         finite = bool(np.isfinite(primal).all())
         status = REASONS.get(watch.reason, f"{self.name} says {stats.get('return_status')!r}")
-        return judged(
+        return judge_point(
             self.name,
             problem,
             x0,
@@ -130,7 +130,7 @@ def _build_solver(problem: GaitProblem, settings: CasadiSolver) -> tuple[ca.Func
     """Return the solver of a problem's NLP, the watch of its iterations, and the time to build them [s]."""
     settings.check(problem)
     started = time.perf_counter()
-    nlp = nlp_model(problem).nlp
+    nlp = build_nlp(problem).nlp
     watch = IterationWatch(nlp)
     options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **settings.quiet}
     with _silent():

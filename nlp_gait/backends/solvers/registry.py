@@ -18,14 +18,14 @@ from nlp_gait.files import refusing
 SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
 
 
-def solver(name: str, /, **settings: Any) -> Solver:
+def make_solver(name: str, /, **settings: Any) -> Solver:
     """An NLP solver by name, with settings where they differ from the defaults.
 
     Raises:
         UnknownNameError: no such solver or setting.
         InputError: a setting of another type, or a value that is not allowed.
     """
-    known = setting_names(name)
+    known = list_settings(name)
     for setting in settings:
         if not known:
             raise InputError(f"{name} has no settings, got {setting!r}")
@@ -36,7 +36,7 @@ def solver(name: str, /, **settings: Any) -> Solver:
     return SOLVERS[name](**settings)
 
 
-def setting_names(name: str) -> tuple[str, ...]:
+def list_settings(name: str) -> tuple[str, ...]:
     """Names of a solver's settings; raises UnknownNameError."""
     check_name("solver", name)
     if name not in SOLVERS:

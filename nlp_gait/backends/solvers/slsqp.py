@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
@@ -50,7 +50,7 @@ class Slsqp(Solver):
         if self.evaluations <= len(problem.names):
             raise InputError(f"slsqp needs at least {len(problem.names) + 1} evaluations for one gradient")
 
-    def plain(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """See ``Solver``."""
         return {"kind": "SLSQP", "step": STEP, "ftol": TOLERANCE, "evaluations": self.evaluations}
 
@@ -105,7 +105,7 @@ class _Functions:
         self._stop = stop
         self._objective = compile_objective(problem, threads=1)
         self.backend = self._objective.backend
-        model = exact_model(problem)
+        model = build_exact_model(problem)
         values = model.at(problem.lower, problem.p)
         own = slice(0, len(model.row_names) - len(problem.names))  # bounds are SLSQP's own
         self._row_lower, self._row_upper = values.lower[own], values.upper[own]

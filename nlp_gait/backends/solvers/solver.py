@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import never
@@ -40,11 +40,11 @@ class Solver(Protocol):
         """A run that starts warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
         return None
 
-    def settled(self, problem: GaitProblem, solves: int = 1) -> Solver:
-        """The same solver with every setting that ``ready_for`` would choose by the problem and the number of runs."""
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> Solver:
+        """The same solver with every setting that ``prepare`` would choose by the problem and the number of runs."""
         return self
 
-    def ready_for(self, problem: GaitProblem, solves: int = 1) -> Solver:
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> Solver:
         """The same solver, checked and made ready for a number of runs of a problem and its copies."""
         self.check(problem)
         return self
@@ -53,15 +53,15 @@ class Solver(Protocol):
         """Raise InputError where a run would fail: the solver is not installed, or does not suit the problem."""
         return None
 
-    def plain(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Settings as a record keeps them."""
         return {"kind": type(self).__name__, **(asdict(self) if is_dataclass(self) else {})}
 
 
-def judged(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any) -> Outcome:
+def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any) -> Outcome:
     """Outcome at x (n,), which is pushed to the bounds, with the exact functions' values there."""
     x = np.clip(x, problem.lower, problem.upper)
-    exact = exact_model(problem).at(x, problem.p)
+    exact = build_exact_model(problem).at(x, problem.p)
     return Outcome(
         solver=solver,
         x0=x0,
@@ -73,7 +73,7 @@ def judged(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any
     )
 
 
-def counted(stats: Mapping[str, Any]) -> Evaluations:
+def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
     """Calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
 
     def calls(*names: str) -> int:

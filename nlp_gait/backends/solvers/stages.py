@@ -12,7 +12,7 @@ import numpy as np
 
 from nlp_gait.backends.nlp import WIDTHS, NlpModel
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
-from nlp_gait.backends.solvers.solver import Solver, counted, judged
+from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
@@ -95,13 +95,13 @@ class StagedSolver(Solver):
                 result = method(p=np.append(p, width), **start, **bounds)
                 stats = method.stats()
                 iterations += int(stats["iter_count"])
-                evaluations += counted(stats)
+                evaluations += count_evaluations(stats)
                 z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
                 start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
                 status = self.watch.reason or str(stats["return_status"])
                 if stage + 1 < len(widths) and status not in REASONS:
                     continue
-                outcome = judged(
+                outcome = judge_point(
                     self.name,
                     problem,
                     x0,

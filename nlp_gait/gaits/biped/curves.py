@@ -15,8 +15,8 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
-from nlp_gait.symbolic.splines import coefficient_count, spline
-from nlp_gait.symbolic.trajectories import Motion, cubic, plus, stack
+from nlp_gait.symbolic.splines import count_coefficients, spline
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
 SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))
@@ -47,7 +47,7 @@ class Splines:
     @property
     def count(self) -> int:
         """Coefficients of each curve."""
-        return coefficient_count(SPANS[self.trajectory])
+        return count_coefficients(SPANS[self.trajectory])
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -128,7 +128,7 @@ def hip_on_spline(
     phase: SX,
 ) -> Motion:
     """Motion of the torso's origin (3,) [m]: the papers' (see ``hip_motion``), and what each curve adds."""
-    return plus(hip_motion(at, along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
+    return add_motions(hip_motion(at, along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
 def grid_for(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:

@@ -14,7 +14,7 @@ from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader, Loads, Planner
 from nlp_gait.gaits.biped.parts import Margins, Part
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import below, combined_zmp, ground_load, zmp_of_wrench
+from nlp_gait.symbolic.balance import below, combine_zmps, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -158,6 +158,6 @@ class Standing:
                 torques |= half
                 zmps.append(feet[side] + offset)
                 ground_loads.append(ground_load(wrench, weight))
-            return Loads(torques, combined_zmp(zmps, ground_loads), wrenches)
+            return Loads(torques, combine_zmps(zmps, ground_loads), wrenches)
 
         return loads

@@ -31,9 +31,9 @@ from nlp_gait.gaits.biped.parts import REACH_MARGIN, Part
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.economy import economical, tabulated
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion
 
 Derivatives = Literal["analytic", "finite-difference"]
@@ -253,9 +253,9 @@ class Phase:
         inputs, outputs = self._sample(ops, motion, wrenches, traces)
         roots = ops.open_roots()
         if roots is None:
-            return self._mapped(ca.Function("sample", inputs, economical(outputs)), at, phases=phases)
-        (start,) = self._mapped(ca.Function("start", inputs, economical([roots.start])), at, phases=phases)
-        tied = ca.Function("sample", [roots.unknowns, *inputs], economical([roots.residual, *outputs]))
+            return self._mapped(ca.Function("sample", inputs, simplify(outputs)), at, phases=phases)
+        (start,) = self._mapped(ca.Function("start", inputs, simplify([roots.start])), at, phases=phases)
+        tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
         found: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
@@ -308,13 +308,13 @@ class Phase:
         """One sample: torques, those of the moving joints, and ZMP, from the inputs of ``_loaded``."""
         inputs, loads = self._loaded()
         torque, moving = (ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.joints, self.moving))
-        return ca.Function("dynamics", inputs, economical([torque, moving, loads.zmp]))
+        return ca.Function("dynamics", inputs, simplify([torque, moving, loads.zmp]))
 
     @cached_property
     def _ground(self) -> ca.Function:
         """One sample: wrenches (6,) on both soles, from the inputs of ``_loaded``."""
         inputs, loads = self._loaded()
-        return ca.Function("ground", inputs, economical([loads.wrenches[side] for side in BOTH_FEET]))
+        return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
 
     def _loaded(self) -> tuple[list[SX], Loads]:
         """Loads of one sample as functions of angles, both derivatives, hip, and what ``_kinematics`` gives of the world."""
@@ -336,7 +336,7 @@ class Phase:
         margin = ca.repmat(at[REACH_MARGIN], 1, n)
         if phases is not None:
             return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, phases]))
-        function, table = tabulated(function, DM(np.linspace(0.0, 1.0, n)).T)
+        function, table = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
         return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, table]))
 
     def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:

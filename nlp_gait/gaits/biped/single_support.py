@@ -11,7 +11,7 @@ from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import below, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
-from nlp_gait.symbolic.trajectories import Motion, constant, cubic, parabola_lift, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
 
 # Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
 MEAN_DBM_SHARES = (1 / 3, 1 / 4)
@@ -27,7 +27,7 @@ def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, 
     """Motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
     forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
     rise = parabola_lift(forward, start_x, end_x, lift)
-    return stack(forward, constant(y), rise._replace(position=rise.position + ankle_height))
+    return stack(forward, constant_motion(y), rise._replace(position=rise.position + ankle_height))
 
 
 def loads_on_left(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:

@@ -9,7 +9,7 @@ from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps
 from nlp_gait.gaits.humanoid.body import GRAVITY, LETTERS, humanoid
 from nlp_gait.gaits.humanoid.recorded import recorded_cycles
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
-from nlp_gait.symbolic.trajectories import constant
+from nlp_gait.symbolic.trajectories import constant_motion
 
 
 def humanoid_on_a_table(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> Body:
@@ -23,7 +23,7 @@ def humanoid_on_a_table(robot: str = "nao-v5", intervals: int = 10, drive_limits
     Raises:
         GaitError: as ``humanoid``.
     """
-    body, upright = humanoid(robot), (constant(0.0), constant(0.0))
+    body, upright = humanoid(robot), (constant_motion(0.0), constant_motion(0.0))
     cycles = recorded_cycles(body, robot=robot, intervals=intervals, drive_limits=drive_limits)
 
     def judged(footsteps: Footsteps, t: Array, q: Array) -> Result:

@@ -39,7 +39,7 @@ from nlp_gait.gaits.humanoid.problem import humanoid_motors, parts_of, with_body
 from nlp_gait.gaits.humanoid.single_support import sole_margins
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
 
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 SPEED_M_S = 0.03  # NAO's
@@ -164,7 +164,7 @@ def humanoid_cycle_variables(body: Humanoid) -> tuple[Variable, ...]:
 
 def _standing_foot(body: Humanoid, side: str) -> Motion:
     """Origin of a standing foot's link (3,) at x = 0 [m]."""
-    return stack(*map(constant, (0.0, body.foot_y(side), body.ankle_height(side))))
+    return stack(*map(constant_motion, (0.0, body.foot_y(side), body.ankle_height(side))))
 
 
 def single_support_planner(body: Humanoid) -> Planner:

@@ -26,7 +26,7 @@ from nlp_gait.gaits.humanoid.body import GRAVITY, LETTERS, Humanoid, humanoid
 from nlp_gait.gaits.humanoid.problem import LEAN, humanoid_motors, lean_motion, lean_variables, parts_of, staged
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import constant, stack
+from nlp_gait.symbolic.trajectories import constant_motion, stack
 
 DURATION = "double_support_time_s"
 UNITS = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(LEAN, "rad")
@@ -116,7 +116,7 @@ def double_support_duration(at: InstantPoint) -> SX:
 def _planner(body: Humanoid, soles: Mapping[str, Point2], splines: Splines) -> Planner:
     """The hips' middle moves from a sixth of a step ahead of the rear foot to a sixth behind the front one."""
     ankles = {
-        LETTERS[side]: stack(*map(constant, (*soles[LETTERS[side]], body.ankle_height(side))))
+        LETTERS[side]: stack(*map(constant_motion, (*soles[LETTERS[side]], body.ankle_height(side))))
         for side in ("left", "right")
     }
     (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]

@@ -9,8 +9,8 @@ from casadi import SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots.leg import Leg
-from nlp_gait.symbolic.general_leg import leg_root
-from nlp_gait.symbolic.leg_poses import POSES, flat_foot_poses
+from nlp_gait.symbolic.general_leg import make_leg_root
+from nlp_gait.symbolic.leg_poses import POSES, sample_flat_foot_poses
 from nlp_gait.symbolic.nonsmooth import Exact
 
 # Nearly all poses are closed to this [1, rad] before the last step, which squares what is left.
@@ -24,7 +24,7 @@ def newton_steps(leg: Leg) -> int:
     Raises:
         InputError: more would be needed than are sensible.
     """
-    inputs = flat_foot_poses(leg)
+    inputs = sample_flat_foot_poses(leg)
     for steps in range(MOST_STEPS):
         left = residuals(leg, steps, inputs)
         if steps == 0 and np.quantile(left, SHARE) <= CLOSED:
@@ -41,7 +41,7 @@ def newton_steps(leg: Leg) -> int:
 def residuals(leg: Leg, steps: int, inputs: Array) -> Array:
     """(N,) largest residual of each pose after so many steps."""
     symbols = SX.sym("inputs", len(inputs))
-    root = leg_root(leg, steps, Exact(), SX(0.0))
+    root = make_leg_root(leg, steps, Exact(), SX(0.0))
     left = root.residual(root.newton(symbols), symbols)
     function = ca.Function("residual", [symbols], [left])
     return np.abs(np.array(function.map(inputs.shape[1])(inputs))).max(axis=0)

@@ -29,7 +29,7 @@ from nlp_gait.gaits.biped.problem import problem_of
 from nlp_gait.gaits.biped.skeleton import skeleton
 from nlp_gait.gaits.humanoid.body import GRAVITY, LARGEST_PITCH, LARGEST_ROLL, Humanoid
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.trajectories import Motion, cubic, plus
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic
 
 DRAWS = 50  # of a start point, at most
 
@@ -84,7 +84,7 @@ def lean_motion(at: InstantPoint, more: Mapping[str, Motion], duration: SX, phas
     """Roll and pitch of the torso [rad]: cubics from rest to rest, and what each curve adds."""
     still = SX(0)
     roll, pitch = (
-        plus(cubic(at[f"{name}_start_rad"], at[f"{name}_end_rad"], still, still, duration, phase), more[name])
+        add_motions(cubic(at[f"{name}_start_rad"], at[f"{name}_end_rad"], still, still, duration, phase), more[name])
         for name in LEAN
     )
     return roll, pitch

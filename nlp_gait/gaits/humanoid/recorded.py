@@ -23,7 +23,7 @@ from nlp_gait.gaits.humanoid.cycle import (
 from nlp_gait.gaits.humanoid.double_support import standing
 from nlp_gait.gaits.humanoid.problem import parts_of, with_body
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
-from nlp_gait.symbolic.general_leg import reach_of
+from nlp_gait.symbolic.general_leg import compute_reach
 
 
 def recorded_cycles(body: Humanoid, *, robot: str, intervals: int, drive_limits: bool) -> Cycles:
@@ -86,5 +86,5 @@ def _cosines(body: Humanoid, q: MX) -> MX:
     """Of both knees (2, N + 1), from all angles (12, N + 1)."""
     angles = SX.sym("q", len(body.biped.joints))
     legs = zip(body.biped.legs.values(), ca.vertsplit(angles, LEG_JOINT_COUNT), strict=True)
-    reach = ca.Function("reach", [angles], [ca.vertcat(*(reach_of(leg, own) for leg, own in legs))])
+    reach = ca.Function("reach", [angles], [ca.vertcat(*(compute_reach(leg, own) for leg, own in legs))])
     return reach.map(q.shape[1])(q)

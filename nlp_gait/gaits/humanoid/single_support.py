@@ -18,7 +18,7 @@ from nlp_gait.gaits.humanoid.body import GRAVITY, Humanoid, humanoid
 from nlp_gait.gaits.humanoid.problem import LEAN, humanoid_motors, lean_motion, lean_variables, parts_of, staged
 from nlp_gait.robots import Foot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 
 DURATION, LIFT = "single_support_time_s", "swing_height_m"
 # Curves that can be splines; the swing foot stays on its line across the walking direction.
@@ -100,7 +100,7 @@ def single_support_plan(body: Humanoid, step: float, splines: Splines) -> Planne
         more = splines.motions(at, duration, phase)
         hip = hip_on_spline(at, more, (step / 2, 1.5 * step), (y / 2, y / 2), duration, phase)
         ankles = {
-            "L": stack(*map(constant, (step, y, body.ankle_height("left")))),
+            "L": stack(*map(constant_motion, (step, y, body.ankle_height("left")))),
             "R": _swing(body, at, step, more, body.ankle_height("right"), phase),
         }
         return body.plan(hip, lean_motion(at, more, duration, phase), ankles, at[REACH_MARGIN], ops)
@@ -114,7 +114,7 @@ def _swing(
     """Motion of the right foot's origin (3,) [m]: a cubic forward, a parabola up, and what its curves add."""
     ends, duration = (SX(0.0), SX(2 * step)), single_support_duration(at)
     swing = swing_foot(*ends, body.foot_y("right"), ankle_height, at[LIFT], duration, phase)
-    return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
+    return add_motions(swing, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
 
 
 def sole_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:

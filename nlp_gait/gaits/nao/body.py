@@ -13,7 +13,7 @@ from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, at_rest, constant, cubic, plus
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, resting_point
 from nlp_gait.symbolic.world_frame import Frame, chain_frames, leg_frames, upright
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
@@ -75,7 +75,7 @@ def upright_plan(
         )
         leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
         rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS)))
-        joints |= {f"{side}HipYawPitch": constant(0.0)}
+        joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
         joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
         reach.append(leg.reach)
     return PlannedInstant(
@@ -97,7 +97,7 @@ def upright_frames(
     frames = {robot.root: upright(hip)}
     for side, ankle in ankles.items():
         geometry, pelvis = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
-        at_hip, at_pelvis = (plus(hip, at_rest(place)) for place in (geometry.hip_m, pelvis.origin_m))
+        at_hip, at_pelvis = (add_motions(hip, resting_point(place)) for place in (geometry.hip_m, pelvis.origin_m))
         leg = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, largest_cosine)
         *turning, foot = (robot.joint(f"{side}{name}").child for name in LEG_JOINTS)
         frames |= {pelvis.child: upright(at_pelvis), **dict(zip(turning, leg, strict=True)), foot: upright(ankle)}
@@ -109,4 +109,4 @@ def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
     """Joint motions of both arms: those named in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
-    return {name: constant(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
+    return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved

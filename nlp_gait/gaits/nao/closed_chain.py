@@ -18,7 +18,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, plus, stack, through
+from nlp_gait.symbolic.trajectories import Motion, add_motions, map_motion, stack
 
 UP = (0.0, 0.0, 1.0)
 YAW_PITCHES = {side: f"{side}HipYawPitch" for side in "LR"}
@@ -69,16 +69,16 @@ def leaning_legs(
         Sole and knee have the angles of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); those at the hip follow from the torso's
         turn. The formulation is this package's own.
     """
-    moved = through(lambda pose: _hips(robot, pose, ankles), stack(torso, lean))
+    moved = map_motion(lambda pose: _hips(robot, pose, ankles), stack(torso, lean))
     yaw_pitch, *sides = (_part(moved, rows) for rows in (slice(0, 1), slice(1, 6), slice(6, 11)))
     joints: dict[str, Motion] = {}
     reach: list[SX] = []
     for side, hip in zip("LR", sides, strict=True):
         geometry = leg_geometry(robot, side)
-        to_ankle = plus(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
+        to_ankle = add_motions(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
         leg = leg_angles(to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
         _, pitch, *below = (_part(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
-        at_hip = (_part(hip, slice(3, 4)), plus(pitch, _part(hip, slice(4, 5))))
+        at_hip = (_part(hip, slice(3, 4)), add_motions(pitch, _part(hip, slice(4, 5))))
         joints |= {f"{side}{name}": motion for name, motion in zip(LEG_JOINTS, (*at_hip, *below), strict=True)}
         joints[YAW_PITCHES[side]] = yaw_pitch
         reach.append(leg.reach)

@@ -12,7 +12,7 @@ from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines
 from nlp_gait.gaits.biped.parts import AngleLimits
 from nlp_gait.gaits.nao.body import arm_joints
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.trajectories import Motion, plus
+from nlp_gait.symbolic.trajectories import Motion, add_motions
 
 
 def hip_and_arm_units(swing: Mapping[str, tuple[float, float]]) -> dict[str, str]:
@@ -25,7 +25,7 @@ def arm_motions(
 ) -> dict[str, Motion]:
     """Motions of the arms' joints [rad]: the papers' (see ``body.arm_joints``), and what each curve adds."""
     arms = arm_joints(swing, duration, phase)
-    return arms | {joint: plus(arms[joint], more[joint]) for joint in swing}
+    return arms | {joint: add_motions(arms[joint], more[joint]) for joint in swing}
 
 
 def arm_limits(

@@ -35,10 +35,10 @@ from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.gaits.nao.single_support import ARM_SWING, LIFT
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
-from nlp_gait.symbolic.economy import economical, tabulated
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import fitted
-from nlp_gait.symbolic.trajectories import Motion, constant, cubic, plus
+from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
+from nlp_gait.symbolic.splines import fit_spline
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic
 
 YAW_PITCH = "HipYawPitch"  # one motor turns both hips
 YAW_PITCHES = tuple(f"{side}{YAW_PITCH}" for side in "LR")
@@ -79,7 +79,7 @@ class FreeMotion:
         for name in MOVING:
             a, b = start[name], end[name]
             hermite = cubic(a.position, b.position, a.velocity, b.velocity, duration, phase)
-            moved[name] = plus(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
+            moved[name] = add_motions(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
         return {**start, **moved}
 
     def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
@@ -102,7 +102,7 @@ class FreeMotion:
         """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and where ankle and sole are."""
         rows = len(CURVES)
         v = SX.sym("v", 3 * rows)
-        joints = {name: constant(angle) for name, angle in HELD_ARM_ANGLES.items()}
+        joints = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
         for row, curve in enumerate(CURVES):
             motion = Motion(*(v[order * rows + row] for order in range(3)))
             joints |= dict.fromkeys(YAW_PITCHES if curve == YAW_PITCH else (curve,), motion)
@@ -110,7 +110,7 @@ class FreeMotion:
         loads = self.loads(joints, body.torso, {"L": SX(DM(self.support[:2]))}, SX(0, 1))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         left = body.corners[1, 1::2]
-        return ca.Function("instant", [v], economical([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
+        return ca.Function("instant", [v], simplify([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
 
     @cached_property
     def _tree(self) -> tuple[Body, ...]:
@@ -140,7 +140,9 @@ class FreePhase(Phase):
         joints = self.free.joints(InstantPoint.of(x, margin, self.names, [REACH_MARGIN]), s, ops)
         moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
         motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
-        motion, table = tabulated(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
+        motion, table = (
+            tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
+        )
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
         motions = tied(values, ops)
         torque, zmp, along, heights, sides = (tied(part, ops) for part in self.free.instant.map(n)(motions))
@@ -228,6 +230,6 @@ def joint_coefficients(signals: Signals, spans: int) -> Array:
     start, end, v0, v1 = (SX(DM(row)) for row in (q[0], q[-1], qd[0], qd[-1]))
     hermite = ca.Function("hermite", [s], [cubic(start, end, v0, v1, SX(float(t[-1])), s).position])
     straight = np.array(hermite.map(len(phases))(DM(phases).T).full())
-    columns = dict(zip(signals.joints, fitted(q - straight.T, spans, phases).T, strict=True))
+    columns = dict(zip(signals.joints, fit_spline(q - straight.T, spans, phases).T, strict=True))
     columns[YAW_PITCH] = np.mean([columns[name] for name in YAW_PITCHES], axis=0)
     return np.concatenate([columns[curve] for curve in CURVES])

@@ -22,7 +22,7 @@ from nlp_gait.gaits.nao.motors import nao_motors
 from nlp_gait.gaits.nao.problem import paper_parts, phase_problem
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 
 ARM_SWING = {  # Table 3, rows 6 to 9 [rad]
     "LShoulderPitch": (2.0, 1.0),
@@ -124,7 +124,7 @@ def single_support_plan(robot: Robot, stance: Stance, splines: Splines) -> Plann
         more = splines.motions(at, duration, phase)
         hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, duration, phase)
         ankles = {
-            "L": stack(*map(constant, (*stance.support_xy, ankle_heights[0]))),
+            "L": stack(*map(constant_motion, (*stance.support_xy, ankle_heights[0]))),
             "R": _swing(at, stance, more, ankle_heights[1], phase),
         }
         arms = arm_motions(more, ARM_SWING, duration, phase)
@@ -142,7 +142,7 @@ def _swing(at: InstantPoint, stance: Stance, more: Mapping[str, Motion], ankle_h
     """Motion of the right ankle (3,) [m]: the paper's, and what its curves add."""
     ends = SX(stance.swing_x[0]), SX(stance.swing_x[1])
     swing = swing_foot(*ends, stance.swing_y, ankle_height, at[LIFT], single_support_duration(at), phase)
-    return plus(swing, stack(more["foot_x"], constant(0.0), more["foot_z"]))
+    return add_motions(swing, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
 
 
 def single_support_loads(robot: Robot, upright: Collection[str] | None = None) -> Loader:

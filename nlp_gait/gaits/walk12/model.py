@@ -21,7 +21,7 @@ from nlp_gait.symbolic.balance import zmp_of_point_masses
 from nlp_gait.symbolic.inverse_kinematics import knee_cosine, leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, stack, through
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, stack
 
 GRAVITY = 9.81  # [m/s^2]
 
@@ -74,7 +74,7 @@ def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> 
         swell = ca.sin(math.pi / 2 * (ca.sin(t * math.pi / (2 * step_time)) + 1))
         return ca.vertcat(forward, n * swell * ca.sin(math.pi * t / step_time), robot.leg_m - bend)  # (eq. 6)
 
-    return through(swing_ankle, time), through(stance_hip, time)
+    return map_motion(swing_ankle, time), map_motion(stance_hip, time)
 
 
 def legs(
@@ -92,7 +92,7 @@ def legs(
         ops: interpretation of acos.
     """
     swing_ankle, hip = ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
-    stance_ankle = stack(constant(0.0), constant(0.0), constant(0.0))
+    stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
     swing_hip = hip._replace(position=hip.position + _across(robot))
     stance = _leg(stance_ankle, hip, margin, robot, ops)
     return stance, _turned(_leg(swing_ankle, swing_hip, margin, robot, ops), turn)
@@ -126,20 +126,20 @@ def exact_shank(leg: LegMotion, heights: DM) -> Motion:
         roll, pitch = angles[0], angles[1]
         return ca.vertcat(ca.sin(pitch), ca.cos(pitch) * ca.sin(roll), ca.cos(pitch) * ca.cos(roll)) @ heights
 
-    return through(points, _ankle_angles(leg))
+    return map_motion(points, _ankle_angles(leg))
 
 
 def appendix_shank(leg: LegMotion, heights: DM) -> Motion:
     """Points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
     upward = Motion(*(hip - ankle for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
-    lean = through(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
+    lean = map_motion(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
 
     def points(angles: SX) -> SX:
         roll, pitch, bend = angles[0], angles[1], angles[1] - angles[2]  # bend = pi/2 - theta_B
         forward, side = ca.sin(bend) * ca.cos(roll), ca.cos(bend) * ca.sin(roll)
         return ca.vertcat(forward, side, ca.cos(roll) * ca.cos(pitch)) @ heights  # (eqs. A3-A6)
 
-    return through(points, stack(_ankle_angles(leg), lean))
+    return map_motion(points, stack(_ankle_angles(leg), lean))
 
 
 def zero_moment_point(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:

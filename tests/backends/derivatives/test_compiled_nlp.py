@@ -9,10 +9,10 @@ from casadi import DM, MX, SX
 
 import nlp_gait
 from nlp_gait.backends.derivatives import plan, sample
-from nlp_gait.backends.derivatives.assembly import plan_of
+from nlp_gait.backends.derivatives.assembly import make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
-from nlp_gait.backends.derivatives.structure import NotMapped, structure_of
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.derivatives.structure import NotMapped, split_nlp
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import Array
 
 OPTIONS = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
@@ -67,7 +67,7 @@ def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monk
 @pytest.mark.slow
 def test_single_support_gives_the_same_values_and_derivatives_also_outside_the_bounds() -> None:
     problem = nlp_gait.load("nao-ssp")
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     rng, n = np.random.default_rng(0), model.variables
     starts = [model.start(problem, model.point(rng.uniform(-0.5, 1.5, n)), model.widths[0]) for _ in range(5)]
     points = np.array([w + np.append(np.zeros(n), rng.normal(0.0, 0.1, len(w) - n)) for w in starts])
@@ -92,4 +92,4 @@ def test_runs_are_as_long_as_both_lists_of_places_count_upwards() -> None:
 def test_what_cannot_be_taken_apart_is_refused() -> None:
     x, table = MX.sym("x", 2), ca.interpolant("table", "linear", [[0.0, 1.0, 2.0]], [0.0, 1.0, 4.0])
     with pytest.raises(NotMapped):
-        plan_of(structure_of({"x": x, "p": MX(0, 1), "f": table(x[0]), "g": x}))
+        make_nlp_plan(split_nlp({"x": x, "p": MX(0, 1), "f": table(x[0]), "g": x}))

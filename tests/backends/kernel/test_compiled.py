@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import InputError
@@ -47,7 +47,7 @@ def candidates(problem: GaitProblem, count: int = CANDIDATES, seed: int = 0) -> 
 def expected(name: str) -> tuple[Array, Array, Array]:
     """Cost, violation and rows from CasADi's virtual machine."""
     problem = problem_named(name)
-    exact = exact_model(problem).function.map(CANDIDATES)
+    exact = build_exact_model(problem).function.map(CANDIDATES)
     cost, violation, g, *_ = exact(candidates(problem).T, np.repeat(problem.p[:, None], CANDIDATES, axis=1))
     return np.array(cost).ravel(), np.array(violation).ravel(), np.array(g).T
 
@@ -159,7 +159,7 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     fixed = compile_objective(problem.fix(swing_height_m=0.024), threads=1)
     assert fixed.lower[7] == fixed.upper[7] == 0.024
     assert fixed.names == problem.names
-    value = exact_model(problem).at(X[0], strict.problem.p).cost
+    value = build_exact_model(problem).at(X[0], strict.problem.p).cost
     assert strict_f[0] == pytest.approx(value, rel=COST_TOLERANCE)
 
 

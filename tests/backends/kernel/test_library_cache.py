@@ -14,7 +14,7 @@ import pytest
 from nlp_gait.backends.kernel import compiler as compiler_module
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler
-from nlp_gait.backends.kernel.library_cache import cache_folder, load_library
+from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_library
 from nlp_gait.errors import CompilerError
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
@@ -103,7 +103,7 @@ def test_a_cache_that_cannot_be_made_or_trusted(
         caplog.clear()
         library_cache._warn_once.cache_clear()
         assert answer(compiler)[0] == 42
-        assert cache_folder() != cache
+        assert find_cache_folder() != cache
         assert len(caplog.messages) == 1 and "cannot be used" in caplog.messages[0]
         assert not any(target.iterdir())
         cache.rmdir() if cache.is_dir() and not cache.is_symlink() else cache.unlink()

@@ -8,8 +8,8 @@ import pytest
 from casadi import MX
 
 from nlp_gait import load
-from nlp_gait.backends.nlp import nlp_model
-from nlp_gait.backends.optima.continuation import Continuation, best_success
+from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
 from nlp_gait.errors import InputError
@@ -30,7 +30,7 @@ def found(problem: GaitProblem) -> Optimum:
 
 
 def solved(problem: GaitProblem) -> tuple[Outcome, Optimum]:
-    end = best_success(Continuation(starts=3).run(problem))
+    end = find_cheapest_feasible(Continuation(starts=3).run(problem))
     assert end is not None
     return end, optimum(problem, end)
 
@@ -140,7 +140,7 @@ def test_casadis_own_sensitivities_agree() -> None:
     """Of its SQP method with an active-set QP solver, where no active rows depend on each other."""
     problem = load("walk12")
     at = found(problem)
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     silent = {"print_header": False, "print_iteration": False, "print_status": False, "print_time": False}
     qp = {"print_iter": False, "print_header": False, "error_on_fail": False}
     solver = ca.nlpsol("oracle", "sqpmethod", model.nlp, {**silent, "qpsol": "qrqp", "qpsol_options": qp})

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings
 from nlp_gait.backends.solvers.ipopt_installation import linear_solver
@@ -86,7 +86,7 @@ def test_starts_from_where_a_row_has_no_value_do_not_hide_the_others() -> None:
 def test_a_row_without_a_value_is_violated_and_named() -> None:
     problem = toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit), row(y, upper=limit))))
     x = np.array([-1.0, 2.0])
-    assert math.isnan(exact_model(problem).at(x, problem.p).violation)
+    assert math.isnan(build_exact_model(problem).at(x, problem.p).violation)
     rows = row_violations(problem, x)
     assert [violated.name for violated in rows] == ["row", "row"]
     assert math.isnan(rows[0].violation)
@@ -140,7 +140,7 @@ def test_outcomes_rank_by_success_then_feasibility_then_violation() -> None:
 def test_what_ipopt_returns_is_said_in_words(returned: str, words: str) -> None:
     """The limit is out of reach, so that the exact functions find every point infeasible."""
     problem = toy(corner, limit=2.5)
-    ready = IpoptSettings(iterations=1).ready_for(problem)
+    ready = IpoptSettings(iterations=1).prepare(problem)
     ready.cold = Returning(ready.cold, returned)  # type: ignore[assignment]
     outcome = ready.run(problem, np.array([-2.0, -1.0]))
     assert (outcome.success, outcome.claimed, outcome.status) == (False, False, words)
@@ -179,4 +179,4 @@ def test_the_linear_solver_is_the_one_that_ipopt_names(capfd: pytest.CaptureFixt
     ca.nlpsol("loud", "ipopt", {"x": x, "f": x**2}, {"ipopt.option_file_name": ""})(x0=1.0)
     banner = capfd.readouterr().out
     assert f"running with linear solver {linear_solver()}" in banner
-    assert IpoptSettings().ready_for(toy(corner)).linear_solver == linear_solver()
+    assert IpoptSettings().prepare(toy(corner)).linear_solver == linear_solver()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError, UnknownNameError
@@ -44,7 +44,7 @@ def point(solution: Solution) -> np.ndarray:
 @pytest.mark.parametrize("phase", ["single_support", "double_support"])
 def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pytest.FixtureRequest) -> None:
     problem, solution = request.getfixturevalue(phase)
-    cost, violation, *_ = exact_model(problem).at(point(solution), problem.p)
+    cost, violation, *_ = build_exact_model(problem).at(point(solution), problem.p)
     assert solution.success
     assert solution.status == "converged"
     assert violation <= FEASIBILITY_TOLERANCE
@@ -103,8 +103,8 @@ def test_compiled_functions_in_the_cache_folder_do_not_change_a_solve() -> None:
         return toy(lambda x, y, limit, ops: (x**4 + y**2, (row(x * y, lower=limit),)))
 
     first = solve(bowl(), starts=1, seed=0)
-    assert IpoptSettings(compiled=True).ready_for(bowl()).compiled
-    assert not IpoptSettings().ready_for(bowl()).compiled
+    assert IpoptSettings(compiled=True).prepare(bowl()).compiled
+    assert not IpoptSettings().prepare(bowl()).compiled
     assert solve(bowl(), starts=1, seed=0).starts[0].x.tolist() == first.starts[0].x.tolist()  # bit for bit
 
 
@@ -165,7 +165,7 @@ def test_what_is_maximised_has_prices_in_its_own_sense() -> None:
 def test_a_limit_changes_without_building_anything_anew() -> None:
     problem = toy(corner)
     solve(problem)
-    model = nlp_model(problem)
+    model = build_nlp(problem)
     other = solve(problem.with_values(limit=1.25))
     assert other.objective == pytest.approx(0.75, abs=TOY_TOLERANCE)
     assert other.time_s.build == model.build_s

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from compare.questions.certainty.multistart import multistart
-from nlp_gait.backends.optima.continuation import Continuation, best_success, solve_both_ways
+from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible, solve_both_ways
 from nlp_gait.backends.optima.optimum import optimum
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.nlpsol import CasadiSolver, probe
-from nlp_gait.backends.solvers.registry import SOLVERS, solver
-from nlp_gait.backends.solvers.solver import Solver, judged
+from nlp_gait.backends.solvers.registry import SOLVERS, make_solver
+from nlp_gait.backends.solvers.solver import Solver, judge_point
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
@@ -34,7 +34,7 @@ class Corners(Solver):
     name: ClassVar[str] = "corners"
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        return judged(
+        return judge_point(
             self.name,
             problem,
             x0,
@@ -50,7 +50,7 @@ class Corners(Solver):
 def ready(name: str) -> Solver:
     if issubclass(SOLVERS[name], CasadiSolver) and (reason := probe(name)):
         pytest.skip(f"{name} does not run here: {reason}")
-    return solver(name)
+    return make_solver(name)
 
 
 @pytest.mark.parametrize("name", SOLVERS)
@@ -83,7 +83,7 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
 
 def test_what_needs_multipliers_says_which_solver_gives_none() -> None:
     problem = toy(corner, limit=1.5)
-    near = best_success(Continuation(starts=1, solver=Corners()).run(problem))
+    near = find_cheapest_feasible(Continuation(starts=1, solver=Corners()).run(problem))
     assert near is not None
     with pytest.raises(InputError, match="need multipliers, which corners does not give; solve with ipopt"):
         optimum(problem, near)
@@ -91,12 +91,12 @@ def test_what_needs_multipliers_says_which_solver_gives_none() -> None:
 
 def test_unknown_names_and_settings_are_refused() -> None:
     with pytest.raises(UnknownNameError, match="unknown NLP solver 'ipop'; did you mean 'ipopt'"):
-        solver("ipop")
+        make_solver("ipop")
     with pytest.raises(UnknownNameError, match="unknown setting of uno 'tolerance'"):
-        solver("uno", tolerance=1e-6)
+        make_solver("uno", tolerance=1e-6)
     with pytest.raises(InputError, match="fatrop has no settings, got 'tolerance'"):
-        solver("fatrop", tolerance=1e-6)
+        make_solver("fatrop", tolerance=1e-6)
     with pytest.raises(InputError, match="setting of ipopt: tolerance must be a number"):
-        solver("ipopt", tolerance="small")
+        make_solver("ipopt", tolerance="small")
     with pytest.raises(InputError, match="slsqp needs at least 3 evaluations"):
-        solve(toy(corner), solver=solver("slsqp", evaluations=2))
+        solve(toy(corner), solver=make_solver("slsqp", evaluations=2))

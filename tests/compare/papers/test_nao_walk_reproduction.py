@@ -15,7 +15,7 @@ from compare.papers.nao_walk.nao_walk_claims import claims
 from compare.papers.nao_walk.nao_walk_findings import Findings
 from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT, by_joint, own_walk, total
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, documented
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import predicted
 from nlp_gait.simulation.plan import plan_of
@@ -86,7 +86,7 @@ def test_verdicts_follow_the_numbers() -> None:
 def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_joint() -> None:
     """Sums over joints are what the package's own measurement and index say of the same walk."""
     walk = own_walk(documented())
-    indexes = exact_model(walk.problem).at(walk.x, walk.problem.p).indexes
+    indexes = build_exact_model(walk.problem).at(walk.x, walk.problem.p).indexes
     assert indexes["speed_m_s"] == pytest.approx(SPEED_M_S, rel=1e-12)
     found = by_joint(Drive(), {}, "", 2)
     assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(found["planned_m"], rel=0.02)

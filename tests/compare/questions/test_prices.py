@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.prices.study import AGREEMENT, prices
 from compare.study.task import ProblemSpec
-from nlp_gait import solver
+from nlp_gait import make_solver
 from nlp_gait.errors import InputError
 
 RUN = CliRunner()
@@ -53,7 +53,7 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
 
 def test_a_solver_without_multipliers_has_no_prices() -> None:
     with pytest.raises(InputError, match="need multipliers, which slsqp does not give; solve with ipopt"):
-        prices(ProblemSpec(name="walk12"), starts=2, solver=solver("slsqp"))
+        prices(ProblemSpec(name="walk12"), starts=2, solver=make_solver("slsqp"))
 
 
 def test_a_fixed_variable_has_one_price() -> None:

@@ -15,7 +15,7 @@ from compare.questions.robust import study as questions
 from compare.questions.robust.study import boxes
 from compare.study.task import ProblemSpec
 from nlp_gait import load
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 
 RUN = CliRunner()
 SPEC = ProblemSpec(name="nao-ssp")
@@ -56,7 +56,7 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
     # Solved independently: the nominal problem with a limit that is 2 mm stricter has the same optimum.
     x = np.array(list(found["x"].values()))
     stricter = load("nao-ssp").with_values(dbm_y_mean_limit_m=0.022)
-    at = exact_model(stricter).at(x, stricter.p)
+    at = build_exact_model(stricter).at(x, stricter.p)
     assert at.violation < 1e-6
     assert at.cost == pytest.approx(found["power_W"])
 

@@ -15,7 +15,7 @@ from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
-from nlp_gait.backends.solvers.registry import solver
+from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
 
@@ -78,23 +78,23 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
     try:
         assert nlpsol.probe("fatrop") == "it ends with status -9"
         with pytest.raises(InputError, match="'fatrop' does not run in this installation"):
-            solver("fatrop").run(nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
+            make_solver("fatrop").run(nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
     finally:
         nlpsol.probe.cache_clear()
     with pytest.raises(UnknownNameError, match="unknown NLP solver 'snop'"):
-        solver("snop")
+        make_solver("snop")
 
 
 @pytest.mark.slow
 def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytest.MonkeyPatch) -> None:
     planned = []
-    ready_for = IpoptSettings.ready_for
+    prepare = IpoptSettings.prepare
 
     def watched(settings: IpoptSettings, problem: GaitProblem, solves: int = 1) -> Ipopt:
         planned.append(solves)
-        return ready_for(settings, problem, solves)
+        return prepare(settings, problem, solves)
 
-    monkeypatch.setattr(IpoptSettings, "ready_for", watched)
+    monkeypatch.setattr(IpoptSettings, "prepare", watched)
     tasks = [Task(problem=ProblemSpec(name="walk12"), algorithm="ipopt", run=run) for run in range(2)]
     for count in (1, 2):
         run_study(Study(tasks=tasks[:count], jobs=1))

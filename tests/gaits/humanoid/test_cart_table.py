@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, finely_sampled, load
 from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps, cart_table_walk
@@ -105,11 +105,11 @@ def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, body: Bo
     assert finer is not None
     dense = finer.signals(x)
     back = body.judged(STEPS, dense.arrays["t"], dense.arrays["q"])
-    own, before = (exact_model(r.problem).at(r.x, r.problem.p) for r in (back, Result(problem=problem, x=x)))
+    own, before = (build_exact_model(r.problem).at(r.x, r.problem.p) for r in (back, Result(problem=problem, x=x)))
     for index, value in before.indexes.items():
         assert own.indexes[index] == pytest.approx(value, rel=2e-3, abs=1e-4), index
-    rows = dict(zip(exact_model(back.problem).row_names, own.g, strict=True))
-    for name, value in zip(exact_model(problem).row_names, before.g, strict=True):
+    rows = dict(zip(build_exact_model(back.problem).row_names, own.g, strict=True))
+    for name, value in zip(build_exact_model(problem).row_names, before.g, strict=True):
         kind = name.split("[")[0].removeprefix("ssp_").removeprefix("dsp_")
         if kind in ("joint_angle", "reach", "effort", "torque_change", "dbm_x", "dbm_y"):
             assert rows[name] == pytest.approx(value, abs=2e-2), name

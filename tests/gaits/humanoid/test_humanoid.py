@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, load
@@ -43,7 +43,7 @@ def solution(problem: GaitProblem) -> Solution:
 
 def reachable(problem: GaitProblem, count: int) -> Array:
     """Random candidates whose legs reach their feet."""
-    model, rng, found = exact_model(problem), np.random.default_rng(0), []
+    model, rng, found = build_exact_model(problem), np.random.default_rng(0), []
     rows = [i for i, name in enumerate(model.row_names) if name.startswith("closure")]
     while len(found) < count:
         x = rng.uniform(problem.lower, problem.upper)
@@ -76,8 +76,8 @@ def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
 def test_an_optimum_is_exact_closed_and_the_lifted_problems(problem: GaitProblem, solution: Solution) -> None:
     assert solution.success and solution.violation == 0.0
     x = np.array(list(solution.x.values()))
-    model, exact = nlp_model(problem), exact_model(problem).at(x, problem.p)
-    closure = [i for i, name in enumerate(exact_model(problem).row_names) if name.startswith("closure")]
+    model, exact = build_nlp(problem), build_exact_model(problem).at(x, problem.p)
+    closure = [i for i, name in enumerate(build_exact_model(problem).row_names) if name.startswith("closure")]
     assert exact.g[closure].max() <= CLOSURE_M
     nlp = model.nlp
     w = model.start(problem, x, model.widths[-1])
@@ -97,7 +97,7 @@ def test_the_torso_leans_as_its_attitude_says(problem: GaitProblem, solution: So
 
 
 def test_nothing_is_ever_nan(problem: GaitProblem) -> None:
-    model, rng = exact_model(problem), np.random.default_rng(1)
+    model, rng = build_exact_model(problem), np.random.default_rng(1)
     middle, half = (problem.lower + problem.upper) / 2, (problem.upper - problem.lower) / 2
     for size in (1.0, 10.0, 1000.0):
         for _ in range(5):
@@ -122,7 +122,7 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
 def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str, name: str) -> None:
     problem = load(name, robot=path)
     x = (problem.lower + problem.upper) / 2
-    values = exact_model(problem).at(x, problem.p)
+    values = build_exact_model(problem).at(x, problem.p)
     assert math.isfinite(values.cost) and math.isfinite(values.violation)
     signals = problem.signals(x)
     assert problem.display.skeleton is not None and problem.display.simulation_model is not None

@@ -13,7 +13,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.biped.curves import SPANS
-from nlp_gait.symbolic.splines import finer
+from nlp_gait.symbolic.splines import refine_spline
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
 
@@ -78,7 +78,7 @@ def test_coefficients_are_counted_by_curves_and_spans(name: str, order: str) -> 
 def test_each_order_contains_the_one_before(name: str) -> None:
     coarse, fine = (load(name, trajectory=order, samples_per_interval=2) for order in ("spline-2", "spline-4"))
     coefficients = some(coarse)
-    more = finer(coefficients.reshape(CURVES[name], -1).T, 4).T.ravel()
+    more = refine_spline(coefficients.reshape(CURVES[name], -1).T, 4).T.ravel()
     same = [evaluated(problem, padded(problem, c)).indexes for problem, c in ((coarse, coefficients), (fine, more))]
     assert same[0] == pytest.approx(same[1], rel=1e-9)
 

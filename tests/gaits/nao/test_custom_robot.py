@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import Array, GaitProblem, load
@@ -141,7 +141,7 @@ def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) ->
     written(tmp_path, partner(raw, "robot.urdf"))
     one, other = load("nao-ssp", robot=str(tmp_path / "robot.urdf")), load("nao-ssp", robot=path)
     x = (one.lower + one.upper) / 2
-    for a, b in zip(exact_model(one).at(x, one.p)[:5], exact_model(other).at(x, other.p)[:5], strict=True):
+    for a, b in zip(build_exact_model(one).at(x, one.p)[:5], build_exact_model(other).at(x, other.p)[:5], strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-10)  # violations of some hundred
 
 

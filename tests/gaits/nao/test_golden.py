@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.backends.exact import exact_model
-from nlp_gait.backends.nlp import nlp_model
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
@@ -67,7 +67,7 @@ def test_with_many_intervals_finite_differences_become_the_derivatives(row: dict
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_function_of_one_sample_stays_small(name: str) -> None:
-    functions = {f.name(): f for f in exact_model(load(name)).function.find_functions()}
+    functions = {f.name(): f for f in build_exact_model(load(name)).function.find_functions()}
     assert functions["sample"].n_instructions() < MOST_INSTRUCTIONS
 
 
@@ -100,7 +100,7 @@ def test_the_leg_under_the_hip_carries_nothing_as_printed_and_all_by_the_lever_r
 
 @pytest.mark.parametrize("name", NAMES)
 def test_only_single_support_smooths_its_jump(name: str) -> None:
-    assert nlp_model(load(name)).smoothed == (name == "nao-ssp")
+    assert build_nlp(load(name)).smoothed == (name == "nao-ssp")
 
 
 @pytest.mark.slow

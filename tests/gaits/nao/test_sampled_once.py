@@ -8,13 +8,13 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, load
 
 
 def mapped(problem: GaitProblem) -> list[str]:
     """Names of the functions that are called over the samples."""
-    function = exact_model(problem).function
+    function = build_exact_model(problem).function
     called = [
         function.instruction_MX(k).which_function()
         for k in range(function.n_instructions())

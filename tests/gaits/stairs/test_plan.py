@@ -9,7 +9,7 @@ import nlp_gait
 from compare.judge import evaluate
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from metaheuristics import ParticleSwarm, minimize
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -49,7 +49,7 @@ def test_stairs_and_times_are_those_that_the_paper_prints() -> None:
 
 
 def test_limits_and_scales_of_rows(problem: GaitProblem) -> None:
-    model = exact_model(problem)
+    model = build_exact_model(problem)
     at = model.at(np.array(NEAR_BEST), problem.p)
     rows = zip(model.row_names, at.lower, at.upper, model.row_scales, strict=True)
     found = [(*name.rstrip("]").partition("["), *numbers) for name, *numbers in rows]

@@ -7,7 +7,7 @@ import pytest
 
 import nlp_gait
 from metaheuristics import AntColony, minimize
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
@@ -31,7 +31,7 @@ def problem() -> GaitProblem:
 
 def values(problem: GaitProblem, x: list[float]) -> tuple[float, float, dict[str, float]]:
     """Cost, violation and indexes."""
-    at = exact_model(problem).at(x, problem.p)
+    at = build_exact_model(problem).at(x, problem.p)
     return at.cost, at.violation, at.indexes
 
 

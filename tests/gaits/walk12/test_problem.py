@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlp_gait
-from nlp_gait.backends.exact import exact_model
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.walk12.locomotion import locomotion
@@ -26,7 +26,7 @@ DEFAULT = nlp_gait.load("walk12")
 
 def random_gaits(count: int, seed: int) -> list[Any]:
     """Reachable gaits, all over the bounds."""
-    model, rng = exact_model(DEFAULT), np.random.default_rng(seed)
+    model, rng = build_exact_model(DEFAULT), np.random.default_rng(seed)
     found: list[Any] = []
     while len(found) < count:
         x = rng.uniform(DEFAULT.lower, DEFAULT.upper)
@@ -37,7 +37,7 @@ def random_gaits(count: int, seed: int) -> list[Any]:
 
 def values(problem: GaitProblem, x: Any) -> tuple[float, float, dict[str, float]]:
     """f, violation and indexes."""
-    at = exact_model(problem).at(x, problem.p)
+    at = build_exact_model(problem).at(x, problem.p)
     return -at.cost, at.violation, at.indexes
 
 

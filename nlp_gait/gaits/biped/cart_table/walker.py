@@ -25,7 +25,7 @@ from nlp_gait.gaits.biped.instant import BOTH_FEET, PlannedInstant
 from nlp_gait.gaits.biped.parts import CLOSURE_M
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.robots import Foot
-from nlp_gait.symbolic.trajectories import Motion, constant, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
 
 SAMPLE_S = 0.005  # as in the source
 SETTLING_S = 10.0  # after which the walk repeats
@@ -179,7 +179,7 @@ class Walker:
         (left_y, left_z), (right_y, right_z) = self.body.ankles["L"], self.body.ankles["R"]
         step = SX(self.footsteps.step_m)
         swing = swing_foot(-step, step, right_y, right_z, SX(self.footsteps.lift_m), SX(self.footsteps.single_s), share)
-        feet = {"L": stack(*map(constant, (0.0, left_y, left_z))), "R": swing}
+        feet = {"L": stack(*map(constant_motion, (0.0, left_y, left_z))), "R": swing}
         plan = self.body.legs(Motion(hip, still, still), feet)
         angles = ca.vertcat(*(plan.joints[name].position for name in self.body.joints))
         return ca.Function("legs", [share, hip], [angles, plan.reach, plan.miss])

@@ -15,8 +15,8 @@ from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic import trajectories
-from nlp_gait.symbolic.economy import economical
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
+from nlp_gait.symbolic.simplification import simplify
 
 
 class FreeParts(NamedTuple):
@@ -115,4 +115,4 @@ def instant_of(stance: Stance, loads: Loader) -> ca.Function:
     com = centre_of_mass(stance.tree, forward_kinematics(stance.tree, angles, SX(DM(stance.support))))
     outputs = [torque, found.zmp, torso, hip, ca.jtimes(hip, q, qd), ankle, ca.vec(corners), com]
     outputs += [found.wrenches[side] for side in BOTH_FEET]
-    return ca.Function("instant", [q, qd, qdd], economical(outputs))
+    return ca.Function("instant", [q, qd, qdd], simplify(outputs))

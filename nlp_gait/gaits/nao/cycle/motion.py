@@ -13,7 +13,7 @@ from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, upright_plan
 from nlp_gait.gaits.nao.legs import hip_variables, leg_geometry
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
 
 # Table 3 swings the shoulders about 1.5 rad and the elbows about 0.53 rad, their rolls by 0.22 rad for each rad of the shoulders.
 MIDDLE_SHOULDER, MIDDLE_ELBOW, ELBOW_PER_SHOULDER = 1.5, 0.53, 0.22
@@ -74,7 +74,7 @@ def _arms(swing: Motion) -> dict[str, Motion]:
     def joint(middle: float, factor: float) -> Motion:
         return Motion(middle + factor * swing.position, factor * swing.velocity, factor * swing.acceleration)
 
-    return {name: constant(angle) for name, angle in HELD_ARM_ANGLES.items()} | {
+    return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | {
         "LShoulderPitch": joint(MIDDLE_SHOULDER, 1.0),
         "RShoulderPitch": joint(MIDDLE_SHOULDER, -1.0),
         # Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
@@ -91,4 +91,4 @@ def _place(robot: Robot, side: str) -> tuple[float, float]:
 
 def _standing(robot: Robot, side: str) -> Motion:
     """An ankle (3,) at rest at x = 0 [m]."""
-    return stack(*map(constant, (0.0, *_place(robot, side))))
+    return stack(*map(constant_motion, (0.0, *_place(robot, side))))

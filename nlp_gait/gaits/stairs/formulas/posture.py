@@ -12,7 +12,7 @@ from nlp_gait.gaits.stairs.formulas.gait import Stair, StairPlan, ToeFoot, ankle
 from nlp_gait.gaits.stairs.formulas.planar_biped import Rod
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, constant, plus, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 
 
 class Posture(NamedTuple):
@@ -60,7 +60,7 @@ def posture(
     swing, swing_reach = _leg(rods, at_hip, at_ankle, margin, ops)
     support, support_reach = _leg(rods, at_hip, Motion(SX(2, 1), SX(2, 1), SX(2, 1)), margin, ops)
     feet = in_time(ca.vertcat(*foot_angles(plan, s)), s, rates)
-    torso = constant(0.0)._replace(position=plan.torso_pitch)
+    torso = constant_motion(0.0)._replace(position=plan.torso_pitch)
     return Posture(stack(swing, support, torso, feet), ca.vertcat(swing_reach, support_reach), at_hip, at_ankle)
 
 
@@ -75,5 +75,5 @@ def _leg(rods: Mapping[str, Rod], at_hip: Motion, at_ankle: Motion, margin: SX, 
         ops,
     )
     _, pitch, knee, _, _ = (Motion(*(part[i] for part in leg.joints)) for i in range(5))
-    upright = constant(ca.pi / 2)  # a leg that hangs down
-    return stack(plus(pitch, upright), plus(plus(pitch, knee), upright)), leg.reach
+    upright = constant_motion(ca.pi / 2)  # a leg that hangs down
+    return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.reach

@@ -16,7 +16,7 @@ from nlp_gait.symbolic.tape import Instruction, read_tape
 LEAST_SQUARE = 1e-200
 
 
-def economical(outputs: Sequence[SX]) -> list[SX]:
+def simplify(outputs: Sequence[SX]) -> list[SX]:
     """The same expressions, cheaper to evaluate.
 
     Common parts are shared; several divisions by one divisor become one reciprocal and products; sines and cosines of angles
@@ -29,7 +29,7 @@ def economical(outputs: Sequence[SX]) -> list[SX]:
         return list(ca.cse(rewritten))
 
 
-def tabulated(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
+def tabulate_last_input(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
     """A function that is to be mapped over known values of its last input, without what depends on that input alone.
 
     Args:
