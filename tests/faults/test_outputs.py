@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli.command import PLAIN, run_app
-from nlp_gait import load, solve, make_solver
+from nlp_gait import load, make_solver, solve
 from nlp_gait.backends.kernel.compiler import _find, find_compiler
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import one_sentence

@@ -14,7 +14,7 @@ import numpy as np
 
 import metaheuristics as search
 from metaheuristics.interface import Start
-from nlp_gait import compile_objective, gaitbench, load, solve, make_solver
+from nlp_gait import compile_objective, gaitbench, load, make_solver, solve
 from nlp_gait.robots import load_robot
 from tests.fuzz.trial import outcome
 
@@ -73,7 +73,10 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "load": (lambda *, name, **options: load(name, **options), {"name": "walk12", "zmp": "appendix"}),
     "load robot": (lambda *, robot: load("nao-dsp", robot=robot), {"robot": "nao-v5"}),
     "robot": (lambda *, name: load_robot(name), {"name": "nao-v5"}),
-    "solver": (lambda *, name, **s: make_solver(name, **s), {"name": "ipopt", "tolerance": 1e-8, "iterations": 9, "hessian": None}),
+    "solver": (
+        lambda *, name, **s: make_solver(name, **s),
+        {"name": "ipopt", "tolerance": 1e-8, "iterations": 9, "hessian": None},
+    ),
     "algorithm": (lambda *, name, **s: search.algorithm(name, **s), {"name": "pso", "population": 9, "inertia": 0.7}),
     "handling": (lambda *, name, **s: search.handling(name, **s), {"name": "penalty", "weight": 1.0}),
     "compile": (compile_objective, {"problem": PROBLEM, "threads": 1, "lanes": None, "require_compiler": True}),

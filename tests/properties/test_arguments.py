@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import metaheuristics as search
-from nlp_gait import GaitError, IpoptSettings, compile_objective, load, solve, make_solver
+from nlp_gait import GaitError, IpoptSettings, compile_objective, load, make_solver, solve
 
 WRONG: tuple[Any, ...] = (
     None,
@@ -51,7 +51,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "lanes": (lambda value: compile_objective(PROBLEM, lanes=value), (None,)),
     "require_compiler": (lambda value: compile_objective(PROBLEM, require_compiler=value), (True,)),
     "problem by name": (load, ()),
-    "solver by name": (solver, ()),
+    "solver by name": (make_solver, ()),
     "algorithm by name": (search.algorithm, ()),
     "handling by name": (search.handling, ()),
     "variable": (PROBLEM.variable_index, ()),
