@@ -163,7 +163,7 @@ def without_times(data: Any) -> Any:
 
 def kept(folder: Path) -> dict[str, bytes]:
     """Finished records and steps."""
-    paths = [*folder.glob("records/*/*.json"), *folder.glob("steps/*.json"), *folder.glob("engine/**/*.json")]
+    paths = [*folder.glob("records/*/*.json"), *folder.glob("store/**/*.json")]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 

@@ -70,9 +70,9 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "compare/study/apart.py": ("tests/compare/study/test_apart.py",),
     "nlp_gait/processes.py": ("tests/compare/study/test_apart.py", "tests/backends/test_starts.py"),
     "compare/study/imported.py": ("tests/compare/study/test_imported.py",),
-    "compare/study/steps.py": ("tests/compare/study/test_steps.py",),
+    "compare/study/store.py": ("tests/compare/study/test_store.py",),
     "compare/logs": ("tests/compare/logs/test_logs.py",),
-    "compare/questions/kept.py": ("tests/compare/questions/test_resuming.py",),
+    "compare/study/stored_solver.py": ("tests/compare/questions/test_resuming.py",),
 }
 OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,),

@@ -21,7 +21,7 @@ def until_interrupted(
     Args:
         work: raises ``Interrupted`` with the part that was found.
         nothing: what to add to the sentence if nothing was found; the command ends with it.
-        folder: in which finished steps are kept; None if the work has none.
+        folder: in which finished results are stored; None if there is none.
     """
 
     def kept() -> str:
@@ -38,14 +38,14 @@ def until_interrupted(
 
 
 def kept_in(folder: Path) -> str:
-    """What is finished in a folder, and how to go on from it."""
-    finished = sum(1 for files in ("steps/*.json", "records/*/*.json") for _ in folder.glob(files))
-    return f"{finished} finished steps are kept in {folder}; the same command continues"
+    """Return how many results are stored in a folder, and how to continue."""
+    finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
+    return f"{finished} finished results are stored in {folder}; rerun the command to continue"
 
 
 @contextmanager
 def interruptible(folder: Path | None = None) -> Iterator[None]:
-    """For a command that has no result before its end, or whose finished steps in a folder it goes on from when called again."""
+    """For a command that has no result before its end, or that continues from the results that are stored in a folder."""
     try:
         yield
     except KeyboardInterrupt:

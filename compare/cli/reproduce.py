@@ -27,7 +27,7 @@ REPRODUCTIONS = {
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
     out: Annotated[
-        Path, typer.Option(help="Folder for the report, its tables and figures; finished steps in it are kept.")
+        Path, typer.Option(help="Folder for the report, its tables and figures; finished results are stored in it.")
     ],
 ) -> None:
     """Compute a paper's tables and figures anew and put them beside the printed ones.

@@ -53,7 +53,7 @@ def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = 
 
     def keep(count: int) -> None:
         for _ in range(count):
-            progress("kept from an earlier run")
+            progress("stored by an earlier run")
 
     found: Runs = {}
     records = run_study(study, lambda task, _: progress(f"{task.problem.title}, {task.title} {task.run}"), keep)

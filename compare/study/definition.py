@@ -24,7 +24,11 @@ WORDS: Mapping[tuple[str, ...], str] = {
     ("algorithm", SOURCE): "the algorithm's source",
     ("polishes", "key"): "the search that it polishes",
 }
-INPUT_WORDS = {FORMULAS: MATHEMATICS, "parameters": "values of the problem's parameters"}
+INPUT_WORDS = {
+    FORMULAS: MATHEMATICS,
+    "parameters": "values of the problem's parameters",
+    "code_sha256": "the program has changed",
+}
 
 
 def source_of(algorithm: object) -> str | None:

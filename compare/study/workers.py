@@ -18,6 +18,7 @@ from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import refusing
 from nlp_gait.interrupts import block_interrupts_in_children, remember_interrupts
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 # A study goes on in new processes when one dies, unless they die so often without finishing any run.
@@ -75,8 +76,8 @@ def run_jobs(
                     ) from error
 
 
-def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator[tuple[int, T]]:
-    """Number and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are.
+def side_by_side(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
+    """Key and result of each call, as it finishes; calls must be picklable, and -1 takes all workers that there are.
 
     Raises:
         WorkerError: a worker process died, or none begins.
@@ -87,11 +88,11 @@ def side_by_side(calls: Mapping[int, Callable[[], T]], workers: int) -> Iterator
     # Dask's workers belong to its scheduler.
     begin = {} if workers < 0 else {"initializer": end_with, "initargs": (os.getpid(),)}
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
-    results: Generator[tuple[int, T], None, None] | None = None
+    results: Generator[tuple[K, T], None, None] | None = None
     try:
         with block_interrupts_in_children():
             folder = os.getcwd() if workers > 0 else None  # another machine has other folders
-            results = parallel(delayed(_numbered)(number, call, folder) for number, call in calls.items())
+            results = parallel(delayed(_keyed)(key, call, folder) for key, call in calls.items())
         for result in results:  # noqa: UP028  `yield from` would close them before what is below
             yield result
     except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
@@ -132,11 +133,11 @@ def end_with(parent: int) -> None:
     threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
 
 
-def _numbered(number: int, call: Callable[[], T], folder: str | None) -> tuple[int, T]:
-    """Number and result of a call made where the caller is: a worker stays where it was started, and paths may be relative."""
+def _keyed(key: K, call: Callable[[], T], folder: str | None) -> tuple[K, T]:
+    """Key and result of a call made where the caller is: a worker stays where it was started, and paths may be relative."""
     if folder is not None and os.getcwd() != folder:
         os.chdir(folder)
-    return number, call()
+    return key, call()
 
 
 def _dask(address: str) -> AbstractContextManager[object]:

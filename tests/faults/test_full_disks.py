@@ -71,8 +71,8 @@ def test_what_was_computed_is_printed_though_it_cannot_be_written(
     assert done.returncode == 1 and printed in done.stdout
     *kept, last = done.stderr.splitlines()
     assert last.startswith("nlp-gait: cannot write ") and "File too large" in last
-    assert all("goes on without keeping what is finished" in line for line in kept) and len(kept) <= 1
-    assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv" and path.name != "steps"] == []
+    assert all("continuing without storing results" in line for line in kept) and len(kept) <= 1
+    assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv" and path.name != "store"] == []
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from typer.testing import CliRunner, Result
 import nlp_gait
 from compare.cli import app
 from compare.study.record import read_record
-from compare.study.steps import Steps
+from compare.study.store import Store
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
@@ -181,16 +181,16 @@ def test_reproduce_names_the_steps_that_it_keeps(tmp_path: Path, monkeypatch: py
     module = ModuleType("reproduction")
 
     def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
-        steps = Steps(out, progress)
-        steps("one", {}, lambda: 1)
-        steps("two", {}, lambda: signal.raise_signal(signal.SIGINT))
+        store = Store(out)
+        store.compute("one", {}, lambda: 1)
+        store.compute("two", {}, lambda: signal.raise_signal(signal.SIGINT))
 
     module.reproduce = reproduce  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "reproduction", module)
     monkeypatch.setitem(sys.modules["compare.cli.reproduce"].REPRODUCTIONS, "nao", "reproduction")
     done = run("reproduce", "nao", "--out", str(tmp_path))
-    assert f"1 finished steps are kept in {tmp_path}; the same command continues" in done.stderr
-    assert [path.name for path in (tmp_path / "steps").iterdir()] == ["one.json"]
+    assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
+    assert [path.name for path in (tmp_path / "store").iterdir()] == ["one.json"]
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study.steps import Steps
+from compare.study.store import Store
 from tests.compare.questions.test_resuming import without_times
 from tests.faults.processes import ROOT, start
 
@@ -23,21 +24,21 @@ STEM = "walk12-sweep-step_length_m-ipopt"
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from compare.study.steps import Steps
+from compare.study.store import Store
 
 def work(number):
     time.sleep(0.03)
     return [number] * 20_000
 
-steps = Steps(Path(sys.argv[1]), lambda note: None)
+store = Store(Path(sys.argv[1]))
 for number in range(20):
-    steps(f"step-{number}", {"number": number}, lambda: work(number))
+    store.compute(f"step-{number}", {"number": number}, lambda: work(number))
 """
 
 
 @pytest.mark.slow
 def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path) -> None:
-    moments, folder = random.Random(1), tmp_path / "steps"
+    moments, folder = random.Random(1), tmp_path / "store"
     finished = 0
     for _ in range(4):
         process = subprocess.Popen([sys.executable, "-c", PROGRAM, str(tmp_path)], cwd=ROOT)
@@ -52,17 +53,17 @@ def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path)
         for path in folder.glob("*.json"):
             json.loads(path.read_text())  # whole or absent
     notes: list[str] = []
-    steps = Steps(tmp_path, notes.append)
-    results = [steps(f"step-{n}", {"number": n}, lambda n=n: [n] * 20_000) for n in range(20)]
+    compute = partial(Store(tmp_path).compute, progress=notes.append)
+    results = [compute(f"step-{n}", {"number": n}, lambda n=n: [n] * 20_000) for n in range(20)]
     assert results == [[n] * 20_000 for n in range(20)]
-    assert sum("kept from an earlier run" in note for note in notes) == finished > 0
+    assert sum("stored by an earlier run" in note for note in notes) == finished > 0
 
 
 @pytest.mark.slow
 def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path) -> None:
     command = ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:6", "--starts", "2")
     RUN.invoke(app, [*command, "--out", str(tmp_path / "undisturbed")])
-    killed, steps = tmp_path / "killed", tmp_path / "killed" / "steps"
+    killed, steps = tmp_path / "killed", tmp_path / "killed" / "store"
     for number, wanted in ((signal.SIGKILL, 3), (signal.SIGINT, 6)):
         process = start(*command, "--out", str(killed))
         while process.poll() is None and len(list(steps.glob("solve-*.json"))) < wanted:
@@ -71,14 +72,14 @@ def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path) -> N
         _, messages = process.communicate(timeout=60)
         assert process.returncode == (-9 if number == signal.SIGKILL else 130), messages
     *_, said = messages.splitlines()
-    assert said.startswith("nlp-gait: interrupted after") and said.endswith("; the same command continues")
+    assert said.startswith("nlp-gait: interrupted after") and said.endswith("; rerun the command to continue")
     done = RUN.invoke(app, [*command, "--out", str(killed)])
-    assert "steps were finished by an earlier call" in done.stderr
+    assert "results were stored by an earlier run" in done.stderr
     whole, resumed = (
         without_times(json.loads((tmp_path / name / f"{STEM}.json").read_text())) for name in ("undisturbed", "killed")
     )
     assert resumed == whole and len(whole["points"]) == 6
-    names = [{path.name for path in (tmp_path / name / "steps").iterdir()} for name in ("undisturbed", "killed")]
+    names = [{path.name for path in (tmp_path / name / "store").iterdir()} for name in ("undisturbed", "killed")]
     assert names[0] == names[1]
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from compare.study.manifest import Session, write_manifest
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.steps import Steps
+from compare.study.store import Store
 from compare.study.study import Study, keep_record, record_file, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache
@@ -66,11 +66,11 @@ def a_record_of_another_definition(folder: Path, finished: Finished) -> None:
     finished(other)
 
 
-def steps_of_a_reproduction(folder: Path, finished: Finished) -> None:
-    steps = Steps(folder, lambda note: None)
+def results_of_a_reproduction(folder: Path, finished: Finished) -> None:
+    store = Store(folder)
     for inputs in ({"seed": 1}, {"seed": 2}):
-        steps("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
-        finished(folder / "steps" / "one.json")
+        store.compute("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
+        finished(folder / "store" / "one.json")
 
 
 def sessions_of_a_study(folder: Path, finished: Finished) -> None:
@@ -95,7 +95,7 @@ SCENARIOS = (
     an_archive,
     a_study,
     a_record_of_another_definition,
-    steps_of_a_reproduction,
+    results_of_a_reproduction,
     sessions_of_a_study,
     a_compiled_library,
 )
@@ -173,7 +173,7 @@ ALLOWED = {
     "compare/drawing/animation.py",
     "compare/drawing/figures.py",
     "compare/drawing/shown_figure.py",  # into memory
-    "compare/papers/nao/nao_runs.py",
+    "compare/study/store.py",
     "nlp_gait/proofs/branch_and_bound.py",
     "nlp_gait/processes.py",  # /dev/null
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import tempfile
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -12,13 +13,15 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from compare.papers.nao.nao_runs import read_points, write_points
+import numpy as np
+
 from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
 from compare.study.settings import StudySettings, read_settings
-from compare.study.steps import Steps
+from compare.study.store import Store
 from compare.study.study import Study, check_study
 from nlp_gait.backends.identity import problem_part
+from nlp_gait.errors import InputError
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
 from nlp_gait.formulation import load, load_result
@@ -169,17 +172,17 @@ def read_a_motion(path: Path) -> None:
     same((points.joints, points.times_ms), (again.joints, again.times_ms), "written again")
 
 
-def read_step(path: Path) -> None:
-    """A step of a reproduction: what is kept is what was computed, and what is damaged is computed again."""
-    steps = Steps(path.parent.parent, lambda note: None)
-    same(STEP_RESULT, steps("one", STEP_INPUTS, lambda: STEP_RESULT), "result")
+def read_stored(path: Path) -> None:
+    """A stored result: what is loaded is what was computed, and what is damaged is computed again."""
+    same(RESULT, Store(path.parent.parent).compute("one", INPUTS, lambda: RESULT), "result")
 
 
 def read_archive(path: Path) -> None:
-    """Points of a reproduction."""
-    x, power = read_points(path)
-    same([[0.5, 1.5], [2.5, 3.5]], x.tolist(), "x")
-    same([0.25, 0.75], power.tolist(), "power")
+    """Stored arrays: what is loaded is what was stored; what is damaged is not loaded."""
+    arrays = Store(path.parent.parent).load_arrays("one", INPUTS)
+    if arrays is None:
+        raise InputError("damaged")
+    same({name: array.tolist() for name, array in ARRAYS.items()}, {n: a.tolist() for n, a in arrays.items()}, "arrays")
 
 
 NOTHING_MORE: dict[str, Any] = {
@@ -188,7 +191,8 @@ NOTHING_MORE: dict[str, Any] = {
     "pieces": 0,
     "reason": "",
 }  # that a guarantee need not say
-STEP_INPUTS, STEP_RESULT = {"seed": 1}, {"runs": [{"x": [0.1, 0.2], "status": "converged"}], "best": 0.5}
+INPUTS, RESULT = {"seed": 1}, {"runs": [{"x": [0.1, 0.2], "status": "converged"}], "best": 0.5}
+ARRAYS = {"x": np.array([[0.5, 1.5], [2.5, 3.5]]), "power_W": np.array([0.25, 0.75])}
 
 FORMATS = (
     Format(name="result", file="result.json", mutate=mutated_json, read=read_result),
@@ -201,14 +205,14 @@ FORMATS = (
     Format(name="mjcf", file="robot.xml", mutate=mutated_xml, read=read_mjcf),
     Format(name="certificate", file="certificate.json", mutate=mutated_json, read=read_a_certificate),
     Format(name="motion", file="gait.motion", mutate=mutated_lines, read=read_a_motion),
-    Format(name="step", file="one.json", mutate=mutated_json, read=read_step),
-    Format(name="points", file="points.npz", mutate=mutated_bytes, read=read_archive),
+    Format(name="stored", file="one.json", mutate=mutated_json, read=read_stored),
+    Format(name="points", file="one.npz", mutate=mutated_bytes, read=read_archive),
 )
 
 
 def prepared(form: Format, folder: Path) -> Path:
     """Where a file of this kind is read from."""
-    place = folder / "steps" if form.name == "step" else folder
+    place = folder / "store" if form.name in ("stored", "points") else folder
     place.mkdir(parents=True, exist_ok=True)
     return place / form.file
 
@@ -313,11 +317,6 @@ def _certificate() -> bytes:
 
 
 def _points() -> bytes:
-    import tempfile
-
-    import numpy as np
-
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "points.npz"
-        write_points(path, np.array([[0.5, 1.5], [2.5, 3.5]]), np.array([0.25, 0.75]))
-        return path.read_bytes()
+        Store(Path(folder)).save_arrays("one", INPUTS, ARRAYS)
+        return (Path(folder) / "store" / "one.npz").read_bytes()

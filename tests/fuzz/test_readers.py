@@ -59,11 +59,11 @@ def test_what_is_no_file_is_refused_at_once(form: Format, kind: str, tmp_path: P
         path.symlink_to("nowhere")
     else:
         path.write_bytes(b"" if kind == "empty" else bytes(range(256)))
-    expected = ("refused", "accepted") if form.name == "step" else ("refused",)  # a step is computed again
+    expected = ("refused", "accepted") if form.name == "stored" else ("refused",)  # it is recomputed
     assert outcome(lambda: form.read(path)) in expected
 
 
-@pytest.mark.parametrize("form", [f for f in FORMATS if f.name not in ("step", "points")], ids=lambda form: form.name)
+@pytest.mark.parametrize("form", [f for f in FORMATS if f.name not in ("stored", "points")], ids=lambda form: form.name)
 def test_a_link_to_a_file_is_read_and_a_huge_one_is_not(form: Format, tmp_path: Path) -> None:
     path = prepared(form, tmp_path)
     target = tmp_path / f"target{path.suffix}"

@@ -15,7 +15,7 @@ from nlp_gait.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
     from compare.questions.answer import Answer
-    from compare.questions.kept import Finished
+    from compare.study.store import Store
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,19 +29,19 @@ class Output:
         """Refuse a folder that cannot be written to."""
         writable_folder(self.out)
 
-    def take(self, answer: Answer, stopped: str = "", finished: Finished | None = None) -> None:
+    def take(self, answer: Answer, stopped: str = "", store: Store | None = None) -> None:
         """Write an answer and print it, as one JSON object or in tables and sentences.
 
         Args:
             answer: what was found.
             stopped: sentence on where the work was interrupted, if it was; the command ends with it.
-            finished: what was kept on the way, of which an earlier call's part is said.
+            store: of finished results; reports how many were stored by an earlier run.
 
         Raises:
             OutputError: a file cannot be written; the answer is printed all the same.
         """
-        if finished is not None and finished.sentence:
-            say(finished.sentence)
+        if store is not None and store.summary:
+            say(store.summary)
         written: list[Path] = []
         with defer_interrupts() as pressed:  # it takes a moment; pressed again, Ctrl-C does not wait
             try:

@@ -34,7 +34,7 @@ def certainty(
     ] = None,
     paths: Annotated[int, typer.Option(min=1, max=100_000, help="Parts of a proof to check.")] = 200,
     code: Code = None,
-    out: Annotated[Path, typer.Option(help="Folder; finished batches in it are kept.")] = Path("certainty"),
+    out: Annotated[Path, typer.Option(help="Folder; finished results are stored in it.")] = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
     """Evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
@@ -50,19 +50,19 @@ def certainty(
         return
     from compare.questions.certainty.report import certainty_answer
     from compare.questions.certainty.study import certainty as study_certainty
+    from compare.study.store import Store
 
     output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
     with interruptible(out), progress_bar("starts, search, proof", None) as advance:
         study = study_certainty(
             loaded,
-            out,
+            Store(out, say),
             starts=starts,
             evaluations=evaluations,
             tolerance=tolerance,
             time_limit_s=time_limit,
             seed=seed,
-            anew=say,
             progress=advance,
         )
     output.take(certainty_answer(study))

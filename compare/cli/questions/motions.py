@@ -37,16 +37,16 @@ def motions(
 
     Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
     """
-    from compare.questions.kept import Finished
     from compare.questions.motions.report import motions_answer
     from compare.questions.motions.study import motions as run
     from compare.questions.motions.tasks import tasks
+    from compare.study.store import Store
 
     study = tasks(problem, orders=parse_names(orders), free_orders=parse_names(free_orders), robot=robot, starts=starts)
-    finished = Finished(output.out, say)
+    store = Store(output.out, say)
     with interruptible(output.out), progress_bar("motions", len(study)) as advance:
-        found = run(study, output.out, seed=seed, finished=finished, progress=advance)
-    output.take(motions_answer(found, problem), finished=finished)
+        found = run(study, seed=seed, store=store, progress=advance)
+    output.take(motions_answer(found, problem), store=store)
     failed = [motion for motion in found if not motion.success]
     if failed:
         fail("; ".join(f"{motion.task.label}: {motion.status}" for motion in failed))

@@ -25,18 +25,18 @@ def motors(
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """
-    from compare.questions.kept import Finished
     from compare.questions.motors.report import motors_answer
     from compare.questions.motors.study import VARIANTS, motor_variants
+    from compare.study.store import Store
 
     spec = problem.spec()
     with progress_bar("variants", len(VARIANTS)) as advance:
-        finished = Finished(output.out, say)
+        store = Store(output.out, say)
         found, stopped = until_interrupted(
-            lambda: motor_variants(spec, starts=starts, seed=seed, finished=finished, progress=advance),
+            lambda: motor_variants(spec, starts=starts, seed=seed, store=store, progress=advance),
             folder=output.out,
         )
-    output.take(motors_answer(found, spec.load()), stopped, finished)
+    output.take(motors_answer(found, spec.load()), stopped, store)
     failed = [variant for variant in found if not variant.success]
     if failed:
         fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))

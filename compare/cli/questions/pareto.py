@@ -40,7 +40,7 @@ def pareto(
     runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search.")] = 11,
     seed: Seed = 0,
     problem: NamedProblem,
-    out: Annotated[Path, typer.Option(help="Folder; finished runs in it are kept.")] = Path("pareto"),
+    out: Annotated[Path, typer.Option(help="Folder; finished results are stored in it.")] = Path("pareto"),
     as_json: AsJson = False,
 ) -> None:
     """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
@@ -49,11 +49,11 @@ def pareto(
 
     Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --objectives power,dbm_y_mean,speed`
     """
-    from compare.questions.kept import Finished
     from compare.questions.pareto.competing import parse_objectives
     from compare.questions.pareto.report import front_answer
     from compare.questions.pareto.study import pareto_study, parse_searches
     from compare.questions.pareto.surface import pareto_surface, surface_answer
+    from compare.study.store import Store
 
     names = parse_objectives(objectives)
     searches = parse_searches(search or SEARCHES)
@@ -62,25 +62,24 @@ def pareto(
         raise InputError("three objectives are traded without searches; leave out --search")
     output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
-    finished = Finished(out, say)
+    store = Store(out, say)
     with interruptible(out), progress_bar("front", None) as advance:
         if three:
             surface = pareto_surface(
-                loaded, names, points=points, starts=starts, seed=seed, finished=finished, progress=advance
+                loaded, names, points=points, starts=starts, seed=seed, store=store, progress=advance
             )
             answer = surface_answer(surface)
         else:
             study = pareto_study(
                 loaded,
                 names[0],
-                out,
                 points=points,
                 starts=starts,
                 searches=searches,
                 runs=runs,
                 seed=seed,
-                finished=finished,
+                store=store,
                 progress=advance,
             )
             answer = front_answer(study, loaded)
-    output.take(answer, finished=finished)
+    output.take(answer, store=store)

@@ -26,14 +26,14 @@ def prices(
 
     Derivatives of optimum and x* by the first-order conditions, checked by solving again. Example: `nlp-gait prices nao-ssp`
     """
-    from compare.questions.kept import Finished
     from compare.questions.prices.report import prices_answer
     from compare.questions.prices.study import prices as find
+    from compare.study.store import Store
 
     spec = problem.spec()
     with interruptible(output.out), progress_bar("steps", None) as advance:
-        finished = Finished(output.out, say)
-        found = find(spec, starts=starts, seed=seed, checks=checks, finished=finished, progress=advance)
-    output.take(prices_answer(found, spec.load()), finished=finished)
+        store = Store(output.out, say)
+        found = find(spec, starts=starts, seed=seed, checks=checks, store=store, progress=advance)
+    output.take(prices_answer(found, spec.load()), store=store)
     if found.reason is not None:
         fail(f"no prices at this optimum: {found.reason}")

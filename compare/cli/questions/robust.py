@@ -33,11 +33,11 @@ def robust(
 
     One motion for all robots of a box, its worst corners found one after the other. Example: `nlp-gait robust nao-ssp`
     """
-    from compare.questions.kept import Finished
     from compare.questions.robust.playback import Played, played
     from compare.questions.robust.report import robust_answer
     from compare.questions.robust.study import Robust, boxes
     from compare.questions.robust.study import robust as find
+    from compare.study.store import Store
 
     if simulate:
         from nlp_gait.simulation.engine import mujoco
@@ -45,8 +45,8 @@ def robust(
         mujoco()
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
-    finished = Finished(output.out, say)
-    finished.asked("robust", spec.load(), mass=mass, sole=sole, starts=starts, seed=seed, samples=samples)
+    store = Store(output.out, say)
+    store.report_changes("robust", spec.load(), mass=mass, sole=sole, starts=starts, seed=seed, samples=samples)
     found: list[Robust] = []
     runs: tuple[Played, ...] = ()
     stopped = ""
@@ -61,13 +61,13 @@ def robust(
                         starts=starts,
                         seed=seed,
                         samples=samples,
-                        finished=finished,
+                        store=store,
                         progress=advance,
                     )
                 )
-            runs = played(spec, found[-1], finished, advance) if simulate else ()
+            runs = played(spec, found[-1], store, advance) if simulate else ()
     except KeyboardInterrupt:
         stopped = f"interrupted after {len(found)} of {len(uncertain)} boxes"
         if not found:
             end_interrupted(f"{stopped}; {kept_in(output.out)}")
-    output.take(robust_answer(problem.name, found, runs), stopped, finished)
+    output.take(robust_answer(problem.name, found, runs), stopped, store)

@@ -30,15 +30,15 @@ def sweep(
 
     Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
     """
-    from compare.questions.kept import Finished
     from compare.questions.sweep.report import sweep_answer
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.sweep.study import sweep as run_sweep
+    from compare.study.store import Store
     from compare.study.task import Task
 
     spec = problem.spec()
     axes = [parse_axis(text) for text in over]
-    finished = Finished(output.out, say)
+    store = Store(output.out, say)
     with progress_bar("solves", count_solves(axes, algorithm)) as advance:
         points, stopped = until_interrupted(
             lambda: run_sweep(
@@ -48,12 +48,12 @@ def sweep(
                 starts=starts,
                 evaluations=evaluations,
                 seed=seed,
-                finished=finished,
+                store=store,
                 progress=advance,
             ),
             folder=output.out,
         )
-    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title), finished=finished)
+    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title), store=store)
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
         end_interrupted(f"{stopped}; these are in {output.out}{not_twice}; the same command continues")

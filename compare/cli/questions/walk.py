@@ -56,12 +56,12 @@ def walk(
     `nlp-gait walk humanoid-cycle --robot my.urdf --over speed_m_s=0.05 --baseline cart-table`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
-    from compare.questions.kept import Finished
     from compare.questions.sweep.study import count_solves, parse_axis
     from compare.questions.walk.planners import checked_planners, rivals
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLES, default_speeds, optimal_gaits, played
     from compare.study.engine import STEPS
+    from compare.study.store import Store
     from nlp_gait.simulation.engine import mujoco
 
     drive = servos.make()
@@ -73,17 +73,17 @@ def walk(
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name)
     own = spec.load()
     axis, planners = parse_axis(default_speeds(own) if over is None else over), checked_planners(baseline or (), own)
-    finished = Finished(output.out, say)
+    store = Store(output.out, say)
     with progress_bar("solves", count_solves([axis], "ipopt")) as advance:
         gaits, stopped = until_interrupted(
-            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, finished=finished, progress=advance),
+            lambda: optimal_gaits(spec, axis, starts=starts, seed=seed, store=store, progress=advance),
             folder=output.out,
         )
     if steps and not stopped:
         try:
             with progress_bar("walks", len(gaits)) as advance:
                 for i, gait in enumerate(gaits):
-                    gaits[i] = played(spec, gait, steps, drive, finished)
+                    gaits[i] = played(spec, gait, steps, drive, store)
                     advance(f"{gait.at:g}")
         except KeyboardInterrupt:
             stopped = "interrupted while the gaits were played"
@@ -100,12 +100,12 @@ def walk(
                         seed=seed,
                         steps=steps,
                         drive=drive,
-                        finished=finished,
+                        store=store,
                         progress=advance,
                     )
                 )
         except KeyboardInterrupt:
             stopped = "interrupted while other planners planned"
-    output.take(walk_answer(spec, gaits, others), stopped, finished)
+    output.take(walk_answer(spec, gaits, others), stopped, store)
     if not any(gait.found.feasible for gait in gaits):
         fail(gaits[0].found.status)

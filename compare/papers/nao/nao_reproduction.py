@@ -18,9 +18,8 @@ from compare.papers.nao.nao_runs import (
     SWING_SWEEP,
     Effort,
     Held,
-    points_file,
-    read_points,
-    run_keeping_points,
+    load_points,
+    run_storing_points,
     spec_of,
     special_sweeps,
     sweep_step,
@@ -29,7 +28,7 @@ from compare.papers.nao.nao_runs import (
 from compare.papers.nao.report import document
 from compare.papers.paper_runs import Runs, best, run_all
 from compare.report.writing import write_document
-from compare.study.steps import Step, Steps
+from compare.study.store import Computation, Store
 from compare.study.study import record_file
 from compare.study.task import IPOPT, Task
 from nlp_gait.files import writable_folder
@@ -43,7 +42,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     """Write the report (HTML, Markdown), tables (CSV), figures (PNG, SVG) and every feasible solution evaluated (npz).
 
     Args:
-        out: folder; finished runs in ``out/records`` and sweeps in ``out/steps`` are used again.
+        out: folder; finished runs in ``out/records`` and results in ``out/store`` are reused.
         progress: told about each run and each step, ``effort.steps`` times.
         effort: how much is computed.
 
@@ -51,19 +50,19 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
         OutputError: the folder cannot be written to.
     """
     folder = writable_folder(out)
-    writable_folder(folder / "points")
+    store = Store(folder)
     todo = tasks(effort)
     searches = [task for task in todo if task.is_search]
     for task in searches:
-        if not points_file(folder, task).exists():
+        if load_points(store, task) is None:
             record_file(folder, task).unlink(missing_ok=True)  # its points come with the run
-    runs = run_all(folder, todo, progress, partial(run_keeping_points, folder))
-    points = {phase.problem: _points(folder, phase, searches) for phase in PHASES}
+    runs = run_all(folder, todo, progress, partial(run_storing_points, folder))
+    points = {phase.problem: _points(store, phase, searches) for phase in PHASES}
     sweeps = special_sweeps(effort) + [
         step for phase in PHASES for step in _variable_sweeps(phase, runs, points[phase.problem], effort)
     ]
-    results = Steps(folder, progress, code=(nao_runs,)).side_by_side(sweeps)
-    held = {step.name: [Held(**row) for row in rows] for step, rows in zip(sweeps, results, strict=True)}
+    results = store.compute_all(sweeps, code=[nao_runs], progress=progress)
+    held = {name: [Held(**row) for row in rows] for name, rows in results.items()}
     ssp, dsp = (_phase(phase, effort, runs, held, points[phase.problem]) for phase in PHASES)
     findings = Findings(
         ssp=ssp, dsp=dsp, swing=held[SWING_SWEEP], durations=held[DURATION_SWEEP], lever=runs[LEVER, IPOPT]
@@ -72,7 +71,9 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     write_document(folder, document(findings))
 
 
-def _variable_sweeps(phase: PrintedPhase, runs: Runs, points: Mapping[str, Points], effort: Effort) -> list[Step]:
+def _variable_sweeps(
+    phase: PrintedPhase, runs: Runs, points: Mapping[str, Points], effort: Effort
+) -> list[Computation]:
     """IPOPT over each variable's feasible range."""
     optimum = best(runs[phase.problem, IPOPT]).x
     return [
@@ -91,12 +92,12 @@ def _sweep_name(phase: PrintedPhase, position: int) -> str:
     return f"{phase.problem}-sweep-x{position + 1}"
 
 
-def _points(folder: Path, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
+def _points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
     """Feasible solutions of all runs, by algorithm."""
     found = {}
     for algorithm in ALGORITHMS:
         own = [task for task in searches if (task.problem.title, task.title) == (phase.problem, algorithm)]
-        runs = [read_points(points_file(folder, task)) for task in own]
+        runs = [points for task in own if (points := load_points(store, task)) is not None]
         found[algorithm] = Points(
             x=np.concatenate([x for x, _ in runs]),
             power_W=np.concatenate([power for _, power in runs]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,13 +13,11 @@ from compare.judge import evaluate
 from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
 from compare.study.record import RunRecord
 from compare.study.runner import run_task
-from compare.study.steps import Step
+from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.errors import InputError
-from nlp_gait.files import new_file, read_bytes
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.nao.body import PLANNED_JOINTS
 
@@ -88,49 +85,33 @@ def spec_of(problem: str, effort: Effort) -> ProblemSpec:
     return ProblemSpec(name=problem, options={"intervals": effort.intervals})
 
 
-def run_keeping_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
-    """One run; every feasible solution that a search evaluated goes to ``points_file``."""
+def run_storing_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
+    """Do one run, and store every feasible solution that a search evaluated, see ``load_points``."""
     if not task.is_search:
         return run_task(task, start)
     feasible: list[tuple[Array, Array]] = []
 
-    def keep(X: Array, f: Array, violation: Array) -> None:
+    def add(X: Array, f: Array, violation: Array) -> None:
         good = violation == 0.0
         feasible.append((X[good], f[good]))
 
-    record = run_task(task, callback=keep)
+    record = run_task(task, callback=add)
     x, power = (np.concatenate(part) for part in zip(*feasible, strict=True))
-    write_points(points_file(folder, task), x, power)
+    Store(folder).save_arrays(_points_name(task), task.definition(), {"x": x, "power_W": power})
     return record
 
 
-def points_file(folder: Path, task: Task) -> Path:
-    """NumPy archive of a search with x (m, n) and power_W (m,)."""
-    return folder / "points" / f"{task.problem.title}-{task.title}-{task.run:02d}.npz"
+def load_points(store: Store, task: Task) -> tuple[Array, Array] | None:
+    """Return the feasible solutions of a search: x (m, n) and power (m,) [W]; None if they are not stored."""
+    arrays = store.load_arrays(_points_name(task), task.definition())
+    return None if arrays is None else (arrays["x"], arrays["power_W"])
 
 
-def write_points(path: Path, x: Array, power: Array) -> None:
-    """Keep feasible solutions x (m, n) with their power (m,) [W]; raises OutputError."""
-    with new_file(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, x=x, power_W=power)
+def _points_name(task: Task) -> str:
+    return f"points/{task.problem.title}-{task.title}-{task.run:02d}"
 
 
-def read_points(path: Path) -> tuple[Array, Array]:
-    """Feasible solutions of a run: x (m, n) and power (m,) [W].
-
-    Raises:
-        InputError: the archive is damaged.
-    """
-    content = io.BytesIO(read_bytes(path, "points"))
-    try:
-        with np.load(content, allow_pickle=False) as archive:
-            return np.asarray(archive["x"], dtype=float), np.asarray(archive["power_W"], dtype=float)
-    except Exception as error:
-        # NumPy and zipfile raise a dozen kinds of errors on damaged archives.
-        raise InputError(f"points {str(path)!r} cannot be read ({error}); delete it to have it made anew") from error
-
-
-def special_sweeps(effort: Effort) -> list[Step]:
+def special_sweeps(effort: Effort) -> list[Computation]:
     """IPOPT over the paper's swing heights, and over durations of single support."""
     values = {SWING_SWEEP: (SWING_HEIGHT, SWING_POWER_W["pso"]), DURATION_SWEEP: (SSP.duration, DURATIONS_S)}
     return [
@@ -139,17 +120,17 @@ def special_sweeps(effort: Effort) -> list[Step]:
     ]
 
 
-def sweep_step(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Step:
+def sweep_step(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
     """Sweep over a variable, kept as a step: its optima lead to each other and are no runs of their own."""
     problem = spec.load()
     variable = problem.names[position]
-    return Step(
+    return Computation(
         name=name,
         inputs={
             **fingerprint(problem),
             **{"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts},
         },
-        compute=partial(sweep, spec, variable, values, starts),
+        function=partial(sweep, spec, variable, values, starts),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from compare.questions.pareto.competing import MARGINS, competing_objective
 from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.search import PowerAndCompeting, Scale
-from compare.study.steps import Step
+from compare.study.store import Computation
 from compare.study.task import ProblemSpec
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
 from nlp_gait.backends.identity import fingerprint
@@ -74,16 +74,18 @@ def looks_of(budget: int) -> list[int]:
     return [int(g) * FIRST_LOOK for g in np.unique([*generations, budget // FIRST_LOOK])]
 
 
-def searches(phase: str, front: Sequence[FrontPoint], effort: Effort) -> list[tuple[Step, Callable[[Any], FrontRun]]]:
+def searches(
+    phase: str, front: Sequence[FrontPoint], effort: Effort
+) -> list[tuple[Computation, Callable[[Any], FrontRun]]]:
     """Every run of a phase as a step, and what makes the run of its result."""
     spec = spec_of(phase, effort)
     problem = spec.load()
     free = competing_objective(CRITERION, problem).freed(problem)
-    found: list[tuple[Step, Callable[[Any], FrontRun]]] = []
+    found: list[tuple[Computation, Callable[[Any], FrontRun]]] = []
     for budget in effort.budgets:
         for name in ALGORITHMS:
             for run in range(effort.runs):
-                step = Step(
+                step = Computation(
                     name=f"{phase}-{name.lower()}-{budget}-{run:02d}",
                     inputs={
                         **fingerprint(free),
@@ -93,7 +95,7 @@ def searches(phase: str, front: Sequence[FrontPoint], effort: Effort) -> list[tu
                         "looks": looks_of(budget),
                         "seed": run,
                     },
-                    compute=partial(search, spec, (front[0], front[-1]), name, looks_of(budget), run),
+                    function=partial(search, spec, (front[0], front[-1]), name, looks_of(budget), run),
                 )
                 found.append((step, partial(run_of, name, run, budget)))
     return found

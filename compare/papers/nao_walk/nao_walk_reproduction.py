@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from compare.papers.nao_walk.nao_walk_runs import SPECS, gaits_first, walks_then
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S
 from compare.papers.nao_walk.report import document
 from compare.report.writing import write_document
-from compare.study.steps import Steps
+from compare.study.store import Store
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
 from nlp_gait.gaits.biped.cart_table import walker
@@ -30,7 +31,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG).
 
     Args:
-        out: folder; finished steps in ``out/steps`` are used again.
+        out: folder; results in ``out/store`` are reused.
         progress: told about each step, ``effort.steps`` times.
         effort: how much is computed.
 
@@ -41,9 +42,10 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     """
     mujoco()  # if it is missing, say so before the work
     folder = writable_folder(out)
-    steps = Steps(folder, progress, code=(claim_runs, published, walker, cart_table, playback))
-    todo = gaits_first(effort)
-    first = dict(zip((step.name for step in todo), steps.side_by_side(todo), strict=True))
+    compute = partial(
+        Store(folder).compute_all, code=[claim_runs, published, walker, cart_table, playback], progress=progress
+    )
+    first = compute(gaits_first(effort))
     speeds = {heat: first[f"speeds-{heat.split()[-1]}"] for heat in SPECS}
     optima = {}
     for heat, points in speeds.items():
@@ -51,8 +53,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
         if not at["feasible"]:
             raise InputError(f"no optimal gait was found at {SPEED_M_S:g} m/s with {heat}; ask for more starts")
         optima[heat] = at["x"]
-    todo = walks_then(effort, optima)
-    second = dict(zip((step.name for step in todo), steps.side_by_side(todo), strict=True))
+    second = compute(walks_then(effort, optima))
     findings = Findings(
         speeds=speeds,
         torsos=first["torso-heights"],

@@ -14,7 +14,7 @@ from compare.papers.nao_walk.effort import Effort
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, STRETCHED_M, documented
 from compare.questions.sweep.study import Axis
 from compare.questions.walk.study import CYCLE, optimal_gaits
-from compare.study.steps import Step
+from compare.study.store import Computation
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
@@ -45,30 +45,30 @@ DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 PUSHES_NS, SLOPES_DEG, FRICTIONS, MASS_FACTORS = (0.5, 1.0), (6.0,), (0.3,), (0.9, 1.1)
 
 
-def gaits_first(effort: Effort) -> list[Step]:
+def gaits_first(effort: Effort) -> list[Computation]:
     """Optimal gaits over speed, the robot's own walk at other heights, optima whose legs may stretch."""
     found = [
-        Step(
+        Computation(
             name=f"speeds-{_word(name)}",
             inputs={**fingerprint(spec.load()), "speeds": effort.speeds_m_s, "starts": effort.starts},
-            compute=partial(over_speed, spec, effort.speeds_m_s, effort.starts),
+            function=partial(over_speed, spec, effort.speeds_m_s, effort.starts),
         )
         for name, spec in SPECS.items()
     ]
     inputs = {**_own(), "heights": effort.torsos_m}
-    found.append(Step(name="torso-heights", inputs=inputs, compute=partial(at_heights, effort.torsos_m)))
+    found.append(Computation(name="torso-heights", inputs=inputs, function=partial(at_heights, effort.torsos_m)))
     for name, spec in (*((f"{heat:g}", _with_heat(heat)) for heat in effort.heats), ("sheet", SPECS[SHEET_HEAT])):
         found.append(
-            Step(
+            Computation(
                 name=f"straighter-{name}",
                 inputs={**fingerprint(spec.load()), "starts": effort.starts},
-                compute=partial(free_height, spec, effort.starts),
+                function=partial(free_height, spec, effort.starts),
             )
         )
     return found
 
 
-def walks_then(effort: Effort, optima: Mapping[str, Mapping[str, float]]) -> list[Step]:
+def walks_then(effort: Effort, optima: Mapping[str, Mapping[str, float]]) -> list[Computation]:
     """What joints draw in the robot's own walk and in the optima at its speed, by heat; its own walk on softer servos."""
     plain, fed = Drive(feed_forward="none"), Drive()
     gaits: dict[str, tuple[Drive, Mapping[str, float], str]] = {
@@ -77,10 +77,10 @@ def walks_then(effort: Effort, optima: Mapping[str, Mapping[str, float]]) -> lis
         **{f"optimum-{_word(name)}": (fed, x, name) for name, x in optima.items()},
     }
     found = [
-        Step(
+        Computation(
             name=f"joints-{title}",
             inputs={**_own(), "x": dict(x), "drive": repr(drive), "steps": effort.walked, "K": name},
-            compute=partial(by_joint, drive, x, name, effort.walked),
+            function=partial(by_joint, drive, x, name, effort.walked),
         )
         for title, (drive, x, name) in gaits.items()
     ]
@@ -88,7 +88,7 @@ def walks_then(effort: Effort, optima: Mapping[str, Mapping[str, float]]) -> lis
         for share in effort.stiffnesses:
             drive = Drive(full_error_rad=fed.full_error_rad / share, feed_forward=feed_forward)
             found.append(
-                Step(
+                Computation(
                     name=f"servos-{feed_forward}-{share:g}",
                     inputs={
                         **_own(),
@@ -97,7 +97,7 @@ def walks_then(effort: Effort, optima: Mapping[str, Mapping[str, float]]) -> lis
                         "lengths": effort.steps_m,
                         "disturbed": effort.disturbed,
                     },
-                    compute=partial(on_servos, drive, effort.walked, effort.steps_m, effort.disturbed),
+                    function=partial(on_servos, drive, effort.walked, effort.steps_m, effort.disturbed),
                 )
             )
     return found

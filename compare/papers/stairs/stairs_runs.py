@@ -15,7 +15,7 @@ from compare.papers.stairs.stairs_motion import swing_leg
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_replay import FEEDBACK, OPEN_LOOP, replay
 from compare.study.record import RunRecord
-from compare.study.steps import Step
+from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
@@ -182,19 +182,19 @@ def complete(effort: Effort, case: int, plan: Mapping[str, float]) -> dict[str, 
     return {**plan, **given}
 
 
-def other_steps(effort: Effort, runs: Runs) -> list[Step]:
+def other_computations(effort: Effort, runs: Runs) -> list[Computation]:
     """What is computed from the runs and is no run of a solver, so that it is kept as steps."""
     first = effort.cases[0]
     plan = complete(effort, first, plan_of(runs, first))
-    trained = Step(
+    trained = Computation(
         name="network",
         inputs={**fingerprint(plan_spec(effort, first).load()), "plan": plan, "poses": effort.poses},
-        compute=partial(network, first, plan, effort.poses),
+        function=partial(network, first, plan, effort.poses),
     )
     return [trained, *(step for case in effort.cases for step in case_steps(effort, case, runs))]
 
 
-def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Step]:
+def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Computation]:
     """Replay of the ideal, the printed scheme, differences of both plans, and the network in the loop."""
     ideal, plan = point(best(runs[f"ideal-{case}", IPOPT])), plan_of(runs, case)
     spec = ideal_spec(effort, case)
@@ -207,9 +207,9 @@ def case_steps(effort: Effort, case: int, runs: Runs) -> Iterator[Step]:
     yield _step("learned", case, track_spec(case, plan), partial(with_network, case), plan=plan, x=x)
 
 
-def _step(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Step:
+def _step(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Computation:
     inputs = {**fingerprint(spec.load()), **arguments}
-    return Step(name=f"{name}-{case}", inputs=inputs, compute=partial(compute, **arguments))
+    return Computation(name=f"{name}-{case}", inputs=inputs, function=partial(compute, **arguments))
 
 
 def network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:

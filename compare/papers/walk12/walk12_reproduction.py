@@ -14,7 +14,7 @@ from compare.papers.walk12.walk12_runs import PAPER, Effort, PathPoint, first_ta
 from compare.papers.walk12.walk12_tables import Findings
 from compare.report.document import Table
 from compare.report.writing import write_document, write_parts
-from compare.study.steps import Steps
+from compare.study.store import Store
 from nlp_gait.files import writable_folder
 from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
@@ -28,7 +28,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     """Write the report (HTML, Markdown), tables and joint trajectories (CSV), and figures (PNG, SVG).
 
     Args:
-        out: folder; finished runs in ``out/records`` and paths in ``out/steps`` are used again.
+        out: folder; finished runs in ``out/records`` and paths in ``out/store`` are reused.
         progress: told about each run and each step, ``effort.steps`` times.
         effort: how much is computed.
 
@@ -38,8 +38,8 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     folder = writable_folder(out)
     runs = run_all(folder, first_tasks(effort), progress)
     runs |= run_all(folder, second_tasks(effort, runs), progress)
-    results = Steps(folder, progress, code=(walk12_runs,)).side_by_side(paths(effort))
-    weighted, front = ([PathPoint(**row) for row in rows] for rows in results)
+    results = Store(folder).compute_all(paths(effort), code=[walk12_runs], progress=progress)
+    weighted, front = ([PathPoint(**row) for row in rows] for rows in results.values())
     findings = Findings(runs=runs, weighted=weighted, front=front)
     progress("figures, tables and report")
     write_document(folder, document(findings, effort))

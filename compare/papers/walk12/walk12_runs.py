@@ -12,7 +12,7 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.paper_runs import Runs, best, searches, starts
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
-from compare.study.steps import Step
+from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 from nlp_gait.backends.identity import fingerprint
@@ -143,14 +143,14 @@ def _spec(label: str, options: dict[str, str], values: dict[str, float]) -> Prob
     return ProblemSpec(name="walk12", options=options, values=values, label=label)
 
 
-def paths(effort: Effort) -> list[Step]:
+def paths(effort: Effort) -> list[Computation]:
     """The weighted sum and the front, kept as steps: each optimum begins at the end of the last one and is no run of its own."""
     computed = {WEIGHTED: (weighted_sum, effort.weights), FRONT: (front, effort.lengths_m)}
     return [
-        Step(
+        Computation(
             name=name,
             inputs={**fingerprint(walk()), "starts": effort.starts, "at": list(at)},
-            compute=partial(compute, at, effort.starts),
+            function=partial(compute, at, effort.starts),
         )
         for name, (compute, at) in computed.items()
     ]

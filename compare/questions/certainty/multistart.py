@@ -1,16 +1,15 @@
-"""Many local solves from random starts, kept in batches, so that an interrupted study continues where it stopped."""
+"""Many local solves from random starts, stored in batches, so that an interrupted study can be continued."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.study.steps import Steps
+from compare.study.store import Store
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -41,40 +40,39 @@ class Ends:
 
 def multistart(
     problem: GaitProblem,
-    out: Path,
+    store: Store,
     *,
     starts: int,
     seed: int = 0,
     solver: Solver | None = None,
-    anew: Progress | None = None,
     progress: Progress = ignore_progress,
 ) -> Ends:
     """Ends of a solver from random starts; batch k draws its start points from the seed and k, whatever ran before.
 
     Args:
         problem: with its current parameter values.
-        out: folder in which finished batches are kept.
+        store: of finished batches.
         starts: how many.
         seed: of the start points.
         solver: with its settings; None for IPOPT with its defaults.
-        anew: told of each batch that is made again, and why; None for ``progress``.
         progress: told of each batch when it begins and when it is done.
 
     Raises:
         InputError: fewer than one start.
-        OutputError: a batch cannot be kept.
+        OutputError: a batch cannot be stored.
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
     chosen = solver or IpoptSettings()
     ready = chosen.prepare(problem, starts)
-    steps = Steps(out, progress, code=[sys.modules[__name__]], anew=anew)
+    code = [sys.modules[__name__]]
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
     rows: list[list[Any]] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
-        rows += steps(f"starts-{first}", inputs, partial(_batch, problem, ready, seed, k, count))
+        batch = partial(_batch, problem, ready, seed, k, count)
+        rows += store.compute(f"starts-{first}", inputs, batch, code=code, progress=progress)
         progress(f"{len(rows)} starts")
     x, objective, success, status = zip(*rows, strict=True)
     return Ends(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import metaheuristics
 from compare.analysis.units import with_unit
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
-from compare.study.steps import Steps
+from compare.study.store import Store
 from compare.study.task import plain_problem
 from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.backends.kernel.compiled import compile_objective
@@ -127,27 +127,25 @@ class Certainty:
 
 def certainty(
     problem: GaitProblem,
-    out: Path,
+    store: Store,
     *,
     starts: int,
     evaluations: int,
     tolerance: float = 0.01,
     time_limit_s: float = 1800.0,
     seed: int = 0,
-    anew: Progress | None = None,
     progress: Progress = ignore_progress,
 ) -> Certainty:
-    """Evidence by many starts, a long search and, for few variables, branch and bound; each step is kept under ``out``.
+    """Evidence by many starts, a long search and, for few variables, branch and bound; each result is stored.
 
     Args:
         problem: with its current parameter values.
-        out: folder.
+        store: of finished results.
         starts: of IPOPT.
         evaluations: of CMA-ES; 0 for none.
         tolerance: relative, of the certificate.
         time_limit_s: of the certificate [s]; 0 for none.
         seed: of starts and search.
-        anew: told of each step that is made again, and why; None for ``progress``.
         progress: told each step, and how far it is.
 
     Raises:
@@ -162,12 +160,12 @@ def certainty(
         )
     if evaluations:
         metaheuristics.algorithm("cma")
-    ends = multistart(problem, out, starts=starts, seed=seed, anew=anew, progress=progress)
+    ends = multistart(problem, store, starts=starts, seed=seed, progress=progress)
     optima = cluster(problem, ends)
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    steps = Steps(out, progress, code=[bounds, *CODE], anew=anew)
+    compute = partial(store.compute, code=[bounds, *CODE], progress=progress)
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -180,18 +178,19 @@ def certainty(
 
     def proven() -> dict[str, Any]:
         x = np.array(best.x)
-        kept = out / "steps" / f"proof-{sha256_of({**identity, 'tolerance': tolerance})[:12]}.npz"
+        name = f"proof-{sha256_of({**identity, 'tolerance': tolerance})[:12]}.npz"
+        checkpoint = None if store.folder is None else store.folder / name
         limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
-        found = certify(problem, x, **limits, progress=progress, checkpoint=kept)
+        found = certify(problem, x, **limits, progress=progress, checkpoint=checkpoint)
         return dict(without_nan(asdict(found)))
 
     search = certificate = None
     if evaluations:
         inputs = {**identity, "evaluations": evaluations, "seed": seed}
-        search = decoded(LongSearch, steps("cma", inputs, searched))
+        search = decoded(LongSearch, compute("cma", inputs, searched))
     if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or has_power_form(problem)):
         inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
-        certificate = decoded(Certificate, steps("certificate", inputs, proven))
+        certificate = decoded(Certificate, compute("certificate", inputs, proven))
     return Certainty(
         problem=problem,
         starts=starts,

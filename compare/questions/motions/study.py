@@ -6,15 +6,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.questions.kept import Finished
 from compare.questions.motions.tasks import FREED, PLANNED, SMOOTH, SMOOTH_ORDER, SMOOTHED, MotionTask
-from compare.study.steps import Steps
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
@@ -29,6 +28,7 @@ from nlp_gait.symbolic.splines import refine_spline
 
 # A study of many variables may take longer than a single solve of few.
 TIME_LIMIT_S, ITERATIONS = 3600.0, 1000
+CODE = [sys.modules[__name__]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,35 +77,32 @@ class Motion:
 
 def motions(
     study: Sequence[MotionTask],
-    out: Path,
     *,
     seed: int = 0,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> list[Motion]:
-    """Solve all tasks; what an earlier call has finished is read from its file.
+    """Solve all tasks; load the results that are stored.
 
     Args:
         study: see ``tasks``.
-        out: folder in which finished tasks are kept.
         seed: of the random starts.
-        finished: what an earlier call has finished of a task; None to keep nothing of an unfinished one.
+        store: of finished results; None stores nothing.
         progress: told of each task when it is done.
 
     Raises:
-        OutputError: a motion cannot be kept.
+        OutputError: a motion cannot be stored.
     """
-    finished = finished or Finished()
-    steps = Steps(out, ignore_progress, code=[sys.modules[__name__]], anew=finished.anew)
-    solver = finished.solver(IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS))
+    store = store or Store()
+    solver = store_runs(store, IpoptSettings(time_limit_s=TIME_LIMIT_S, iterations=ITERATIONS))
     found: list[Motion] = []
     for task in study:
         problem = task.spec.load()
         x0 = _start(task, problem, found)
         start = None if x0 is None else x0.tolist()
         inputs = {**fingerprint(problem), "task": asdict(task), "seed": seed, "start": start}
-        kept = steps(f"{task.problem}-{task.label}", inputs, partial(_solved, task, problem, x0, seed, solver))
-        found.append(decoded(Motion, kept))
+        solved = partial(_solved, task, problem, x0, seed, solver)
+        found.append(decoded(Motion, store.compute(f"{task.problem}-{task.label}", inputs, solved, code=CODE)))
         progress(task.label)
     return found
 

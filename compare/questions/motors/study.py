@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.questions.kept import Finished
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
@@ -81,7 +82,7 @@ def motor_variants(
     *,
     starts: int = 10,
     seed: int = 0,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> tuple[Variant, ...]:
     """Optimum under each variant.
@@ -90,7 +91,7 @@ def motor_variants(
         spec: a NAO phase, without the option ``motors``.
         starts: random starts of IPOPT for each.
         seed: of the starts.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told the name of each variant when it is solved.
 
     Raises:
@@ -102,9 +103,9 @@ def motor_variants(
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
     if "motors" not in inspect.signature(problem_maker(spec.called)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
-    finished = finished or Finished()
-    finished.asked("motors", published, starts=starts, seed=seed)
-    solver = finished.solver()
+    store = store or Store()
+    store.report_changes("motors", published, starts=starts, seed=seed)
+    solver = store_runs(store)
     limited = {rotor: spec.with_options(motors=f"limits{rotor}").load() for rotor in ("", ",rotor")}
     found: list[Variant] = []
     try:

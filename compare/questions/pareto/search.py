@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
-from compare.study.steps import Steps
+from compare.study.store import Store
 from metaheuristics.array import Array
 from metaheuristics.multi_objective import FrontAlgorithm, front_algorithm, minimize_many
 from nlp_gait.backends.identity import fingerprint
@@ -83,20 +82,20 @@ def search_fronts(
     problem: GaitProblem,
     criterion: CompetingObjective,
     scale: Scale,
-    out: Path,
+    store: Store,
     *,
     searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
     progress: Progress = ignore_progress,
 ) -> list[SearchFront]:
-    """Fronts of all runs; each run is kept as a file when it is done.
+    """Fronts of all runs; each run is stored when it is finished.
 
     Args:
         problem: with the criterion's demand dropped.
         criterion: beside power.
         scale: of both, so that no algorithm's distances are dominated by one of them.
-        out: folder.
+        store: of finished runs.
         searches: rising numbers of evaluations by algorithm.
         runs: run k uses seed + k.
         seed: of the first run.
@@ -104,9 +103,8 @@ def search_fronts(
 
     Raises:
         SearchError: an unknown algorithm, or a budget that is not allowed.
-        OutputError: a run cannot be kept.
+        OutputError: a run cannot be stored.
     """
-    steps = Steps(out, ignore_progress)
     compiled = PowerAndCompeting(compile_objective(problem), criterion, scale)
     ranges = [scale.least_power, scale.power_range, scale.largest, scale.range]
     identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}
@@ -116,8 +114,8 @@ def search_fronts(
         for run in range(runs):
             inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed + run}
             compute = partial(_snapshots, compiled, algorithm, budgets, seed + run)
-            kept = steps(f"{name.lower()}-{run}", inputs, compute)
-            for budget, snapshot in zip(budgets, kept, strict=True):
+            stored = store.compute(f"{name.lower()}-{run}", inputs, compute)
+            for budget, snapshot in zip(budgets, stored, strict=True):
                 values, powers = scale.back(np.array(snapshot["F"]).reshape(-1, 2))
                 X = np.array(snapshot["X"]).reshape(-1, len(problem.names))
                 fronts.append(SearchFront(algorithm=name, run=run, budget=budget, values=values, powers=powers, X=X))

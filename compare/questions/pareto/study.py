@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-from compare.questions.kept import Finished
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.compare import Challenge, Quality, challenge, quality
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import FrontPoint, pareto_front
 from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
-from compare.study.steps import Steps
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import plain_problem
 from metaheuristics.multi_objective import check_budgets, front_algorithm
 from nlp_gait.backends.identity import fingerprint
@@ -63,28 +62,26 @@ class ParetoStudy:
 def pareto_study(
     problem: GaitProblem,
     name: str,
-    out: Path,
     *,
     points: int,
     starts: int,
     searches: Mapping[str, Sequence[int]],
     runs: int,
     seed: int,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> ParetoStudy:
-    """The front, and the searches beside it; finished steps are kept under ``out`` and not done again.
+    """The front, and the searches beside it; stored results are loaded.
 
     Args:
         problem: of the front.
         name: of the criterion beside power.
-        out: folder.
         points: of the front.
         starts: random starts at some of its points.
         searches: budgets by algorithm; none for the front alone.
         runs: of each algorithm.
         seed: of starts and of the first run.
-        finished: what an earlier call has finished of a step; None to keep nothing of an unfinished one.
+        store: of finished results; None stores nothing.
         progress: told what is done.
 
     Raises:
@@ -96,28 +93,28 @@ def pareto_study(
     for algorithm, budgets in searches.items():
         check_budgets(front_algorithm(algorithm), budgets)  # before the front, which takes long
     free = beside.freed(problem)
-    finished = finished or Finished()
+    store = store or Store()
     asked = {"searches": {a: list(b) for a, b in searches.items()}, "runs": runs}
-    finished.asked("pareto", free, objectives=[name], points=points, starts=starts, seed=seed, **asked)
-    solver = finished.solver()
-    steps = Steps(out, progress, code=[front_module], anew=finished.anew)
+    store.report_changes("pareto", free, objectives=[name], points=points, starts=starts, seed=seed, **asked)
+    solver = store_runs(store)
+    compute = partial(store.compute, code=[front_module], progress=progress)
     identity = {**fingerprint(free), "criterion": name}
 
     inputs = {**identity, "points": points, "starts": starts, "seed": seed}
     solved = partial(
         pareto_front, problem, beside, points=points, starts=starts, seed=seed, solver=solver, progress=progress
     )
-    kept = steps(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
-    front = [decoded(FrontPoint, point) for point in kept]
+    stored = compute(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
+    front = [decoded(FrontPoint, point) for point in stored]
     found: list[SearchFront] = []
     outcome = None
     if searches:
         found = search_fronts(
-            free, beside, Scale(front), out, searches=searches, runs=runs, seed=seed, progress=progress
+            free, beside, Scale(front), store, searches=searches, runs=runs, seed=seed, progress=progress
         )
         best = best_of_all(found)
         answered = partial(challenge, free, beside, front, best, solver, progress)
-        outcome = decoded(Challenge, steps(f"challenge-{name}", {**inputs, **asked}, lambda: asdict(answered())))
+        outcome = decoded(Challenge, compute(f"challenge-{name}", {**inputs, **asked}, lambda: asdict(answered())))
         front = list(outcome.front)
     return ParetoStudy(
         problem=free,

@@ -15,10 +15,11 @@ from matplotlib.figure import Figure as Drawing
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label
 from compare.questions.answer import Answer
-from compare.questions.kept import Finished
 from compare.questions.pareto.competing import CompetingObjective, competing_objective
 from compare.questions.pareto.front import front_ends
 from compare.report.document import Figure
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import plain_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
@@ -69,7 +70,7 @@ def pareto_surface(
     points: int,
     starts: int,
     seed: int,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> Surface:
     """Least power over a square grid of at least this many points, from the cheapest values of both criteria to the largest.
@@ -80,14 +81,14 @@ def pareto_surface(
         points: least number of pairs of demands.
         starts: random starts at both ends of the walk over the grid.
         seed: of these.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told after each solve.
     """
     first, second = (competing_objective(name, problem) for name in names)
     free = second.freed(first.freed(problem))
-    finished = finished or Finished()
-    finished.asked("pareto", free, objectives=list(names), points=points, starts=starts, seed=seed)
-    solver = finished.solver()
+    store = store or Store()
+    store.report_changes("pareto", free, objectives=list(names), points=points, starts=starts, seed=seed)
+    solver = store_runs(store)
     side = math.ceil(math.sqrt(points))
     grids = []
     for beside in (first, second):

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
-from compare.questions.kept import Finished
 from compare.questions.other_robot import is_mass, present_value, with_robot
 from compare.questions.prices.price import STANDS, Price, Prices, price_from
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
@@ -37,15 +38,15 @@ AGREEMENT = 1e-4
 MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 
 
-class _KeptPrices(NamedTuple):
+class _StoredPrices(NamedTuple):
     """Prices that take seconds, in steps: those of the whole robot, and what solving again says of each."""
 
-    finished: Finished
+    store: Store
     inputs: dict[str, Any]
     progress: Progress
 
     def of_robot(self, compute: Callable[[], list[Price]]) -> list[Price]:
-        raw = self.finished.step("robot", self.inputs, lambda: [price.plain() for price in compute()])
+        raw = self.store.compute("robot-{key}", self.inputs, lambda: [price.plain() for price in compute()])
         return [price_from(price) for price in raw]
 
     def checked(self, base: Solved, price: Price, changed: Callable[[float], GaitProblem | None]) -> Price:
@@ -53,7 +54,7 @@ class _KeptPrices(NamedTuple):
             self.progress(f"solving again with another {price.name}")
             return _checked(base, price, changed).plain()
 
-        return price_from(self.finished.step("check", {**self.inputs, "quantity": price.name}, compute))
+        return price_from(self.store.compute("check-{key}", {**self.inputs, "quantity": price.name}, compute))
 
 
 class Solved(NamedTuple):
@@ -85,7 +86,7 @@ def prices(
     seed: int = 0,
     checks: int = 3,
     solver: Solver | None = None,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> Prices:
     """Prices of all parameters and, where a robot can be chosen, of its masses, leg lengths and soles.
@@ -96,19 +97,19 @@ def prices(
         seed: of the starts.
         checks: how many of the robot's quantities, largest change first, are checked by solving again; all parameters are.
         solver: one that gives multipliers; None for IPOPT, which in any case sharpens what was found.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told each step when it begins.
 
     Raises:
         InputError: no optimum was found, the solver gives no multipliers, or the problem is too large.
     """
     problem = spec.load()
-    finished, chosen = finished or Finished(), solver or IpoptSettings()
+    store, chosen = store or Store(), solver or IpoptSettings()
     asked = {"starts": starts, "seed": seed, "solver": chosen.name, "settings": chosen.to_dict()}
-    finished.asked("prices", problem, **asked, checks=checks)
-    kept = _KeptPrices(finished, {**fingerprint(problem), **asked}, progress)
+    store.report_changes("prices", problem, **asked, checks=checks)
+    kept = _StoredPrices(store, {**fingerprint(problem), **asked}, progress)
     progress("solving")
-    base = solved(problem, starts, seed, finished.solver(chosen))
+    base = solved(problem, starts, seed, store_runs(store, chosen))
     found = base.optimum
     limits, free = list[Price](), 0
     robot: list[Price] = []

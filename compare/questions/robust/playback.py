@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.questions.kept import Finished
 from compare.questions.robust.study import Robust
+from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
@@ -47,7 +47,7 @@ class Played:
 
 
 def played(
-    spec: ProblemSpec, found: Robust, finished: Finished | None = None, progress: Progress = ignore_progress
+    spec: ProblemSpec, found: Robust, store: Store | None = None, progress: Progress = ignore_progress
 ) -> tuple[Played, ...]:
     """Both gaits on every robot of the scenario problem; ``progress`` is told of each. What is finished is not played again.
 
@@ -59,7 +59,7 @@ def played(
         for gait, x in (("nominal", found.nominal_x), ("robust", found.x)):
             problem = spec.with_options(robot=robot).load()
             inputs = {**fingerprint(problem), "gait": gait, "x": dict(x)}
-            kept = (finished or Finished()).step("play", inputs, partial(_play, problem, robot, gait, x))
+            kept = (store or Store()).compute("play-{key}", inputs, partial(_play, problem, robot, gait, x))
             runs.append(decoded(Played, kept))
             progress(f"{gait} gait on {robot[:40]}")
     return tuple(runs)

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.questions.kept import Finished
 from compare.questions.robust.family import Box, Corner, Family, Worst
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
@@ -94,7 +95,7 @@ def robust(
     starts: int = 10,
     seed: int = 0,
     samples: int = 20,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> Robust:
     """Robust optimum over a box of robots.
@@ -106,16 +107,16 @@ def robust(
         starts: random starts of the nominal problem.
         seed: of the starts and of the random corners.
         samples: random corners on which the robust optimum is checked.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told each step when it begins.
     """
-    finished = finished or Finished()
+    store = store or Store()
     asked = {"box": dict(box), "name": name, "starts": starts, "seed": seed, "samples": samples}
 
     def found() -> dict[str, Any]:
-        return dict(without_nan(asdict(_found(spec, name, box, starts, seed, samples, finished.solver(), progress))))
+        return dict(without_nan(asdict(_found(spec, name, box, starts, seed, samples, store_runs(store), progress))))
 
-    return decoded(Robust, finished.step("box", {**fingerprint(spec.load()), **asked}, found))
+    return decoded(Robust, store.compute("box-{key}", {**fingerprint(spec.load()), **asked}, found))
 
 
 def _found(

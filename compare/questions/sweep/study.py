@@ -11,9 +11,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from compare.questions.kept import Finished
 from compare.study.record import RunRecord, record_from
 from compare.study.runner import attempt, run_task
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
@@ -88,7 +89,7 @@ def sweep(
     starts: int = 5,
     evaluations: int = 10_000,
     seed: int = 0,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> list[SweepPoint]:
     """Optimum at every point of the grid, in row-major order of the axes.
@@ -103,7 +104,7 @@ def sweep(
         starts: random starts of an NLP solver at both ends of its walk, and where no neighbour helps.
         evaluations: budget of a search run, and of a run of SLSQP.
         seed: of starts and searches.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told of each solve, ``count_solves`` times.
 
     Raises:
@@ -120,16 +121,18 @@ def sweep(
     specs = [replace(spec, values=dict(placed(problem, at).values)) for at in walk]  # all checked before the work
     tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
     check_task(tasks[0])
-    finished = finished or Finished()
+    store = store or Store()
     asked = {axis.name: list(axis.values) for axis in axes}
-    finished.asked("sweep", problem, over=asked, algorithm=algorithm, starts=starts, evaluations=evaluations, seed=seed)
+    store.report_changes(
+        "sweep", problem, over=asked, algorithm=algorithm, starts=starts, evaluations=evaluations, seed=seed
+    )
     ends: Sequence[Solution | RunRecord | None]
     sentence = ""
     try:
         if tasks[0].is_search:
-            ends = _searched(tasks, finished, progress)
+            ends = _searched(tasks, store, progress)
         else:
-            problems, solver = [s.load() for s in specs], finished.solver(tasks[0].solver())
+            problems, solver = [s.load() for s in specs], store_runs(store, tasks[0].solver())
             ends = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
     except Interrupted as interrupt:
         ends, sentence = cast("list[Solution | RunRecord | None]", interrupt.partial), interrupt.sentence
@@ -173,12 +176,12 @@ def _snake(axes: Sequence[Axis]) -> list[tuple[float, ...]]:
     return points
 
 
-def _searched(tasks: Sequence[Task], finished: Finished, progress: Progress) -> list[RunRecord]:
+def _searched(tasks: Sequence[Task], store: Store, progress: Progress) -> list[RunRecord]:
     """Records along the walk; an interrupt carries those that were made until then."""
     records: list[RunRecord] = []
     try:
         for task in tasks:
-            records.append(record_from(finished.step("search", task.definition(), partial(_run, task))))
+            records.append(record_from(store.compute("search-{key}", task.definition(), partial(_run, task))))
             progress("")
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted after {len(records)} of {len(tasks)} points", records) from None

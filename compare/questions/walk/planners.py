@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.questions.kept import Finished
 from compare.questions.walk.study import CYCLE, Gait, result_of, walked
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
@@ -92,7 +93,7 @@ def rivals(
     seed: int,
     steps: int,
     drive: Drive,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> Iterator[Rival]:
     """Gaits of other planners over the footsteps, the times and the swing height of each feasible gait, one after the other.
@@ -105,23 +106,23 @@ def rivals(
         seed: of these.
         steps: that are played; 0 plays none.
         drive: of the playback.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told of each gait.
     """
-    kept = finished or Finished()
+    store = store or Store()
     for gait in gaits:
         if not gait.found.feasible:
             continue
         for planner in planners:
             if planner == CART_TABLE:
-                planned = cart_table(result_of(spec, gait.found), gait, kept)
+                planned = cart_table(result_of(spec, gait.found), gait, store)
             else:
-                planned = least_torque(spec, gait, starts, seed, kept)
-            yield _rival(planner, gait.at, planned, steps, drive, kept)
+                planned = least_torque(spec, gait, starts, seed, store)
+            yield _rival(planner, gait.at, planned, steps, drive, store)
             progress(f"{planner} {gait.at:g}")
 
 
-def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | None, str]:
+def cart_table(own: Result, gait: Gait, store: Store) -> tuple[Result | None, str]:
     """The textbook's walk at the cheapest height of its hip: from the highest that reaches, lower as long as it pays."""
     problem = own.problem
     body = ON_A_TABLE[problem.name](**_shared(problem))
@@ -154,7 +155,7 @@ def cart_table(own: Result, gait: Gait, finished: Finished) -> tuple[Result | No
             best = energy, float(height)
         return best[1]
 
-    height = finished.step(CART_TABLE, {**fingerprint(problem), "x": own.x.tolist()}, cheapest)
+    height = store.compute(f"{CART_TABLE}-{{key}}", {**fingerprint(problem), "x": own.x.tolist()}, cheapest)
     if height is None:
         return None, "no height of the hip reaches"
     return at(height), f"hip {1000.0 * height:.0f} mm high"
@@ -168,21 +169,19 @@ def height_step_m(problem: GaitProblem) -> float:
     return HEIGHT_STEP_M * biped_of(problem.display.robot).length_scale
 
 
-def least_torque(
-    spec: ProblemSpec, gait: Gait, starts: int, seed: int, finished: Finished
-) -> tuple[Result | None, str]:
+def least_torque(spec: ProblemSpec, gait: Gait, starts: int, seed: int, store: Store) -> tuple[Result | None, str]:
     """The gait of least squared torques at the same times, so with the same steps."""
     own = result_of(spec, gait.found).problem
     problem = replace(spec, options={**spec.options, "objective": "torque"}).load().with_values(**own.values)
     same = {name: gait.found.x[name] for name in (*own.display.durations, LIFT)}
-    solution = solve(problem, starts=starts, seed=seed, fix=same, solver=finished.solver())
+    solution = solve(problem, starts=starts, seed=seed, fix=same, solver=store_runs(store))
     if not solution.success:
         return None, solution.status
     return Result(problem=problem, x=problem.check_x(solution.x)), ""
 
 
 def _rival(
-    planner: str, at: float, planned: tuple[Result | None, str], steps: int, drive: Drive, finished: Finished
+    planner: str, at: float, planned: tuple[Result | None, str], steps: int, drive: Drive, store: Store
 ) -> Rival:
     """A planned gait, judged and played."""
     result, note = planned
@@ -191,5 +190,5 @@ def _rival(
     exact = build_exact_model(result.problem)
     values = exact.at(result.x, result.problem.p)
     broken = tuple(f"{row.name} by {row.violation:.2g} {row.unit}" for row in exact.violated(values))
-    walk = walked(result, steps, drive, finished) if steps else None
+    walk = walked(result, steps, drive, store) if steps else None
     return Rival(planner=planner, at=at, indexes=dict(values.indexes), broken=broken, note=note, walk=walk)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
-from compare.questions.kept import Finished
 from compare.questions.sweep.study import Axis, SweepPoint, placed, sweep
+from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
@@ -72,7 +72,7 @@ def optimal_gaits(
     *,
     starts: int,
     seed: int,
-    finished: Finished | None = None,
+    store: Store | None = None,
     progress: Progress = ignore_progress,
 ) -> list[Gait]:
     """Optimal cycle at every point of an axis, each from its neighbours, there and back.
@@ -82,7 +82,7 @@ def optimal_gaits(
         axis: parameter or variable.
         starts: random starts of IPOPT at both ends, and where no neighbour helps.
         seed: of these starts.
-        finished: what an earlier call has finished; None to keep nothing.
+        store: of finished results; None stores nothing.
         progress: told of each solve, twice for each point.
 
     Raises:
@@ -95,12 +95,12 @@ def optimal_gaits(
         return [Gait(found=point, indexes=own) for point, own in zip(points, indexes, strict=True)]
 
     try:
-        return gaits(sweep(spec, [axis], starts=starts, seed=seed, finished=finished, progress=progress))
+        return gaits(sweep(spec, [axis], starts=starts, seed=seed, store=store, progress=progress))
     except Interrupted as interrupt:
         raise Interrupted(interrupt.sentence, gaits(cast("list[SweepPoint]", interrupt.partial))) from None
 
 
-def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive, finished: Finished | None = None) -> Gait:
+def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive, store: Store | None = None) -> Gait:
     """The gait with a playback of this many steps, taken from what is finished; unchanged where no feasible gait was found.
 
     Raises:
@@ -108,10 +108,10 @@ def played(spec: ProblemSpec, gait: Gait, steps: int, drive: Drive, finished: Fi
     """
     if not gait.found.feasible:
         return gait
-    return replace(gait, walk=walked(result_of(spec, gait.found), steps, drive, finished or Finished()))
+    return replace(gait, walk=walked(result_of(spec, gait.found), steps, drive, store or Store()))
 
 
-def walked(gait: Result, steps: int, drive: Drive, finished: Finished) -> Walk:
+def walked(gait: Result, steps: int, drive: Drive, store: Store) -> Walk:
     """How so many steps of a gait fare in the engine, taken from what is finished.
 
     Raises:
@@ -123,7 +123,7 @@ def walked(gait: Result, steps: int, drive: Drive, finished: Finished) -> Walk:
         plan = plan_of(gait, steps)
         return dict(without_nan(asdict(measure_walk(plan, play(plan, drive=drive), drive, steps))))
 
-    return decoded(Walk, finished.step("walk", inputs, measured))
+    return decoded(Walk, store.compute("walk-{key}", inputs, measured))
 
 
 def result_of(spec: ProblemSpec, point: SweepPoint) -> Result:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from compare.questions.certainty.multistart import multistart
+from compare.study.store import Store
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible, solve_both_ways
 from nlp_gait.backends.optima.optimum import optimum
 from nlp_gait.backends.solve import solve
@@ -77,7 +78,7 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
     solution = solve(problem, starts=2, solver=Corners())
     assert solution.success and solution.status == "tried" and solution.objective == pytest.approx(1.5)
     assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
-    ends = multistart(problem, tmp_path, starts=3, solver=Corners(), progress=lambda note: None)
+    ends = multistart(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
     assert ends.success.all() and ends.objective == pytest.approx([1.5] * 3)
 
 

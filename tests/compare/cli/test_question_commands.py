@@ -44,7 +44,7 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
     assert all(Path(file).stat().st_size > 0 for file in data["files"])
     again = nlp_gait(
         *PARETO, "--objectives", "power,speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path
-    )  # from its finished steps
+    )  # from its stored results
     assert "price" in again.stdout and " W per m/s " in again.stdout and "wrote " in again.stdout
 
 
@@ -143,13 +143,15 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
 
     monkeypatch.setattr(IterationWatch, "eval", counted)
     monkeypatch.setattr(pareto_front, "front_ends", found)
-    steps = tmp_path / "steps"
+    steps = tmp_path / "store"
     steps.mkdir()
     (steps / "earlier.json").write_text("{}")
     error = one_sentence(*PARETO, "--search", "none", "--out", tmp_path, status=130)
     kept = [path.name.partition("-")[0] for path in steps.iterdir()]
     assert kept.count("solve") == 4 and len(kept) == 6  # both ends of the front, and how it was asked
-    assert error == f"nlp-gait: interrupted; 6 finished steps are kept in {tmp_path}; the same command continues\n"
+    assert (
+        error == f"nlp-gait: interrupted; 6 finished results are stored in {tmp_path}; rerun the command to continue\n"
+    )
 
 
 def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,8 +171,8 @@ def test_ctrl_c_before_the_first_result_says_that_nothing_is_kept(
         monkeypatch.setattr(module, "solve", press)
     monkeypatch.setattr(prices, "solved", press)
     out = ["--out", tmp_path]
-    kept = f"finished steps are kept in {tmp_path}; the same command continues\n"
+    kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
     assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("motors", *out, status=130)
     assert f"after 0 of 3 boxes; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
     assert f"interrupted; 3 {kept}" in one_sentence("prices", "walk12", *out, status=130)
-    assert [path.name for path in tmp_path.iterdir()] == ["steps"]
+    assert [path.name for path in tmp_path.iterdir()] == ["store"]

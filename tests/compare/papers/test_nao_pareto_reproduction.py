@@ -65,12 +65,12 @@ def test_no_point_of_a_search_betters_the_true_front(done: tuple[Path, Findings,
 @pytest.mark.slow
 def test_a_second_call_makes_no_run_again(done: tuple[Path, Findings, list[str]]) -> None:
     out, _, _ = done
-    lost = out / "steps" / "nao-dsp-cmoead-200-00.json"
+    lost = out / "store" / "nao-dsp-cmoead-200-00.json"
     kept = lost.read_text()
     lost.unlink()
     told: list[str] = []
     nao_pareto.reproduce(out, progress=told.append, effort=SMALL)
-    made = [note for note in told if "kept from an earlier run" not in note]
+    made = [note for note in told if "stored by an earlier run" not in note]
     assert made == ["nao-dsp-cmoead-200-00", "figures, tables and report"]
     found, before = (re.sub(r'"(objective_)?time_s": [\d.e-]+', "", text) for text in (lost.read_text(), kept))
     assert found.partition('"result_sha256"')[0] == before.partition('"result_sha256"')[0]

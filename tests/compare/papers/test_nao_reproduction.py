@@ -60,7 +60,7 @@ def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings, list[
 
 def test_every_feasible_solution_is_kept(done: tuple[Path, Findings, list[str]]) -> None:
     out, findings, _ = done
-    with np.load(out / "points" / "nao-dsp-ga-02.npz") as archive:
+    with np.load(out / "store" / "points" / "nao-dsp-ga-02.npz") as archive:
         x, power = archive["x"], archive["power_W"]
     f, violation = nlp_gait.compile_objective(findings.dsp.problem)(x)
     assert len(x) > 100 and np.all(violation == 0.0)
@@ -84,10 +84,10 @@ def test_nothing_lies_below_ipopts_optimum(done: tuple[Path, Findings, list[str]
 
 def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, list[str]]) -> None:
     out, findings, _ = done
-    step = out / "steps" / "nao-dsp-sweep-x1.json"
+    step = out / "store" / "nao-dsp-sweep-x1.json"
     swept = step.read_text()
     (out / "records" / "nao-ssp" / "pso-0001.json").unlink()
-    (out / "points" / "nao-dsp-ga-00.npz").unlink()
+    (out / "store" / "points" / "nao-dsp-ga-00.npz").unlink()
     step.write_text(swept[: len(swept) // 2])  # torn by a crash
     told: list[str] = []
 
@@ -113,7 +113,7 @@ def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, 
     assert step.read_text() == swept
     again = read_record(out / "records" / "nao-ssp" / "pso-0001.json")
     assert again.x == findings.ssp.searches["pso"][1].x
-    assert (out / "points" / "nao-dsp-ga-00.npz").exists()
+    assert (out / "store" / "points" / "nao-dsp-ga-00.npz").exists()
 
 
 def test_progress_is_told_as_often_as_announced() -> None:

@@ -57,7 +57,7 @@ def test_tables_tell_what_the_records_hold(done: tuple[Path, list[str]]) -> None
 
 def test_a_second_call_computes_only_what_is_missing(done: tuple[Path, list[str]]) -> None:
     out, _ = done
-    first, step = out / "records" / f"table3-paper-{TABLE_3[1].weight:g}" / "ga-0001.json", out / "steps" / "front.json"
+    first, step = out / "records" / f"table3-paper-{TABLE_3[1].weight:g}" / "ga-0001.json", out / "store" / "front.json"
     kept = read_record(first), step.read_text()
     first.unlink()
     step.unlink()

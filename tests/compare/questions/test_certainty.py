@@ -13,6 +13,7 @@ from compare.questions.certainty.clusters import LocalOptimum, cluster, unseen
 from compare.questions.certainty.multistart import Ends, multistart
 from compare.questions.certainty.report import certainty_answer
 from compare.questions.certainty.study import certainty
+from compare.study.store import Store
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
 from nlp_gait.proofs.branch_and_bound import certify
@@ -87,23 +88,23 @@ def test_estimates_by_hand() -> None:
 def test_an_interrupted_multistart_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.questions.certainty.multistart.BATCH", 4)
     problem = toy(two_valleys)
-    whole = multistart(problem, tmp_path / "whole", starts=8)
+    whole = multistart(problem, Store(tmp_path / "whole"), starts=8)
 
     def interrupt(note: str) -> None:
         if note == "4 starts":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        multistart(problem, tmp_path / "cut", starts=8, progress=interrupt)
+        multistart(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
     notes: list[str] = []
-    resumed = multistart(problem, tmp_path / "cut", starts=8, progress=notes.append)
-    assert "starts-0: kept from an earlier run" in notes
+    resumed = multistart(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
+    assert "starts-0: stored by an earlier run" in notes
     np.testing.assert_array_equal(whole.x, resumed.x)
 
 
 def test_a_study_says_what_is_proven_and_what_is_supported(tmp_path: Path) -> None:
     problem = toy(two_valleys, limit=-9.0)
-    study = certainty(problem, tmp_path, starts=12, evaluations=2000, time_limit_s=20.0)
+    study = certainty(problem, Store(tmp_path), starts=12, evaluations=2000, time_limit_s=20.0)
     assert len(study.optima) == 2
     assert study.optima[0].x[0] < 0.0 < study.optima[1].x[0]
     assert study.certificate is not None and study.certificate.closed

@@ -18,6 +18,7 @@ from compare.questions.motions import study as module
 from compare.questions.motions.report import motions_answer, sentences
 from compare.questions.motions.study import Motion, limit, motions
 from compare.questions.motions.tasks import tasks
+from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError
 
@@ -32,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> list[Motion]:
-    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), folder)
+    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), store=Store(folder))
 
 
 def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: list[Motion]) -> None:
@@ -51,10 +52,10 @@ def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], mon
     monkeypatch.setattr(module, "solve", never)
     again: list[str] = []
     study = tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0)
-    assert motions(study, folder, progress=again.append) == found
+    assert motions(study, store=Store(folder), progress=again.append) == found
     assert again == ["planned-cubic-power", "planned-quintic-power", "coarse-quintic-power"]
     with pytest.raises(AssertionError, match="solved again"):
-        motions(study, folder, seed=1)
+        motions(study, store=Store(folder), seed=1)
 
 
 def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:

@@ -18,6 +18,7 @@ from compare.questions.pareto.report import front_answer
 from compare.questions.pareto.search import SearchFront
 from compare.questions.pareto.study import ParetoStudy, pareto_study, parse_searches
 from compare.questions.pareto.surface import pareto_surface, surface_answer
+from compare.study.store import Store
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
 
@@ -147,12 +148,12 @@ def study(problem: GaitProblem, folder: Path, notes: list[str]) -> ParetoStudy:
     return pareto_study(
         problem,
         "dbm_y_mean",
-        folder,
         points=5,
         starts=1,
         searches={"NSGA2": (100, 300)},
         runs=1,
         seed=0,
+        store=Store(folder),
         progress=notes.append,
     )
 
@@ -168,7 +169,7 @@ def test_a_small_front_lies_below_what_searches_find_and_is_kept(small: GaitProb
     assert found.qualities[1].hypervolume[1] > 0.8
     notes: list[str] = []
     again = study(small, folder, notes)
-    assert any("kept from an earlier run" in note for note in notes)
+    assert any("stored by an earlier run" in note for note in notes)
     assert [p.power_W for p in again.front] == list(powers)
     written = front_answer(found, small).write(folder)
     with (folder / "nao-ssp-front-dbm_y_mean.csv").open(encoding="utf-8") as file:

@@ -16,9 +16,9 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from compare.questions.certainty import multistart
-from compare.questions.kept import Finished, _outcome, _plain
 from compare.questions.motors import study as motors
-from compare.study.steps import Steps
+from compare.study.store import Store
+from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
@@ -55,18 +55,18 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
-    """Steps that were kept; the call ends after so many."""
+    """Names of the results that are stored; the call ends after so many."""
     kept: list[str] = []
-    keep = Steps.keep
+    save = Store.save
 
-    def counted(self: Steps, name: str, *rest: Any) -> Any:
-        result = keep(self, name, *rest)
+    def counted(self: Store, name: str, *rest: Any) -> Any:
+        result = save(self, name, *rest)
         kept.append(name)
         if len(kept) == steps:
             raise Killed
         return result
 
-    monkeypatch.setattr(Steps, "keep", counted)
+    monkeypatch.setattr(Store, "save", counted)
     return kept
 
 
@@ -98,7 +98,7 @@ def test_the_same_call_goes_on(case: str, tmp_path: Path, monkeypatch: pytest.Mo
         resumed, said = answer(killed, *WHOLE[case])
     assert resumed == undisturbed
     assert not set(before) & set(after) and sorted([*before, *after]) == sorted(all_steps)  # none is lost, none double
-    assert "made again" not in said
+    assert "recomputed" not in said
 
 
 @pytest.mark.parametrize("case", BEGUN)
@@ -125,23 +125,23 @@ def test_what_changed_is_said_and_made_again(tmp_path: Path) -> None:
     assert text != content
     (light, _), (heavy, said) = found
     assert heavy["points"][0]["objective"] > light["points"][0]["objective"]
-    assert said == "sweep-nao-ssp: made again: the problem's mathematics or limits\n"
+    assert said == "sweep-nao-ssp: recomputed: the problem's mathematics or limits\n"
     again, said = answer(tmp_path / "out", *sweep)
-    assert again == heavy and said == "2 of 2 steps were finished by an earlier call\n"
+    assert again == heavy and said == "2 of 2 results were stored by an earlier run\n"
     _, said = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")
-    assert said == "sweep-nao-ssp: made again: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
+    assert said == "sweep-nao-ssp: recomputed: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
 
 
 def test_steps_of_forked_starts_are_counted(tmp_path: Path) -> None:
     """Starts that run side by side are steps of this call too."""
     problem = nlp_gait.load("walk12")
     points = [problem.start_point(np.random.default_rng(seed)) for seed in range(5)]
-    first = Finished(tmp_path)
-    list(run_starts(first.solver(), problem, points[:3], workers=2))
-    assert first.sentence == ""
-    second = Finished(tmp_path)
-    list(run_starts(second.solver(), problem, points, workers=2))
-    assert second.sentence == "3 of 5 steps were finished by an earlier call"
+    first = Store(tmp_path)
+    list(run_starts(store_runs(first), problem, points[:3], workers=2))
+    assert first.summary == ""
+    second = Store(tmp_path)
+    list(run_starts(store_runs(second), problem, points, workers=2))
+    assert second.summary == "3 of 5 results were stored by an earlier run"
 
 
 def test_a_kept_outcome_has_every_bit() -> None:
@@ -149,7 +149,7 @@ def test_a_kept_outcome_has_every_bit() -> None:
     (outcome,) = nlp_gait.solve(problem).starts
     strange = replace(outcome, objective=math.nan, violation=math.inf, cost=-0.0, history=(Best(3, None, 0.5),))
     for whole in (outcome, strange, replace(outcome, guess=None)):
-        back = _outcome(json.loads(json.dumps(_plain(whole), allow_nan=False)))
+        back = parse_outcome(json.loads(json.dumps(plain_outcome(whole), allow_nan=False)))
         for field in fields(Outcome):
             if field.name != "guess":
                 assert repr(getattr(back, field.name)) == repr(getattr(whole, field.name))
@@ -164,15 +164,15 @@ def test_a_kept_outcome_has_every_bit() -> None:
 
 
 def test_a_solve_that_was_stopped_is_not_finished(tmp_path: Path) -> None:
-    problem, finished = nlp_gait.load("walk12"), Finished(tmp_path)
-    solver = finished.solver()
+    problem, store = nlp_gait.load("walk12"), Store(tmp_path)
+    solver = store_runs(store)
     x0 = (problem.lower + problem.upper) / 2
     stopped = solver.run(problem, x0, lambda: True)
-    assert stopped.status == "was interrupted" and not list((tmp_path / "steps").iterdir())
+    assert stopped.status == "was interrupted" and not list((tmp_path / "store").iterdir())
     whole = solver.run(problem, x0)
-    assert whole.success and len(list((tmp_path / "steps").iterdir())) == 1
+    assert whole.success and len(list((tmp_path / "store").iterdir())) == 1
     warm = solver.run_from(problem, whole)
-    later = Finished(tmp_path).solver()
+    later = store_runs(Store(tmp_path))
     kept = later.run(problem, x0)
     kept_warm = later.run_from(problem, kept)
     assert warm is not None and kept_warm is not None and repr(kept_warm) == repr(warm)

@@ -15,6 +15,7 @@ from compare.cli import app
 from compare.study import engine, task
 from compare.study.engine import kept_plays, play_records
 from compare.study.record import RunRecord
+from compare.study.store import Store
 from compare.study.study import RECORDS
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
@@ -109,10 +110,10 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
 
 
 def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
-    path = tmp_path / "engine" / "nao-dsp" / "pso-0000.json"
-    path.parent.mkdir(parents=True)
-    path.write_text('{"schema": 1, "played": {}}')
-    with pytest.raises(InputError, match="delete it to have the gait played anew"):
+    gait = dsp("pso", 3.0)
+    inputs = {"problem": gait.definition["problem"], "x": dict(gait.x)}
+    Store(tmp_path).save("simulations/nao-dsp/pso-0000", inputs, {})
+    with pytest.raises(InputError, match="delete it and rerun with --engine"):
         kept_plays(tmp_path, [dsp("pso", 3.0)])
 
 

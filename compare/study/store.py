@@ -1,0 +1,251 @@
+"""Finished results on disk: each is computed once for equal inputs, so that an interrupted command can be rerun to continue."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import json
+import tempfile
+import weakref
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compare.study.definition import input_differences
+from compare.study.workers import side_by_side
+from nlp_gait.backends.identity import fingerprint, sha256_of
+from nlp_gait.backends.kernel.compiled import available_cores
+from nlp_gait.errors import InputError, OutputError
+from nlp_gait.files import new_file, read_bytes, read_json, remove_leftovers, writable_folder, write_json
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
+
+FOLDER = "store"  # in the folder of the work
+KEY = "{key}"  # in a name
+KEY_DIGITS = 20
+CODE = "code_sha256"  # input: hash of the modules that compute a result
+STORED, COMPUTED = b"s", b"c"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Computation:
+    """A named result: everything that it depends on, and the function that computes it (picklable for worker processes)."""
+
+    name: str
+    inputs: Mapping[str, Any]
+    function: Callable[[], Any]
+
+
+class Result(NamedTuple):
+    """A stored result: its value, which may be None, and the inputs from which it was computed."""
+
+    value: Any
+    inputs: Mapping[str, Any]
+
+
+class Store:
+    """Results in ``<folder>/store/<name>.json`` or ``.npz``, each with its inputs and their hash.
+
+    A name may contain ``/`` for subfolders, and ``{key}`` for the hash of the inputs: results of different inputs then lie next
+    to each other; otherwise a new result replaces the old one. Damaged files are recomputed. Files are written in one step and
+    flushed to the disk.
+
+    Attributes:
+        folder: of the files; None if nothing is stored.
+
+    Args:
+        out: folder of the work; None stores nothing.
+        report: receives a message for each result that is recomputed because its inputs have changed, and one if results can no
+            longer be stored. Without it, the progress of the computation receives the former and the latter raises OutputError.
+
+    Raises:
+        OutputError: the folder is not writable.
+    """
+
+    def __init__(self, out: Path | None = None, report: Progress | None = None) -> None:
+        self.folder = None if out is None else writable_folder(out / FOLDER)
+        self._report = report
+        self._counts = tempfile.TemporaryFile("w+b", buffering=0)  # noqa: SIM115  one byte for each result, shared with forks
+        weakref.finalize(self, self._counts.close)
+        if self.folder is not None:
+            for folder in (self.folder, *(path for path in self.folder.rglob("*") if path.is_dir())):
+                remove_leftovers(folder)
+
+    def compute(
+        self,
+        name: str,
+        inputs: Mapping[str, Any],
+        function: Callable[[], Any],
+        *,
+        code: Sequence[ModuleType] = (),
+        progress: Progress = ignore_progress,
+    ) -> Any:
+        """Return a stored result, or compute and store it; arguments and errors as ``compute_all``."""
+        computation = Computation(name=name, inputs=inputs, function=function)
+        return self.compute_all([computation], jobs=1, code=code, progress=progress)[name]
+
+    def compute_all(
+        self,
+        computations: Sequence[Computation],
+        *,
+        jobs: int | None = None,
+        code: Sequence[ModuleType] = (),
+        progress: Progress = ignore_progress,
+    ) -> dict[str, Any]:
+        """Return several results by name; compute those that are not stored, and store each as soon as it is finished.
+
+        Args:
+            computations: with different names.
+            jobs: worker processes; None for one on each processor, 1 for this process.
+            code: modules that compute the results; these are recomputed when the text of one has changed.
+            progress: receives the name of each result when it is loaded, or before it is computed (in worker processes: after).
+
+        Returns:
+            Plain data as JSON gives it back.
+
+        Raises:
+            OutputError: a result cannot be stored, and the store has no ``report``.
+            ValueError: a result is no plain data, or not finite.
+        """
+        source = {CODE: sha256_of([inspect.getsource(module) for module in code])} if code else {}
+        inputs = {computation.name: {**computation.inputs, **source} for computation in computations}
+        values: dict[str, Any] = dict.fromkeys(inputs)
+        waiting: dict[str, Callable[[], Any]] = {}
+        notes: dict[str, str] = {}
+        for computation in computations:
+            name = computation.name
+            result, notes[name] = self._find(name, inputs[name])
+            self._count(COMPUTED if result is None else STORED)
+            if result is None:
+                waiting[name] = computation.function
+            else:
+                progress(f"{name}: stored by an earlier run")
+                values[name] = result.value
+        workers = min(jobs or available_cores(), len(waiting))
+        if workers > 1:
+            for name, value in side_by_side(waiting, workers):
+                progress(notes[name])
+                values[name] = self.save(name, inputs[name], value)
+        else:
+            for name, function in waiting.items():
+                progress(notes[name])
+                values[name] = self.save(name, inputs[name], function())
+        return values
+
+    def load(self, name: str, inputs: Mapping[str, Any] | None = None) -> Result | None:
+        """Return the stored result; None if there is none, it is damaged, or it was computed from other inputs.
+
+        Args:
+            name: of the result.
+            inputs: None accepts any.
+        """
+        path = self._path(name, inputs, ".json")
+        if path is None or not path.exists():
+            return None
+        try:
+            content = read_json(path, "result")
+        except InputError:
+            return None
+        if not isinstance(content, dict) or not content.keys() >= {"inputs", "result", "sha256", "result_sha256"}:
+            return None
+        intact = content["result_sha256"] == sha256_of([content["result"], content["inputs"]])
+        fits = inputs is None or content["sha256"] == sha256_of(inputs)
+        return Result(content["result"], content["inputs"]) if intact and fits else None
+
+    def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
+        """Store a result, and return it as ``load`` does.
+
+        Raises:
+            OutputError, ValueError: see ``compute_all``.
+        """
+        value, inputs = as_json(value), as_json(inputs)
+        hashes = {"sha256": sha256_of(inputs), "result_sha256": sha256_of([value, inputs])}
+        with self._writing(name, inputs, ".json") as path:
+            if path is not None:
+                write_json(path, {"inputs": inputs, "result": value, **hashes})
+        return value
+
+    def load_arrays(self, name: str, inputs: Mapping[str, Any]) -> dict[str, Array] | None:
+        """Return stored arrays by name; None as for ``load``."""
+        path = self._path(name, inputs, ".npz")
+        if path is None or not path.exists():
+            return None
+        try:
+            with np.load(io.BytesIO(read_bytes(path, "result")), allow_pickle=False) as archive:
+                arrays = {key: np.asarray(archive[key]) for key in archive}
+        except Exception:  # NumPy and zipfile raise a dozen kinds of errors on damaged archives
+            return None
+        fits = "inputs" in arrays and str(arrays.pop("inputs")) == json.dumps(inputs, sort_keys=True)
+        return arrays if fits else None
+
+    def save_arrays(self, name: str, inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Store arrays by name as an npz file.
+
+        Raises:
+            OutputError: see ``compute_all``.
+        """
+        with self._writing(name, inputs, ".npz") as path:
+            if path is not None:
+                with new_file(path) as temporary, open(temporary, "wb") as file:
+                    text = np.array(json.dumps(inputs, sort_keys=True))
+                    np.savez_compressed(file, allow_pickle=False, inputs=text, **arrays)
+
+    def report_changes(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
+        """Report what has changed since a question about a problem was last answered in this folder, and store its inputs."""
+        name, inputs = f"{question}-{problem.name}", {**fingerprint(problem), **inputs}
+        if self._find(name, inputs)[0] is None:
+            self.save(name, inputs, None)
+
+    @property
+    def summary(self) -> str:
+        """How many results were stored by an earlier run, as a sentence; empty if none."""
+        self._counts.seek(0)
+        counts = Counter(self._counts.read())
+        stored = counts[STORED[0]]
+        return f"{stored} of {counts.total()} results were stored by an earlier run" if stored else ""
+
+    def _find(self, name: str, inputs: Mapping[str, Any]) -> tuple[Result | None, str]:
+        """Result, and what to say when it is computed."""
+        result = self.load(name, inputs)
+        outdated = self.load(name) if result is None and KEY not in name else None
+        if outdated is None:
+            return result, name
+        message = f"{name}: recomputed: {input_differences(outdated.inputs, as_json(inputs))}"
+        if self._report is None:
+            return None, message
+        self._report(message)
+        return None, name
+
+    def _path(self, name: str, inputs: Mapping[str, Any] | None, suffix: str) -> Path | None:
+        if self.folder is None:
+            return None
+        return self.folder / f"{name.replace(KEY, sha256_of(inputs)[:KEY_DIGITS])}{suffix}"
+
+    @contextmanager
+    def _writing(self, name: str, inputs: Mapping[str, Any], suffix: str) -> Iterator[Path | None]:
+        """Path to write to; after a failure nothing more is stored if there is someone to report it to."""
+        path = self._path(name, inputs, suffix)
+        try:
+            if path is not None and not path.parent.is_dir():
+                writable_folder(path.parent)
+            yield path
+        except OutputError as error:
+            if self._report is None:
+                raise
+            self.folder = None
+            self._report(f"{error}; continuing without storing results")
+
+    def _count(self, kind: bytes) -> None:
+        with suppress(OSError):
+            self._counts.write(kind)
+
+
+def as_json(data: Any) -> Any:
+    """Return plain data as JSON gives it back."""
+    return json.loads(json.dumps(data, allow_nan=False))
