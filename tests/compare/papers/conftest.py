@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import pytest
 
 from compare.papers import paper_runs
-from compare.study import steps
+from compare.study import store
 
 
 @pytest.fixture(scope="package", autouse=True)
 def in_this_process() -> Iterator[None]:
     """No worker processes: each would build every problem again."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (steps, paper_runs):
+        for module in (store, paper_runs):
             patch.setattr(module, "available_cores", lambda: 1)
         yield

@@ -93,7 +93,7 @@ def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, 
 
     def stop_at_news(note: str) -> None:
         told.append(note)
-        if "kept" not in note:
+        if "stored" not in note:
             raise KeyboardInterrupt
 
     for news in ("nao-dsp, ga 0", "nao-ssp, pso 1", "nao-dsp-sweep-x1"):
@@ -109,7 +109,7 @@ def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, 
 
     with pytest.raises(KeyboardInterrupt):
         nao.reproduce(out, progress=stop_at_figures, effort=SMALL)
-    assert [note for note in told if "kept" not in note] == ["nao-dsp-sweep-x1", "figures, tables and report"]
+    assert [note for note in told if "stored" not in note] == ["nao-dsp-sweep-x1", "figures, tables and report"]
     assert step.read_text() == swept
     again = read_record(out / "records" / "nao-ssp" / "pso-0001.json")
     assert again.x == findings.ssp.searches["pso"][1].x

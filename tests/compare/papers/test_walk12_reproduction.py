@@ -70,7 +70,7 @@ def test_a_second_call_computes_only_what_is_missing(done: tuple[Path, list[str]
 
     with pytest.raises(KeyboardInterrupt):
         walk12.reproduce(out, progress=stop_at_figures, effort=SMALL)
-    assert [note for note in told if "kept" not in note] == [
+    assert [note for note in told if "stored" not in note] == [
         "table3-paper-0.15, ga 1",
         "front",
         "figures, tables and report",

@@ -19,6 +19,7 @@ from compare.questions.certainty import multistart
 from compare.questions.motors import study as motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
+from nlp_gait.backends.identity import sha256_of
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
@@ -59,9 +60,9 @@ def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
     kept: list[str] = []
     save = Store.save
 
-    def counted(self: Store, name: str, *rest: Any) -> Any:
-        result = save(self, name, *rest)
-        kept.append(name)
+    def counted(self: Store, name: str, inputs: Any, *rest: Any) -> Any:
+        result = save(self, name, inputs, *rest)
+        kept.append(f"{name} {sha256_of(inputs)}")
         if len(kept) == steps:
             raise Killed
         return result
