@@ -9,8 +9,8 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import FLAGS
-from nlp_gait.backends.derivatives.source import table, write_nlp_source
-from nlp_gait.backends.derivatives.straight_line import number
+from nlp_gait.backends.derivatives.operations import format_number
+from nlp_gait.backends.derivatives.source import write_array, write_nlp_source
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.export.c_files import comment, write_c_files
@@ -80,7 +80,7 @@ def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) 
             write_nlp_source(found).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(
-                _constant("double", f"{prefix}_{name}", map(number, values.tolist()))
+                _constant("double", f"{prefix}_{name}", map(format_number, values.tolist()))
                 for name, values in constants.items()
             ),
             *(_constant("long long", f"{prefix}_{name}", values) for name, values in {**starts, **rows}.items()),
@@ -90,7 +90,7 @@ def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) 
 
 
 def _constant(kind: str, name: str, values: Iterable[object]) -> str:
-    return table(kind, name, values).replace("static const", 'extern "C" const', 1)
+    return write_array(kind, name, values).replace("static const", 'extern "C" const', 1)
 
 
 def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:

@@ -21,7 +21,7 @@ from nlp_gait.backends.derivatives.structure import Structure
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NlpPlan:
-    """A plan and where its results stand.
+    """A plan and the places of its inputs and results.
 
     Attributes:
         plan: with steps of three phases.
@@ -32,7 +32,7 @@ class NlpPlan:
         jacobian: sparsity (m, n).
         jacobian_places: of its nonzeros, in CasADi's order.
         hessian: sparsity (n, n), upper triangle.
-        hessian_place: of its nonzeros, which stand in CasADi's order.
+        hessian_place: of its nonzeros, in CasADi's order.
     """
 
     plan: Plan
@@ -49,11 +49,7 @@ class NlpPlan:
 
 
 def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
-    """The plan of an NLP.
-
-    Args:
-        structure: of the NLP.
-        second: whether second derivatives are wanted.
+    """Return the plan of an NLP, with second derivatives or without.
 
     Raises:
         NotMapped: it uses an operation that has no C++ here.
@@ -66,12 +62,12 @@ def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
         stages.append(Samples(assembler, stage, before))
         before += stage.outputs.shape[0]
     rows = structure.rows
-    place = plan.room(rows.shape[0])
-    glue = assembler.glue(rows, place + np.arange(rows.shape[0]))
+    place = plan.allocate(rows.shape[0])
+    glue = assembler.add_glue(rows, place + np.arange(rows.shape[0]))
     patterns = [assembler.columns(entries) for entries in glue.entries]
-    gradient = plan.room(n)
+    gradient = plan.allocate(n)
     starts = np.cumsum([0, *(len(pattern) for pattern in patterns[1:])])
-    jacobian = plan.room(int(starts[-1]))
+    jacobian = plan.allocate(int(starts[-1]))
     plan.reset(FIRST, gradient, n + int(starts[-1]))
     for row, (entries, pattern) in enumerate(zip(glue.entries, patterns, strict=True)):
         for j, factor in entries:
@@ -81,13 +77,13 @@ def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
                 if row == 0
                 else jacobian + starts[row - 1] + np.searchsorted(pattern, derivative.columns)
             )
-            plan.add(FIRST, derivative, targets, factor)
+            plan.add_row(FIRST, derivative, targets, factor)
     m = rows.shape[0] - 1
     number = np.repeat(np.arange(m), np.diff(starts))
     column = np.concatenate([np.zeros(0, int), *patterns[1:]])
     order = np.lexsort((number, column))
     sparsity = ca.Sparsity.triplet(m, n, number.tolist(), column.tolist())
-    weights = plan.room(rows.shape[0])
+    weights = plan.allocate(rows.shape[0])
     hessian = Hessian(assembler, stages, glue, weights) if second else None
     return NlpPlan(
         plan=plan,

@@ -1,7 +1,8 @@
-"""CasADi's scalar operations as C++, for lanes and for single numbers."""
+"""CasADi's scalar operations as C++, for lanes and for single numbers, and functions of them as straight-line code."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import casadi as ca
@@ -9,8 +10,11 @@ import casadi as ca
 from nlp_gait.backends.derivatives.structure import NotMapped
 from nlp_gait.symbolic.tape import Instruction, read_tape
 
-# {f} is the prefix of functions: of lanes or of numbers (``native/nlp.hpp``).
-EXPRESSIONS = {
+_UNARY = "EXP LOG SQRT SIN COS TAN ASIN ACOS ATAN SINH COSH TANH FLOOR CEIL FABS SIGN NOT LOG1P EXPM1"
+_BINARY = "POW CONSTPOW LT LE EQ NE AND OR FMOD COPYSIGN IF_ELSE_ZERO FMIN FMAX ATAN2 HYPOT"
+_NAMES = {"CONSTPOW": "pow", "LT": "less", "LE": "at_most", "EQ": "equal", "NE": "unequal"}  # others have CasADi's
+# {f} is the prefix of functions: of lanes or of numbers (``native/operations.hpp``).
+EXPRESSIONS: dict[int, str] = {
     ca.OP_ASSIGN: "{0}",
     ca.OP_ADD: "{0} + {1}",
     ca.OP_SUB: "{0} - {1}",
@@ -20,52 +24,12 @@ EXPRESSIONS = {
     ca.OP_SQ: "{0} * {0}",
     ca.OP_TWICE: "{0} + {0}",
     ca.OP_INV: "{f}number(1.0) / {0}",
-    **{
-        code: f"{{f}}{name}({{0}})"
-        for code, name in {
-            ca.OP_EXP: "exp",
-            ca.OP_LOG: "log",
-            ca.OP_SQRT: "sqrt",
-            ca.OP_SIN: "sin",
-            ca.OP_COS: "cos",
-            ca.OP_TAN: "tan",
-            ca.OP_ASIN: "asin",
-            ca.OP_ACOS: "acos",
-            ca.OP_ATAN: "atan",
-            ca.OP_SINH: "sinh",
-            ca.OP_COSH: "cosh",
-            ca.OP_TANH: "tanh",
-            ca.OP_FLOOR: "floor",
-            ca.OP_CEIL: "ceil",
-            ca.OP_FABS: "fabs",
-            ca.OP_SIGN: "sign",
-            ca.OP_NOT: "not",
-            ca.OP_LOG1P: "log1p",
-            ca.OP_EXPM1: "expm1",
-        }.items()
-    },
-    **{
-        code: f"{{f}}{name}({{0}}, {{1}})"
-        for code, name in {
-            ca.OP_POW: "pow",
-            ca.OP_CONSTPOW: "pow",
-            ca.OP_LT: "less",
-            ca.OP_LE: "at_most",
-            ca.OP_EQ: "equal",
-            ca.OP_NE: "unequal",
-            ca.OP_AND: "and",
-            ca.OP_OR: "or",
-            ca.OP_FMOD: "fmod",
-            ca.OP_COPYSIGN: "copysign",
-            ca.OP_IF_ELSE_ZERO: "if_else_zero",
-            ca.OP_FMIN: "fmin",
-            ca.OP_FMAX: "fmax",
-            ca.OP_ATAN2: "atan2",
-            ca.OP_HYPOT: "hypot",
-        }.items()
-    },
+    **{getattr(ca, f"OP_{name}"): f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()},
+    **{getattr(ca, f"OP_{name}"): f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()},
 }
 CODES = {operation: code for code, operation in enumerate(EXPRESSIONS)}
+# Operations in one C++ function: longer ones take the compiler longer per operation, shorter ones pass more values in memory.
+PIECE = 500
 
 
 def read_operations(function: ca.Function) -> Iterator[Instruction]:
@@ -78,3 +42,58 @@ def read_operations(function: ca.Function) -> Iterator[Instruction]:
         if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
             raise NotMapped(f"operation {instruction.operation} of function {function.name()}")
         yield instruction
+
+
+def write_function(name: str, function: ca.Function) -> str:
+    """Return C++ of ``void name(const Vector* in, Vector* out)``, with all inputs one after the other, and all outputs.
+
+    It is split into pieces, so that the compile time is proportional to the length.
+    """
+    tape = list(read_operations(function))
+    free = {
+        k: f"in[{each.place}]" if each.operation == ca.OP_INPUT else f"v_number({format_number(each.constant)})"
+        for k, each in enumerate(tape)
+        if each.operation in (ca.OP_INPUT, ca.OP_CONST)
+    }
+    body = [k for k in range(len(tape)) if k not in free]
+    piece = {k: i // PIECE for i, k in enumerate(body)}
+    kept: dict[int, int] = {}  # values that later pieces need, by their place in memory
+    for k in body:
+        for value in tape[k].arguments:
+            if value not in free and piece[value] != piece[k]:
+                kept.setdefault(value, len(kept))
+    pieces = -(-len(body) // PIECE)
+    lines: list[str] = []
+    for number in range(pieces):
+        lines.append(
+            f"static NEVER_INLINE void {name}_{number}(const Vector* __restrict in, Vector* __restrict out, "
+            "Vector* __restrict kept) {"
+        )
+        known: set[int] = set()
+        for k in body[number * PIECE : (number + 1) * PIECE]:
+            each = tape[k]
+            for value in each.arguments:
+                if value not in known:
+                    known.add(value)
+                    lines.append(f"const Vector t{value} = {free.get(value) or f'kept[{kept[value]}]'};")
+            names = [f"t{value}" for value in each.arguments]
+            if each.operation == ca.OP_OUTPUT:
+                lines.append(f"out[{each.place}] = {names[0]};")
+                continue
+            known.add(k)
+            lines.append(f"const Vector t{k} = {EXPRESSIONS[each.operation].format(*names, f='v_')};")
+            if k in kept:
+                lines.append(f"kept[{kept[k]}] = t{k};")
+        lines.append("}")
+    calls = " ".join(f"{name}_{number}(in, out, kept);" for number in range(pieces))
+    lines.append(f"static void {name}(const Vector* in, Vector* out) {{ Vector kept[{len(kept) + 1}]; {calls} }}")
+    return "\n".join(lines)
+
+
+def format_number(value: float) -> str:
+    """Return a double as C++, to the last bit."""
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(float(value))

@@ -1,8 +1,8 @@
-"""What is computed in which order and where: one memory of doubles, and steps that fill it.
+"""Evaluation plan of an NLP: one memory of doubles, and the steps that fill it.
 
 Everything has a place in one array: variables, parameters, inputs and outputs of all samples, derivatives, constants. A step
-copies initial values, works through a tape of scalar operations (the glue), adds products of runs of numbers (sparse linear
-algebra), or calls a function of one sample for all pairs of a sample and a direction, as many at once as there are lanes.
+copies initial values, executes a tape of scalar operations (the glue), adds products of runs of numbers (sparse linear algebra),
+or calls a function of one sample for all pairs of a sample and a direction, as many at once as there are lanes.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ RESET, TAPE, RUNS, PRODUCTS, CALL = range(5)
 
 
 class Row(NamedTuple):
-    """Derivative of a scalar with respect to the variables: (k,) their numbers, ascending, and places of the values."""
+    """Derivative of a scalar: numbers (k,) of the variables, ascending, and places (k,) of the values."""
 
     columns: Integers
     places: Integers
 
 
 class Block(NamedTuple):
-    """Numbers that a call reads or writes for sample e and direction d: at base + e sample + i step + d direction, i < length."""
+    """Places that a call uses for sample e and direction d: base + e sample + i step + d direction, i < length."""
 
     base: int
     sample: int
@@ -41,12 +41,12 @@ class Block(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A function of one sample for all samples and directions.
+    """Call of a function of one sample for all samples and directions.
 
     Attributes:
         function: number of the function.
-        samples: their number.
-        directions: of each sample (samples,), or None where it takes none.
+        samples: number of samples.
+        directions: (samples,) number of directions of each, or None if the function takes none.
         inputs: in their order; likewise ``outputs``.
     """
 
@@ -62,14 +62,14 @@ class Plan:
     """The memory and the steps; ``Assembler`` fills it.
 
     Attributes:
-        size: doubles of the memory.
-        initial: numbers that are there from the beginning, by place; all others are zero.
-        functions: of one sample, to be emitted.
-        calls: of these.
+        size: of the memory, in doubles.
+        initial: initial values by place; all others are zero.
+        functions: functions of one sample, to be emitted.
+        calls: of these functions.
         tape: (operation, target, argument, argument).
-        runs: (target, source, factor, length): adds factor times a run of numbers to another.
+        runs: (target, source, factor, length): adds factor times a run of numbers to another run.
         products: (target, source, factor, factor, length): the same with two factors.
-        steps: (kind, first, last) of the three phases, which build on each other: values, first and second derivatives.
+        steps: (kind, first, last) of three phases: values, first derivatives, second derivatives.
     """
 
     size: int = 1
@@ -82,46 +82,46 @@ class Plan:
     steps: tuple[list[tuple[int, int, int]], ...] = field(default_factory=lambda: ([], [], []))
     _constants: dict[float, int] = field(default_factory=lambda: {1.0: ONE})
 
-    def room(self, count: int) -> int:
-        """Place of so many new numbers."""
+    def allocate(self, count: int) -> int:
+        """Return the place of new numbers."""
         place = self.size
         self.size += count
         return place
 
-    def constant(self, value: float) -> int:
-        """Place of a constant."""
+    def place_constant(self, value: float) -> int:
+        """Return the place of a constant."""
         if value not in self._constants:
-            place = self._constants[value] = self.room(1)
+            place = self._constants[value] = self.allocate(1)
             self.initial[place] = value
         return self._constants[value]
 
     def reset(self, phase: int, place: int, count: int, before: int | None = None) -> None:
-        """Begin a phase's numbers from their initial values, before a step that is there already or after all of them."""
+        """Add a step that sets numbers to their initial values, before an existing step or after all steps."""
         if count:
             steps = self.steps[phase]
             steps.insert(len(steps) if before is None else before, (RESET, place, count))
 
-    def call(self, phase: int, call: Call) -> None:
-        """Call a function of one sample."""
+    def add_call(self, phase: int, call: Call) -> None:
+        """Add a call of a function of one sample."""
         self.steps[phase].append((CALL, len(self.calls), len(self.calls) + 1))
         self.calls.append(call)
 
-    def function(self, function: ca.Function) -> int:
-        """Number of a function that will be emitted."""
+    def add_function(self, function: ca.Function) -> int:
+        """Add a function to be emitted, and return its number."""
         self.functions.append(function)
         return len(self.functions) - 1
 
-    def evaluate(
+    def add_expressions(
         self, phase: int, inputs: Sequence[SX], places: Sequence[Integers], outputs: SX, targets: Integers
     ) -> None:
-        """Scalar expressions.
+        """Add scalar expressions to the tape.
 
         Args:
-            phase: that they belong to.
+            phase: that evaluates them.
             inputs: vectors of symbols.
-            places: of their numbers, -1 for those that are not used.
+            places: of the symbols' values, -1 for those that are not used.
             outputs: (k,) expressions.
-            targets: (k,) their places.
+            targets: (k,) places of the outputs.
         """
         if not outputs.shape[0]:
             return
@@ -136,51 +136,50 @@ class Plan:
                 at.append(int(source[each.place]))
                 continue
             if each.operation == ca.OP_CONST:
-                at.append(self.constant(each.constant))
+                at.append(self.place_constant(each.constant))
                 continue
             if each.operation == ca.OP_OUTPUT:
                 operation, target = CODES[ca.OP_ASSIGN], int(targets[each.place])
             else:
                 operation, target = CODES[each.operation], registers.setdefault(each.register, len(registers))
-                target = -1 - target  # settled below, where the number of registers is known
+                target = -1 - target  # replaced below, where the number of registers is known
             at.append(target)
             self.tape.append((operation, target, arguments[0], arguments[-1]))
-        base = self.room(len(registers))
+        base = self.allocate(len(registers))
         for k in range(begin, len(self.tape)):
             operation, *where = self.tape[k]
             target, first, second = (base - 1 - place if place < 0 else place for place in where)
             self.tape[k] = operation, target, first, second
-        self._step(phase, TAPE, begin, len(self.tape))
+        self._add_step(phase, TAPE, begin, len(self.tape))
 
-    def add(self, phase: int, row: Row, targets: Integers, factor: int) -> bool:
-        """Add factor times a row to targets; True if that is done at run time, False if it went into the initial values."""
-        fixed = row.places == ONE
-        if factor in self.initial and fixed.all() and self._is_constant(factor):
+    def add_row(self, phase: int, row: Row, targets: Integers, factor: int) -> bool:
+        """Add factor times a row to targets: in a step (returns True), or in the initial values if all is constant."""
+        if factor in self.initial and (row.places == ONE).all() and self._is_constant(factor):
             for place in targets.tolist():
                 self.initial[place] = self.initial.get(place, 0.0) + self.initial[factor]
             return False
-        begin = len(self.runs)
-        self.runs += [(target, source, factor, length) for target, source, length in _segments(targets, row.places)]
-        self._step(phase, RUNS, begin, len(self.runs))
+        self._add_runs(phase, row, targets, factor)
         return True
 
+    def _add_runs(self, phase: int, row: Row, targets: Integers, factor: int) -> None:
+        begin = len(self.runs)
+        self.runs += [(target, source, factor, length) for target, source, length in find_runs(targets, row.places)]
+        self._add_step(phase, RUNS, begin, len(self.runs))
+
     def add_product(self, phase: int, row: Row, targets: Integers, first: int, second: int) -> None:
-        """Add the product of two factors with a row to targets."""
+        """Add the product of two factors and a row to targets."""
         if ONE in (first, second):
-            begin = len(self.runs)
-            factor = second if first == ONE else first
-            self.runs += [(target, source, factor, length) for target, source, length in _segments(targets, row.places)]
-            self._step(phase, RUNS, begin, len(self.runs))
+            self._add_runs(phase, row, targets, second if first == ONE else first)
             return
         begin = len(self.products)
-        self.products += [(t, s, first, second, length) for t, s, length in _segments(targets, row.places)]
-        self._step(phase, PRODUCTS, begin, len(self.products))
+        self.products += [(t, s, first, second, length) for t, s, length in find_runs(targets, row.places)]
+        self._add_step(phase, PRODUCTS, begin, len(self.products))
 
     def _is_constant(self, place: int) -> bool:
         return self._constants.get(self.initial[place]) == place
 
-    def _step(self, phase: int, kind: int, begin: int, end: int) -> None:
-        """A step, which goes on with the last one if that is of its kind."""
+    def _add_step(self, phase: int, kind: int, begin: int, end: int) -> None:
+        """Add a step, or extend the last one if it is of the same kind."""
         steps = self.steps[phase]
         if begin == end:
             return
@@ -189,8 +188,8 @@ class Plan:
         steps.append((kind, begin, end))
 
 
-def _segments(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
-    """Longest parts of two lists of places in which both count upwards by one: target, source, length."""
+def find_runs(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
+    """Split two lists of places into runs in which both increase by one; return target, source, length of each."""
     if not len(targets):
         return []
     if len(targets) == 1:

@@ -1,4 +1,4 @@
-"""Second derivatives of the Lagrangian, backwards: with the weights of each sample's outputs, and what the glue adds."""
+"""Second derivatives of the Lagrangian, backwards: of each sample with the weights of its outputs, and of the glue."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.backends.derivatives.first_order import Samples
-from nlp_gait.backends.derivatives.glue import Assembler, Glue
+from nlp_gait.backends.derivatives.glue import Assembler, Glue, union
 from nlp_gait.backends.derivatives.plan import ONE, SECOND, Block, Call, Integers, Row
 from nlp_gait.backends.derivatives.structure import nonzeros
 
@@ -24,7 +24,7 @@ class Hessian:
     def __init__(self, assembler: Assembler, stages: Sequence[Samples], last: Glue, weights: int) -> None:
         self.assembler, self.plan = assembler, assembler.plan
         plan = self.plan
-        bars = {id(samples): plan.room(samples.count * len(samples.used)) for samples in stages}
+        bars = {id(samples): plan.allocate(samples.count * len(samples.used)) for samples in stages}
         for samples in stages:
             plan.reset(SECOND, bars[id(samples)], samples.count * len(samples.used))
         self.bar_places = np.full(assembler.y.shape[0], -1)
@@ -35,12 +35,12 @@ class Hessian:
                 self.bar_places[numbers] = bar + place + nv * np.arange(samples.count)
         marker = len(plan.steps[SECOND])
         contributions: Products = []
-        self._glue(last, weights + np.arange(last.rows.shape[0]), contributions)
+        self._add_glue(last, weights + np.arange(last.rows.shape[0]), contributions)
         for samples in reversed(stages):
             if len(samples.active) and len(samples.used):
-                self._samples(samples, bars[id(samples)], contributions)
-        keys = np.unique(np.concatenate([np.zeros(0, int), *(d * assembler.n + c for d, c, *_ in contributions)]))
-        self.place = plan.room(len(keys))
+                self._add_samples(samples, bars[id(samples)], contributions)
+        keys = union(d * assembler.n + c for d, c, *_ in contributions)
+        self.place = plan.allocate(len(keys))
         plan.reset(SECOND, self.place, len(keys), marker)
         for d, c, row, first, second in contributions:
             plan.add_product(SECOND, row, self.place + np.searchsorted(keys, d * assembler.n + c), first, second)
@@ -48,8 +48,8 @@ class Hessian:
             assembler.n, assembler.n, (keys % assembler.n).tolist(), (keys // assembler.n).tolist()
         )
 
-    def _glue(self, glue: Glue, weights: Integers, contributions: Products) -> None:
-        """Weights of the samples' outputs that glue reads, and its own second derivatives."""
+    def _add_glue(self, glue: Glue, weights: Integers, contributions: Products) -> None:
+        """Add the weights of the outputs that glue reads, and its own second derivatives."""
         assembler, plan = self.assembler, self.plan
         symbols = SX.sym("weights", glue.rows.shape[0])
         for weight, entries in zip(weights.tolist(), glue.entries, strict=True):
@@ -65,32 +65,32 @@ class Hessian:
         H = ca.triu(ca.hessian(total, assembler.y)[0])
         first, second = H.sparsity().get_triplet()
         values = nonzeros(H)
-        places = plan.room(len(first)) + np.arange(len(first))
+        places = plan.allocate(len(first)) + np.arange(len(first))
         assembler.evaluate(SECOND, values, places, (symbols, weights))
         for i, j, place in zip(first, second, places.tolist(), strict=True):
             rows = assembler.derivatives[i], assembler.derivatives[j]
             for row, other in [rows] if i == j else [rows, rows[::-1]]:
-                _outer(row, other, place, contributions)
+                _add_outer(row, other, place, contributions)
 
-    def _samples(self, samples: Samples, bar: int, contributions: Products) -> None:
+    def _add_samples(self, samples: Samples, bar: int, contributions: Products) -> None:
         plan, found, count = self.plan, samples.derivatives, samples.count
         ma, nv = len(samples.active), len(samples.used)
-        number = plan.function(found.second)
+        number = plan.add_function(found.second)
         weights = Block(bar, nv, nv, 1, 0)
-        gradient = plan.room(count * ma)
+        gradient = plan.allocate(count * ma)
         write = Block(gradient, ma, ma, 1, 0)
         pattern = np.zeros((ma, ma), bool)
         pattern[tuple(found.hessian.get_triplet())] = True
         if found.directional:
-            place = plan.room(count * ma * samples.width)
+            place = plan.allocate(count * ma * samples.width)
             change = Block(place, ma * samples.width, ma, samples.width, 1)
-            given = (samples.read, weights, samples.seeds(plan))
-            plan.call(SECOND, Call(number, count, samples.directions(), given, (write, change)))
+            given = (samples.read, weights, samples.place_directions(plan))
+            plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
         else:
             upper = ca.triu(found.hessian)
-            place = plan.room(count * upper.nnz())
+            place = plan.allocate(count * upper.nnz())
             change = Block(place, upper.nnz(), upper.nnz(), 1, 0)
-            plan.call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
+            plan.add_call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
             at = np.full((ma, ma), -1)
             i, j = upper.get_triplet()
             at[i, j] = at[j, i] = np.arange(upper.nnz())
@@ -99,23 +99,25 @@ class Hessian:
                 row = samples.rows[e][a]
                 if samples.by_column:
                     parts = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
-                    columns = np.unique(np.concatenate([np.zeros(0, int), *parts]))
+                    columns = union(parts)
                     base = place + (e * ma + a) * samples.width
-                    _outer(row, Row(columns, base + np.searchsorted(samples.columns[e], columns)), ONE, contributions)
+                    _add_outer(
+                        row, Row(columns, base + np.searchsorted(samples.columns[e], columns)), ONE, contributions
+                    )
                     continue
                 for b in np.flatnonzero(pattern[a]):
                     factor = place + ((e * ma + a) * ma + b if found.directional else e * upper.nnz() + at[a, b])
-                    _outer(row, samples.rows[e][b], int(factor), contributions)
+                    _add_outer(row, samples.rows[e][b], int(factor), contributions)
         places = np.full(len(samples.glue.entries), -1)
         for a, i in enumerate(samples.active):
             places[i + samples.m * np.arange(count)] = gradient + a + ma * np.arange(count)
         rows = [i for i, entries in enumerate(samples.glue.entries) if entries]
         glue = samples.glue._replace(rows=samples.glue.rows[rows], entries=[samples.glue.entries[i] for i in rows])
-        self._glue(glue, places[rows], contributions)
+        self._add_glue(glue, places[rows], contributions)
 
 
-def _outer(row: Row, other: Row, factor: int, contributions: Products) -> None:
-    """Products of each entry d of a row with the entries c <= d of another, times a factor."""
+def _add_outer(row: Row, other: Row, factor: int, contributions: Products) -> None:
+    """Add the products of each entry d of a row with the entries c <= d of another one, times a factor."""
     for column, place in zip(row.columns.tolist(), row.places.tolist(), strict=True):
         end = int(np.searchsorted(other.columns, column, side="right"))
         if end:

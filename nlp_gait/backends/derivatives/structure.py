@@ -1,4 +1,4 @@
-"""An NLP taken apart: functions of one sample that are mapped, and the cheap expressions between them (the glue).
+"""An NLP split into functions of one sample that are mapped, and the cheap expressions between them (the glue).
 
 y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import cast
 
 import casadi as ca
@@ -17,18 +18,18 @@ from nlp_gait.errors import CompilerError
 
 
 class NotMapped(CompilerError):
-    """A graph that holds what cannot be taken apart; the message says what."""
+    """The graph of an NLP contains something that cannot be split; the message says what."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """A function of one sample, called at all samples.
+    """A function of one sample that is called at all samples.
 
     Attributes:
-        function: of one sample, all inputs in one vector (m,), all outputs in another.
-        count: samples.
-        inputs: (count * m,) glue rows, sample by sample.
-        outputs: (count * nv,) symbols that stand for the outputs, sample by sample.
+        function: of one sample, from all inputs (m,) to all outputs (nv,).
+        count: number of samples.
+        inputs: (count * m,) glue, sample by sample.
+        outputs: (count * nv,) symbols in place of the outputs, sample by sample.
     """
 
     function: ca.Function
@@ -39,12 +40,12 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Structure:
-    """Stages of an NLP in the order in which they are evaluated, and its last glue.
+    """Stages of an NLP in the order in which they are evaluated, and the glue after the last one.
 
     Attributes:
         w: (n,) symbols of the NLP's variables.
         p: (k,) symbols of its parameters.
-        stages: each of which depends on earlier ones only.
+        stages: each depends on earlier ones only.
         rows: (1 + m,) cost and rows.
     """
 
@@ -55,10 +56,7 @@ class Structure:
 
 
 def split_nlp(nlp: Mapping[str, MX]) -> Structure:
-    """An NLP taken apart.
-
-    Args:
-        nlp: CasADi's dictionary of x, p, f, g.
+    """Split an NLP, CasADi's dictionary of x, p, f, g.
 
     Raises:
         NotMapped: it calls a function that is neither mapped nor made of scalar operations.
@@ -70,18 +68,15 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     found = [[call.get_output(i) for i in range(call.n_out())] for call in calls]
     symbols = [[MX.sym("v", output.sparsity()) for output in outputs] for outputs in found]
     given = [[call.dep(i) for i in range(call.n_dep())] for call in calls]
-    wanted = [nlp["f"], nlp["g"], *_flat(given)]
-    replaced = ca.graph_substitute(wanted, _flat(found), _flat(symbols)) if calls else wanted
-    try:
-        glue = ca.Function("glue", [x, p, *_flat(symbols)], replaced).expand()
-    except RuntimeError as error:
-        raise NotMapped(str(error).splitlines()[-1]) from error
+    outputs = [nlp["f"], nlp["g"], *chain(*given)]
+    replaced = ca.graph_substitute(outputs, [*chain(*found)], [*chain(*symbols)]) if calls else outputs
+    glue = _expand(ca.Function("glue", [x, p, *chain(*symbols)], replaced))
     w, q, *v = glue.sx_in()
     cost, rows, *u = glue.call([w, q, *v])
     stages = []
     for call, inputs, outputs in zip(calls, given, found, strict=True):
         function = call.which_function()
-        inner = _scalar(function.find_functions(0)[0])
+        inner = _concatenate(_expand(function.find_functions(0)[0]))
         count = function.nnz_in() // inner.nnz_in()
         stages.append(
             Stage(
@@ -95,24 +90,27 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
 
 
 def nonzeros(value: SX) -> SX:
-    """Structural nonzeros as a dense vector."""
+    """Return the structural nonzeros as a dense vector."""
     found = SX(value.nz[:])  # a row where the value is one
     return found if found.shape[1] == 1 else found.T
 
 
 def scalars(value: SX) -> list[SX]:
-    """Structural nonzeros, one by one."""
+    """Return the structural nonzeros one by one."""
     return cast(list[SX], value.nonzeros())
 
 
-def _scalar(function: ca.Function) -> ca.Function:
-    """A function with vectors of the nonzeros of all inputs and of all outputs, of scalar operations."""
+def _expand(function: ca.Function) -> ca.Function:
     try:
-        expanded = function.expand()
+        return function.expand()
     except RuntimeError as error:
         raise NotMapped(str(error).splitlines()[-1]) from error
-    inputs = expanded.sx_in()
-    outputs = expanded.call(inputs)
+
+
+def _concatenate(function: ca.Function) -> ca.Function:
+    """Return a function from the nonzeros of all inputs, as one vector, to those of all outputs."""
+    inputs = function.sx_in()
+    outputs = function.call(inputs)
     return ca.Function(
         function.name(),
         [ca.vertcat(*(nonzeros(each) for each in inputs))],
@@ -121,7 +119,7 @@ def _scalar(function: ca.Function) -> ca.Function:
 
 
 def _by_sample(matrices: list[SX], count: int) -> SX:
-    """Nonzeros of matrices with one block of columns a sample, as one vector with one part a sample."""
+    """Return the nonzeros of matrices with a block of columns for each sample as one vector, sample by sample."""
     parts = [nonzeros(matrix) for matrix in matrices]
     order = []
     before = 0
@@ -129,7 +127,3 @@ def _by_sample(matrices: list[SX], count: int) -> SX:
         order.append(before + np.arange(part.shape[0]).reshape(count, -1))
         before += part.shape[0]
     return ca.vertcat(*parts)[np.hstack(order).ravel().tolist()]
-
-
-def _flat(lists: list[list[MX]]) -> list[MX]:
-    return [each for one in lists for each in one]

@@ -59,7 +59,7 @@ def compared(nlp: dict[str, MX], p: Array, points: Array) -> float:
 @pytest.mark.parametrize("longest", [0, sample.LONGEST_WRITTEN_OUT], ids=["in directions", "written out"])
 def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sample, "LONGEST_WRITTEN_OUT", longest)
-    monkeypatch.setattr("nlp_gait.backends.derivatives.compiled._generator", lambda: f"longest {longest}")
+    monkeypatch.setattr("nlp_gait.backends.derivatives.compiled._hash_generator", lambda: f"longest {longest}")
     points = np.random.default_rng(0).uniform(0.4, 1.5, (20, 8))
     assert compared(chain(), np.array([1.1, 0.7]), points) < TOLERANCE
 
@@ -83,13 +83,13 @@ def test_a_solver_of_compiled_functions_takes_the_same_path() -> None:
     assert interpreted.stats()["iter_count"] == compiled.stats()["iter_count"] > 3
 
 
-def test_runs_are_as_long_as_both_lists_of_places_count_upwards() -> None:
+def test_runs_extend_while_both_lists_increase_by_one() -> None:
     targets, sources = np.array([4, 5, 6, 9, 10]), np.array([1, 2, 3, 4, 6])
-    assert plan._segments(targets, sources) == [(4, 1, 3), (9, 4, 1), (10, 6, 1)]
-    assert plan._segments(targets[:1], sources[:1]) == [(4, 1, 1)] and plan._segments(targets[:0], sources[:0]) == []
+    assert plan.find_runs(targets, sources) == [(4, 1, 3), (9, 4, 1), (10, 6, 1)]
+    assert plan.find_runs(targets[:1], sources[:1]) == [(4, 1, 1)] and plan.find_runs(targets[:0], sources[:0]) == []
 
 
-def test_what_cannot_be_taken_apart_is_refused() -> None:
+def test_an_nlp_that_cannot_be_split_is_refused() -> None:
     x, table = MX.sym("x", 2), ca.interpolant("table", "linear", [[0.0, 1.0, 2.0]], [0.0, 1.0, 4.0])
     with pytest.raises(NotMapped):
         make_nlp_plan(split_nlp({"x": x, "p": MX(0, 1), "f": table(x[0]), "g": x}))
