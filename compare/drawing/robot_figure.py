@@ -8,7 +8,7 @@ import numpy as np
 
 from compare.drawing.figures import new_figure, save, style
 from nlp_gait.robots.biped import Biped
-from nlp_gait.robots.feet import SIDES
+from nlp_gait.robots.inference import SIDES
 
 COLOURS = {"left": "#0072B2", "right": "#D55E00"}
 OTHERS = "#999999"

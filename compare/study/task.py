@@ -24,7 +24,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.registry import PROBLEMS, check_options, load
 from nlp_gait.references import check_reference, installed, is_own, load_object, short_name, source_sha256
-from nlp_gait.robots.loading import is_robot_file, robot_content
+from nlp_gait.robots.loading import hash_robot, is_robot_file
 
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
@@ -82,7 +82,7 @@ class ProblemSpec:
         check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
         robot = self.options.get("robot")
         contents = (
-            robot_content(robot) if isinstance(robot, str) and is_robot_file(robot) else "",
+            hash_robot(robot) if isinstance(robot, str) and is_robot_file(robot) else "",
             source_sha256(self.name, "problem") if self.name not in PROBLEMS else "",
         )
         return _load(self.name, tuple(sorted(self.options.items())), contents).with_values(**self.values)

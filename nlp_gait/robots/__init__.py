@@ -1,4 +1,4 @@
-"""Robot data: frozen records, read from JSON files with a source for every table."""
+"""Robot data: frozen dataclasses, read from JSON files with a source for every table."""
 
 from nlp_gait.robots.loading import load_robot, robot_names
 from nlp_gait.robots.robot import Foot, Joint, Link, Motor, Robot

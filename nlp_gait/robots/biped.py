@@ -1,4 +1,4 @@
-"""A robot as a biped: two legs of six turning joints, everything else one body in a posture, and its size next to NAO's."""
+"""Robots as bipeds: two legs of six turning joints, all other links one body in a posture, and scales against NAO."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from functools import cached_property
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.robots.feet import SIDES
-from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg, leg_of
+from nlp_gait.robots.inference import SIDES
+from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg, make_leg
 from nlp_gait.robots.robot import Joint, Robot
-from nlp_gait.robots.tree import posed, weld
+from nlp_gait.robots.tree import pose_robot, weld
 
 # NAO V5: a leg from hip to ankle [m], the mass [kg], and the heat constant K of the paper [W/(Nm)^2].
 NAO_LEG_M, NAO_MASS_KG, NAO_HEAT_W_PER_NM2 = 0.2029, 5.30535, 0.025
-# Both legs are alike to this [m], and both ankles equally high.
+# Both legs are mirror images to this [m].
 ALIKE_M = 2e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Biped:
-    """A robot as gaits of any humanoid take it.
+    """A robot in the form that the gaits of any humanoid need.
 
     Attributes:
-        full: with all its joints, those that are held at zero in the posture.
-        model: with the joints of the legs alone, all others held in the posture.
+        full: with all joints; those outside the legs count from the posture.
+        model: with the joints of the legs only, all others held in the posture.
         legs: ``"left"`` and ``"right"``.
-        posture_rad: angles of the joints that are held.
+        posture_rad: angles of the held joints.
     """
 
     full: Robot
@@ -39,12 +39,12 @@ class Biped:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Of both legs, the left one's first."""
+        """Joints of both legs, the left one's first."""
         return tuple(name for side in SIDES for name in self.legs[side].joints)
 
     @cached_property
     def images(self) -> Mapping[str, str]:
-        """Joint of the other leg that is the image of each."""
+        """Mirror image of each joint in the other leg."""
         left, right = (self.legs[side].joints for side in SIDES)
         return dict(zip((*left, *right), (*right, *left), strict=True))
 
@@ -70,17 +70,17 @@ class Biped:
 
     @property
     def time_scale(self) -> float:
-        """Of times, and of velocities: equal Froude numbers."""
+        """Scale of times and of velocities, for equal Froude numbers."""
         return math.sqrt(self.length_scale)
 
     @property
     def torque_scale(self) -> float:
-        """Of torques."""
+        """Scale of torques."""
         return self.length_scale * self.mass_scale
 
     @property
     def heat_W_per_Nm2(self) -> float:
-        """K: what the robot's file says, else NAO's by the scale of power over squared torque."""
+        """K of the robot's file, or else NAO's, scaled by power over squared torque."""
         if self.full.heat_loss_W_per_Nm2 is not None:
             return self.full.heat_loss_W_per_Nm2
         power_scale = self.mass_scale * self.time_scale  # weight times velocity
@@ -88,17 +88,17 @@ class Biped:
 
     @property
     def heat_source(self) -> str:
-        """Where K comes from, in words."""
+        """Origin of K, in words."""
         if self.full.heat_loss_W_per_Nm2 is not None:
-            return "of the robot's file"
-        return "NAO's, scaled by power over squared torque: no URDF has it"
+            return "from the robot's file"
+        return "NAO's, scaled by power over squared torque, because no URDF has it"
 
 
-def biped_of(robot: Robot) -> Biped:
-    """A robot as a biped.
+def make_biped(robot: Robot) -> Biped:
+    """Convert a robot to a biped.
 
     Raises:
-        InputError: its legs are not two of six turning joints that mirror each other, or a held joint is unknown.
+        InputError: its legs are not two mirror images of six turning joints each, or the posture names a wrong joint.
     """
     feet = [robot.feet[side].link for side in SIDES]
     paths = [robot.path_to_root(foot) for foot in feet]
@@ -108,28 +108,28 @@ def biped_of(robot: Robot) -> Biped:
         if len(path) != LEG_JOINT_COUNT:
             raise InputError(
                 f"robot {robot.name!r}: the {side} leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to "
-                f"the foot, it has {len(path)}: {', '.join(joint.name for joint in reversed(path)) or 'none'}"
+                f"the foot, got {len(path)}: {', '.join(joint.name for joint in reversed(path)) or 'none'}"
             )
     moving = {joint.name for path in own for joint in path}
-    held = {name: _held(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving}
+    held = {name: _held_angle(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving}
     for name in robot.posture_rad:
         if name not in held:
             raise InputError(
                 f"robot {robot.name!r}: posture_rad names {name!r}, which is "
-                f"{'a joint of a leg' if name in moving else 'no joint'}"
+                f"{'a joint of a leg' if name in moving else 'not a joint'}"
             )
     turned = [name for name in shared if held[name]]
     if turned:
         raise InputError(f"robot {robot.name!r}: posture_rad must leave joint {turned[0]!r} above both legs at zero")
-    full = posed(robot, held)
+    full = pose_robot(robot, held)
     model = weld(full, list(held))
-    legs: dict[str, Leg] = {side: leg_of(model, side) for side in SIDES}
+    legs: dict[str, Leg] = {side: make_leg(model, side) for side in SIDES}
     _check_alike(robot.name, legs)
     return Biped(full=full, model=model, legs=legs, posture_rad=held)
 
 
-def _held(joint: Joint, posture: Mapping[str, float]) -> float:
-    """Angle of a held joint: as stated, else zero or the nearest limit."""
+def _held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
+    """Return the stated angle, or else zero or the nearest limit."""
     low, high = joint.limits_rad
     angle = posture.get(joint.name)
     if angle is None:

@@ -1,17 +1,19 @@
-"""Inertia tensors about the wrong point: public robot files have some about the joint in fields for the centre of mass."""
+"""Masses and inertia tensors of links: sums, shifts, repairs, and tensors that refer to the wrong point."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import inertia_moments, point_inertia
 
-# A tensor about the joint gives ratios below 1 (see ``joint_distance_ratio``); printed digits may lift one by some percent.
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+# A tensor about the joint gives ratios below 1 (see ``compute_joint_ratio``); printed digits may increase one by some percent.
 GREATEST_JOINT_RATIO = 1.05
 # Above one half, the joint is at least as far from the centre of mass as the matter is spread, if the tensor is about the joint.
 FAR_RATIO = 0.5
@@ -21,8 +23,74 @@ LEAST_LINKS = 5
 LEAST_MOMENT = 1e-30
 
 
-def joint_distance_ratio(link: Link) -> float:
-    """Squared distance of joint and centre of mass, in units of the matter's spread along that direction.
+class Mass(NamedTuple):
+    """Mass and its distribution, whether or not a rigid body can have them.
+
+    Attributes:
+        mass_kg: mass.
+        com_m: (3,) centre of mass.
+        tensor_kgm2: (3, 3) inertia about the centre of mass.
+    """
+
+    mass_kg: float
+    com_m: Array
+    tensor_kgm2: Array
+
+    @classmethod
+    def from_link(cls, link: Link) -> Mass:
+        """Return the mass of a link, in its frame."""
+        return cls(link.mass_kg, np.array(link.com_m), link.inertia_matrix)
+
+    @classmethod
+    def from_record(cls, raw: Mapping[str, Any]) -> Mass:
+        """Return the mass of a link as a robot file describes it."""
+        ixx, iyy, izz, ixy, ixz, iyz = raw["inertia_com_kgm2"]
+        tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
+        return cls(float(raw["mass_kg"]), np.array(raw["com_m"], dtype=float), tensor)
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the fields of a link in a robot file."""
+        moments = list(inertia_moments(self.tensor_kgm2))
+        return {"mass_kg": float(self.mass_kg), "com_m": self.com_m.tolist(), "inertia_com_kgm2": moments}
+
+    def move(self, offset: Array) -> Mass:
+        """Return the mass in a frame from which its own is ``offset`` (3,) away [m]."""
+        return self._replace(com_m=self.com_m + offset)
+
+    def turn(self, rotation: Array) -> Mass:
+        """Return the mass along other axes, by a rotation (3, 3)."""
+        return Mass(self.mass_kg, rotation @ self.com_m, rotation @ self.tensor_kgm2 @ rotation.T)
+
+    def repair(self) -> Mass:
+        """Return the mass with the nearest tensor of a rigid body: no second moment of its matter is negative."""
+        trace = np.trace(self.tensor_kgm2)
+        moments, axes = np.linalg.eigh(trace / 2 * np.eye(3) - self.tensor_kgm2)
+        spread = axes @ np.diag(np.maximum(moments, 0.0)) @ axes.T
+        return self._replace(tensor_kgm2=np.trace(spread) * np.eye(3) - spread)
+
+
+def combine_masses(parts: Sequence[Mass]) -> Mass:
+    """Return several masses in one frame as one; without any mass, the centre is that of the first."""
+    mass = sum(part.mass_kg for part in parts)
+    com = sum((part.mass_kg * part.com_m for part in parts), np.zeros(3)) / mass if mass > 0.0 else parts[0].com_m
+    tensor = sum((part.tensor_kgm2 + point_inertia(part.mass_kg, part.com_m - com) for part in parts), np.zeros((3, 3)))
+    return Mass(mass, com, tensor)
+
+
+def inertia_moments(matrix: Array) -> tuple[float, float, float, float, float, float]:
+    """Return (ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as in ``Link``."""
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
+    return ixx, iyy, izz, ixy, ixz, iyz
+
+
+def point_inertia(mass: float, offset: Array) -> Array:
+    """Return the tensor (3, 3) of a point mass [kg] about a point at a distance ``offset`` (3,) [m]."""
+    tensor: Array = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return tensor
+
+
+def compute_joint_ratio(link: Link) -> float:
+    """Return the squared distance of joint and centre of mass, in units of the matter's spread along that direction.
 
     With s for a tensor about the centre of mass, the same link described by the tensor about its joint has s / (1 + s), which
     is below 1. A uniform rod held at its end has s = 3, and 0.75 with the wrong tensor.
@@ -33,15 +101,15 @@ def joint_distance_ratio(link: Link) -> float:
 
 
 def check_inertias(robot: str, links: Sequence[Link]) -> None:
-    """Refuse tensors that look as if they were about the joints.
+    """Refuse tensors that seem to refer to the joints.
 
-    Of links that hang on their joints, most have ratios above 1. Where not one of at least five links has, and most are above
-    one half, all of them were probably taken about the joint. One wrong tensor among right ones is not found.
+    Most links have ratios above 1. If none of at least five links does, and most are above one half, all tensors were probably
+    taken about the joints. One wrong tensor among right ones is not found.
 
     Raises:
         RobotDataError: with the ratios of the farthest links, and what to write into the file.
     """
-    ratios = {link.name: joint_distance_ratio(link) for link in links}
+    ratios = {link.name: compute_joint_ratio(link) for link in links}
     far = sorted((name for name in ratios if ratios[name] > FAR_RATIO), key=lambda name: -ratios[name])
     if len(ratios) < LEAST_LINKS or max(ratios.values()) > GREATEST_JOINT_RATIO or 2 * len(far) < len(ratios):
         return
@@ -54,8 +122,8 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
     )
 
 
-def shifted_to_com(link: Link) -> Link:
-    """The link whose tensor was taken about its joint.
+def shift_to_com(link: Link) -> Link:
+    """Return the link whose tensor was taken about its joint.
 
     Raises:
         RobotDataError: no rigid body has such a tensor about its joint.

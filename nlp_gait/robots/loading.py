@@ -1,4 +1,4 @@
-"""Read robot files: one JSON object a robot, which may extend another one, or a URDF or MJCF, and replace some of its records."""
+"""Robots from files: JSON, URDF and MJCF. A JSON file may extend any of them and replace some of its records."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ from typing import Any, Literal, NamedTuple, TypeVar
 from nlp_gait.decoding import decoded, decoded_value, read_decoded
 from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown, warn_once
 from nlp_gait.files import check_path, refusing
-from nlp_gait.robots.fields import check_name
-from nlp_gait.robots.inertia import check_inertias, shifted_to_com
+from nlp_gait.robots.inertia import check_inertias, shift_to_com
+from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
 from nlp_gait.robots.mjcf import mjcf_points, mjcf_record
-from nlp_gait.robots.perturbation import perturbed, split_name
-from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector
-from nlp_gait.robots.tree import reversed_joint
-from nlp_gait.robots.understanding import Understood, understood
+from nlp_gait.robots.perturbation import perturb, split_name
+from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
+from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
+from nlp_gait.robots.tree import reverse_joint
 from nlp_gait.robots.urdf import collision_points, urdf_record
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
-# What a file says once, in place of what it extends.
+# Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "unphysical")
 
 T = TypeVar("T")
-Side = Literal["left", "right"]
 About = Literal["com", "joint"] | None
 
 _DATA = resources.files("nlp_gait.robots") / "data"
@@ -39,7 +38,7 @@ _DATA = resources.files("nlp_gait.robots") / "data"
 
 @dataclass(frozen=True, kw_only=True)
 class RobotFile:
-    """Content of a robot file. Links, joints and feet are decoded later, once it is known which of them are replaced."""
+    """Content of a robot file. Links, joints and feet are decoded later, when the replaced ones are known."""
 
     schema: Literal[1] = 1
     name: str | None = None
@@ -59,7 +58,6 @@ class RobotFile:
     unphysical: Literal["refuse", "repair"] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse names that cannot be printed."""
         if self.name is not None:
             check_name(self.name, "robot")
         for group in ("links", "joints", "joint_names"):
@@ -75,8 +73,8 @@ class _Record(NamedTuple):
     Attributes:
         raw: its fields.
         file: the file.
-        about: point to which the file says that its inertia tensors refer, if it says so.
-        reversed: the joint's angle is counted the other way round.
+        about: reference point of the file's inertia tensors, if it states one.
+        reversed: the joint's angle is counted in the opposite direction.
     """
 
     raw: Any
@@ -86,18 +84,16 @@ class _Record(NamedTuple):
 
 
 def robot_names() -> tuple[str, ...]:
-    """Names of the robots that come with the package."""
+    """Return the names of the robots of the package."""
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _DATA.iterdir() if entry.name.endswith(".json")))
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
+    """Load a robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
 
-    What such a file leaves out is derived, see ``robots/understanding.py``;
-    a ``.json`` of the same name beside it says it otherwise.
-
-    Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read anew each
-    time: it may have changed, or be another one under the same relative path.
+    What such a file does not state is inferred, see ``robots/inference.py``; a ``.json`` of the same name next to it overrides
+    both. Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read
+    again each time, because it may have changed.
 
     Raises:
         UnknownNameError: no such robot.
@@ -107,81 +103,73 @@ def load_robot(name_or_path: str) -> Robot:
     if not isinstance(name_or_path, str):
         raise UnknownNameError(f"the name of a robot must be a text, got {shown(name_or_path)}")
     check_path(name_or_path, f"robot {name_or_path!r}", RobotDataError)
-    return _made_from(name_or_path) if is_robot_file(name_or_path) else _loaded(name_or_path)
+    return _load(name_or_path) if is_robot_file(name_or_path) else _load_shipped(name_or_path)
 
 
 def is_robot_file(name_or_path: str) -> bool:
-    """Whether a robot comes from a file rather than with the package."""
+    """Return whether a robot comes from a file instead of the package."""
     return split_name(name_or_path)[0].endswith(FILE_ENDINGS)
 
 
-def robot_content(path: str) -> str:
-    """Hash of all files that a robot from a file is made of; raises as ``load_robot``."""
-    return hashlib.sha256(repr(_merged(_described_in(split_name(path)[0]))).encode()).hexdigest()
+def hash_robot(path: str) -> str:
+    """Return a hash of all files that describe a robot; raises as ``load_robot``."""
+    return hashlib.sha256(repr(_read_merged(_find_description(split_name(path)[0]))).encode()).hexdigest()
 
 
 @cache
-def _loaded(name: str) -> Robot:
-    return _made_from(name)
+def _load_shipped(name: str) -> Robot:
+    return _load(name)
 
 
-def _made_from(name_or_path: str) -> Robot:
+def _load(name_or_path: str) -> Robot:
     source, changes = split_name(name_or_path)
-    path = _described_in(source)
-    return perturbed(_robot(_merged(path), path), changes)
+    path = _find_description(source)
+    return perturb(_make_robot(_read_merged(path), path), changes)
 
 
-def _described_in(path: str) -> str:
-    """Where a robot's description begins: for a URDF the robot file of the same name that extends it, if one lies beside it."""
+def _find_description(path: str) -> str:
+    """Return the file to read first: for a URDF or MJCF the robot file of the same name, if there is one."""
     if not path.endswith(MODEL_ENDINGS):
         return path
     partner = Path(path).with_suffix(".json")
     if not os.path.isfile(partner):
         return path
     base = _read(str(partner)).extends
-    if base is None or _resolved(base, str(partner)) != os.path.normpath(path):
-        raise RobotDataError(
-            f"robot file {str(partner)!r}: 'extends' must be {Path(path).name!r}, beside which it lies"
-        )
+    if base is None or _resolve(base, str(partner)) != os.path.normpath(path):
+        raise RobotDataError(f"robot file {str(partner)!r}: 'extends' must be {Path(path).name!r}, the file next to it")
     return str(partner)
 
 
-def _merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
-    """Content of a robot file with what it extends; links, joints and feet are ``_Record``."""
+def _read_merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
+    """Return the content of a robot file and those that it extends; links, joints and feet are ``_Record``."""
     if source.endswith(MODEL_ENDINGS):
-        return _of_model(source, None)
+        return _read_model(source, None)
     own = _read(source)
     file = _with_records(own, source)
     if own.extends is None:
         return file
-    base_source = _resolved(own.extends, source)
+    base_source = _resolve(own.extends, source)
     if base_source in seen or len(seen) >= LONGEST_CHAIN:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {own.extends!r}")
     if base_source.endswith(MODEL_ENDINGS):
-        base = _of_model(base_source, own.inertia_about)
+        base = _read_model(base_source, own.inertia_about)
     else:
-        base = _merged(base_source, (*seen, source))
+        base = _read_merged(base_source, (*seen, source))
     return replace(
         base,
         **{key: getattr(file, key) for key in REPLACED if getattr(file, key) is not None},
         sources={**base.sources, **file.sources},
         posture_rad={**base.posture_rad, **file.posture_rad},
         links={**base.links, **file.links},
-        joints={**_renamed(base.joints, file.joint_names, source), **file.joints},
+        joints={**_rename(base.joints, file.joint_names, source), **file.joints},
         feet={**base.feet, **file.feet},
     )
 
 
-def _of_model(source: str, about: About) -> RobotFile:
-    """Content of a URDF or MJCF."""
+def _read_model(source: str, about: About) -> RobotFile:
     with refusing(f"robot file {source!r}", RobotDataError):
-        raw = mjcf_record(source) if is_mjcf(source) else urdf_record(source, about_joint=about == "joint")
+        raw = mjcf_record(source) if source.endswith(".xml") else urdf_record(source, about_joint=about == "joint")
         return _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), source)
-
-
-def is_mjcf(source: str) -> bool:
-    """Whether a file is MuJoCo's, by its ending."""
-    return source.endswith(".xml")
 
 
 def _with_records(file: RobotFile, source: str) -> RobotFile:
@@ -192,8 +180,8 @@ def _with_records(file: RobotFile, source: str) -> RobotFile:
     return replace(file, **records)  # type: ignore[arg-type]
 
 
-def _renamed(joints: Mapping[str, _Record], names: Mapping[str, str], source: str) -> dict[str, _Record]:
-    """Joints under new names, given as new to old; a minus sign before the old one reverses the joint's sense."""
+def _rename(joints: Mapping[str, _Record], names: Mapping[str, str], source: str) -> dict[str, _Record]:
+    """Return joints with new names, given as new to old; a minus sign in front of the old name reverses the joint."""
     old = {new: name.removeprefix("-") for new, name in names.items()}
     for name in old.values():
         if name not in joints:
@@ -206,9 +194,9 @@ def _renamed(joints: Mapping[str, _Record], names: Mapping[str, str], source: st
     return renamed
 
 
-def _resolved(base: str, source: str) -> str:
-    """What a robot extends: a name, or a file, whose path is relative to the file that names it."""
-    # Normalised, so that two files that extend each other by roundabout paths are recognised.
+def _resolve(base: str, source: str) -> str:
+    """Return the name or path of an extended robot; a path is relative to the file that names it."""
+    # Normalised, to recognise two files that extend each other by different paths.
     return os.path.normpath(Path(source).parent / base) if base.endswith(FILE_ENDINGS) else base
 
 
@@ -217,96 +205,96 @@ def _read(name_or_path: str) -> RobotFile:
         raise unknown("robot", name_or_path, robot_names())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
     file = read_decoded(RobotFile, path, "robot file", error=RobotDataError)
-    beside = [path.with_suffix(ending) for ending in MODEL_ENDINGS if os.path.isfile(path.with_suffix(ending))]
-    if file.extends is None and file.root is None and beside:  # it says of that model what it would say otherwise
+    beside = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]
+    if file.extends is None and file.root is None and beside:
         return replace(file, extends=beside[0].name)
     return file
 
 
-def _robot(file: RobotFile, source: str) -> Robot:
+def _make_robot(file: RobotFile, source: str) -> Robot:
     if file.name is None or file.root is None:
         missing = "name" if file.name is None else "root"
         raise RobotDataError(f"robot file {source!r}: {missing!r} is missing")
-    name, root = file.name, file.root
-    file, notes = _completed(file)
-    links = _made(_link, file.links)
-    check_inertias(name, [links[name] for name, record in file.links.items() if record.about is None])
+    file, notes = _complete(file, file.name)
+    links = _decode(_decode_link, file.links)
+    check_inertias(str(file.name), [links[name] for name, record in file.links.items() if record.about is None])
     return Robot(
-        name=name,
+        name=str(file.name),
         description=file.description or "",
         sources=file.sources,
-        root=root,
+        root=str(file.root),
         links=links,
-        joints=_made(_joint, file.joints),
-        feet=_made(lambda side, record: decoded(Foot, record.raw, f"feet.{side}"), file.feet),
+        joints=_decode(_decode_joint, file.joints),
+        feet=_decode(lambda side, record: decoded(Foot, record.raw, f"feet.{side}"), file.feet),
         posture_rad=file.posture_rad,
         heat_loss_W_per_Nm2=file.heat_loss_W_per_Nm2,
-        notes=notes,
+        notes=tuple(notes),
     )
 
 
-def _completed(file: RobotFile) -> tuple[RobotFile, tuple[str, ...]]:
-    """A robot from a URDF or MJCF with its feet, and without the parts that cannot move by themselves; what was done."""
+def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
+    """Return a robot from a URDF or MJCF with its feet and without faulty parts, and notes on what was inferred."""
     models = {record.file for record in file.links.values() if record.file.endswith(MODEL_ENDINGS)}
     if not models:
-        return file, ()
-    model, name = min(models), str(file.name)
-    records = {**file.links, **file.joints}
+        return file, []
+    model, notes = min(models), list[str]()
 
-    def fault_in(make: Callable[[str, _Record], object]) -> Callable[[str, Mapping[str, Any]], GaitError | None]:
-        def fault(name: str, raw: Mapping[str, Any]) -> GaitError | None:
-            record = records[name]
+    def find_fault_in(records: Mapping[str, _Record], decode: Callable[[str, _Record], object]) -> FindFault:
+        # Faults of a robot file are errors; those of a URDF or MJCF may not matter.
+        _decode(decode, {key: record for key, record in records.items() if not record.file.endswith(MODEL_ENDINGS)})
+
+        def find_fault(key: str, raw: Mapping[str, Any]) -> GaitError | None:
+            record = records[key]
             try:
-                _made(make, {name: record._replace(raw=raw)})
+                _decode(decode, {key: record._replace(raw=raw)})
             except GaitError as error:
                 if not record.file.endswith(MODEL_ENDINGS):
                     raise
                 return error
             return None
 
-        return fault
+        return find_fault
 
-    # What a robot file says of itself is checked first; what a URDF says may be passed over.
-    _made(_link, {key: record for key, record in file.links.items() if not record.file.endswith(MODEL_ENDINGS)})
-    _made(_joint, {key: record for key, record in file.joints.items() if not record.file.endswith(MODEL_ENDINGS)})
+    faults = find_fault_in(file.links, _decode_link), find_fault_in(file.joints, _decode_joint)
     for side, record in file.feet.items():
         with refusing(f"robot file {record.file!r}", RobotDataError):
             decoded_value(Mapping[str, Any], record.raw, f"feet.{side}")
+    links, joints, feet = ({k: dict(r.raw) for k, r in group.items()} for group in (file.links, file.joints, file.feet))
     with refusing(f"robot file {model!r}", RobotDataError):
-        found: Understood = understood(
-            name,
-            {key: record.raw for key, record in file.links.items()},
-            {key: record.raw for key, record in file.joints.items()},
-            {key: record.raw for key, record in file.feet.items()},
-            cloud=lambda link: mjcf_points(model, link) if is_mjcf(model) else collision_points(model, link),
-            forward=file.forward,
-            repair=file.unphysical == "repair",
-            fault_of_link=fault_in(_link),
-            fault_of_joint=fault_in(_joint),
-        )
-    for note in found.notes:
+        legs = find_legs(name, joints, feet)
+        if file.unphysical == "repair":
+            repair_links(links, legs.links, faults[0], notes)
+        weld_faults(links, joints, legs.links, *faults, notes)
+        if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
+            read_points = mjcf_points if model.endswith(".xml") else collision_points
+            feet = infer_feet(
+                name, legs, links, joints, feet, lambda link: read_points(model, link), file.forward, notes
+            )
+    for note in notes:
         if "foot:" not in note:
             warn_once("robot %r: %s", name, note)
-    feet = {side: file.feet.get(side, _Record({}, model))._replace(raw=raw) for side, raw in found.feet.items()}
-    links = {key: records[key]._replace(raw=raw) for key, raw in found.links.items()}
-    joints = {key: records[key]._replace(raw=raw) for key, raw in found.joints.items()}
-    return replace(file, links=links, joints=joints, feet=feet), found.notes
+    changed = {
+        "links": {key: file.links[key]._replace(raw=raw) for key, raw in links.items()},
+        "joints": {key: file.joints[key]._replace(raw=raw) for key, raw in joints.items()},
+        "feet": {side: file.feet.get(side, _Record({}, model))._replace(raw=raw) for side, raw in feet.items()},
+    }
+    return replace(file, **changed), notes  # type: ignore[arg-type]
 
 
-def _made(make: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:
-    made = {}
+def _decode(decode: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:
+    found = {}
     for name, record in records.items():
         with refusing(f"robot file {record.file!r}", RobotDataError):
-            made[name] = make(name, record)
-    return made
+            found[name] = decode(name, record)
+    return found
 
 
-def _link(name: str, record: _Record) -> Link:
+def _decode_link(name: str, record: _Record) -> Link:
     link = decoded(Link, record.raw, f"links.{name}", given={"name": name})
-    return shifted_to_com(link) if record.about == "joint" else link
+    return shift_to_com(link) if record.about == "joint" else link
 
 
-def _joint(name: str, record: _Record) -> Joint:
+def _decode_joint(name: str, record: _Record) -> Joint:
     where = f"joints.{name}"
     raw = decoded_value(Mapping[str, Any], record.raw, where)
     axis = decoded_value(Vector, raw.get("axis"), f"{where}.axis")
@@ -315,4 +303,4 @@ def _joint(name: str, record: _Record) -> Joint:
         raise RobotDataError(f"joint {name!r}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
     completed = {"planning_limits_rad": raw.get("limits_rad"), **raw, "axis": [a / length for a in axis]}
     joint = decoded(Joint, completed, where, given={"name": name})
-    return reversed_joint(joint) if record.reversed else joint
+    return reverse_joint(joint) if record.reversed else joint

@@ -1,4 +1,7 @@
-"""Corner points of meshes, STL, OBJ and Collada, and where ``package://`` leads; nothing else of them is read."""
+"""Points of collision shapes: primitives, and the corners of STL, OBJ and Collada files.
+
+Nothing but corners is read, and hostile files are refused; libraries for meshes expand XML entities and skip damaged parts.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.robots.fields import sound
+from nlp_gait.robots.robot import are_plausible
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -20,51 +23,73 @@ PACKAGE = "package://"
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
 DEEPEST_NODE = 32  # of a Collada scene
+RIM = 24  # points of a cylinder's edge
 
 
-def mesh_file(address: str, beside: Path) -> Path | None:
-    """File of a mesh: ``package://`` is looked for above the robot's file and where ROS looks; None if it is not there.
+def find_mesh(address: str, robot_file: Path) -> Path | None:
+    """Find the file of a mesh; None if it does not exist.
 
     Args:
-        address: as the robot's file has it.
-        beside: the robot's file.
+        address: in the robot's file; ``package://`` is searched for above that file and in the folders of ROS.
+        robot_file: path of the robot's file.
     """
     if "\0" in address:
         return None
     if not address.startswith(PACKAGE):
-        file = beside.parent / address.removeprefix("file://")
+        file = robot_file.parent / address.removeprefix("file://")
         return file if os.path.isfile(file) else None
     path = Path(address.removeprefix(PACKAGE).lstrip("/"))
     if ".." in path.parts or not path.parts:
         return None
     listed = [Path(part) for name in FOLDER_VARIABLES for part in os.environ.get(name, "").split(os.pathsep) if part]
-    above = [*beside.absolute().parents, *listed, *(folder / "share" for folder in listed)]
+    above = [*robot_file.absolute().parents, *listed, *(folder / "share" for folder in listed)]
     inside = [folder for folder in above if folder.name == path.parts[0]]
     candidates = [*(folder / path for folder in above), *(folder.joinpath(*path.parts[1:]) for folder in inside)]
     return next((file for file in candidates if os.path.isfile(file)), None)
 
 
+def parse_xml(data: bytes) -> Any:
+    """Return the root element; entities stay unresolved, and nothing else is read. Raises ValueError."""
+    etree = import_module("lxml.etree")
+    try:
+        return etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
+    except etree.XMLSyntaxError as error:
+        raise ValueError(" ".join(str(error).split())) from error
+
+
+def box_points(half: Array) -> Array:
+    """Return the corners (8, 3) of a box with half its size (3,)."""
+    return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+
+
+def cylinder_points(radius: float, half_length: float) -> Array:
+    """Return points (48, 3) of both edges of a cylinder along z."""
+    turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
+    rim = radius * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
+    return np.concatenate([rim + [0.0, 0.0, end * half_length] for end in (-1, 1)])
+
+
 def mesh_points(path: Path) -> Array:
-    """(N, 3) corners in the file's own unit, Collada's in metres.
+    """Read the corners (N, 3) of a mesh, in the file's own unit; those of Collada in metres.
 
     Raises:
-        RobotDataError: the file cannot be read, or is of another kind or damaged.
+        RobotDataError: the file cannot be read, has another format, or is damaged.
     """
     data = read_bytes(path, "mesh", error=RobotDataError)
-    readers = {".stl": _stl, ".obj": _obj, ".dae": _collada}
+    readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise RobotDataError(f"mesh {str(path)!r}: only {', '.join(readers)} are read")
+        raise RobotDataError(f"mesh {str(path)!r}: supported formats are {', '.join(readers)}")
     try:
         points = reader(data)
     except (ValueError, KeyError, IndexError, AttributeError, TypeError, RecursionError) as error:
         raise RobotDataError(f"mesh {str(path)!r} is damaged: {' '.join(str(error).split())[:200]}") from error
-    if not len(points) or not sound(points):
-        raise RobotDataError(f"mesh {str(path)!r} has no points, or some that are not finite")
+    if not len(points) or not are_plausible(points):
+        raise RobotDataError(f"mesh {str(path)!r} has no points, or points that are not finite")
     return points
 
 
-def _stl(data: bytes) -> Array:
+def _read_stl(data: bytes) -> Array:
     if len(data) >= STL_HEADER:
         count = int.from_bytes(data[80:84], "little")
         if len(data) == STL_HEADER + count * STL_TRIANGLE:
@@ -75,32 +100,28 @@ def _stl(data: bytes) -> Array:
     return np.array([[float(w) for w in line[1:4]] for line in words if line[:1] == ["vertex"]])
 
 
-def _obj(data: bytes) -> Array:
+def _read_obj(data: bytes) -> Array:
     words = (line.split() for line in data.decode("utf-8").splitlines())
     return np.array([[float(w) for w in line[1:4]] for line in words if line[:1] == ["v"]])
 
 
-def _collada(data: bytes) -> Array:
-    etree = import_module("lxml.etree")
-    try:
-        root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
-    except etree.XMLSyntaxError as error:
-        raise ValueError(str(error)) from error
+def _read_collada(data: bytes) -> Array:
+    root = parse_xml(data)
     for element in root.iter():  # names without the namespace
-        element.tag = etree.QName(element).localname
+        element.tag = element.tag.rpartition("}")[2]
     geometries = {f"#{geometry.get('id')}": _positions(geometry) for geometry in root.iter("geometry")}
     unit = root.find("asset/unit")
     scale = float(unit.get("meter", "1")) if unit is not None else 1.0
     up = root.findtext("asset/up_axis", "Y_UP").strip()
     upright = {"Z_UP": np.eye(3), "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])}.get(up)
     if upright is None:
-        raise ValueError(f"up_axis {up!r} is not read")
+        raise ValueError(f"up_axis {up!r} is not supported")
     scene = root.find("library_visual_scenes/visual_scene")
     placed: list[Array] = []
 
     def visit(node: Any, pose: Array, level: int) -> None:
         if level > DEEPEST_NODE:
-            raise ValueError("its nodes nest too deep")
+            raise ValueError("its nodes are nested too deeply")
         for part in node:
             if part.tag in ("matrix", "translate", "rotate", "scale"):
                 pose = pose @ _transform(part)
@@ -117,7 +138,6 @@ def _collada(data: bytes) -> Array:
 
 
 def _positions(geometry: Any) -> Array:
-    """(N, 3) corners of a geometry."""
     vertices = geometry.find("mesh/vertices/input[@semantic='POSITION']")
     source = vertices.get("source").lstrip("#")
     found = next(s for s in geometry.iter("source") if s.get("id") == source)
@@ -125,7 +145,6 @@ def _positions(geometry: Any) -> Array:
 
 
 def _transform(part: Any) -> Array:
-    """(4, 4) of a node's matrix, translation, rotation or scale."""
     values = [float(word) for word in (part.text or "").split()]
     pose = np.eye(4)
     if part.tag == "matrix":

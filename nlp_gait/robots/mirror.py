@@ -1,23 +1,26 @@
-"""Left and right of a robot: which joint is the image of which, and whether both turn the same way in mirrored motions."""
+"""Left and right of a robot: pairs of mirrored joints, and whether both turn the same way in mirrored motions."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from nlp_gait.robots.feet import mirrored
 from nlp_gait.robots.robot import Robot
+
+# Mirrored places agree to this, and mirrored axes to this cosine.
+MIRROR_M, MIRROR_COSINE = 2e-3, 0.999
 
 
 def partner(name: str) -> str:
-    """Joint on the other side, for example LKneePitch for RKneePitch; a joint of neither side is its own image."""
+    """Return the joint on the other side by name, LKneePitch for RKneePitch; a joint of neither side is its own partner."""
     swapped = {"L": "R", "R": "L"}.get(name[0])
     return swapped + name[1:] if swapped and name[1:2].isupper() else name
 
 
 def partners(robot: Robot) -> Mapping[str, str]:
-    """Image of every joint, by where they are at zero angles, for names mislead; by name where no place fits."""
+    """Return the mirror image of every joint by its place at zero angles, because names mislead; else by its name."""
     places = {
         name: np.sum([above.origin_m for above in robot.path_to_root(joint.child)], axis=0)
         for name, joint in robot.joints.items()
@@ -26,7 +29,7 @@ def partners(robot: Robot) -> Mapping[str, str]:
 
     def image(name: str) -> str:
         named = partner(name)
-        fitting = [o for o in places if mirrored(places[name], axes[name], places[o], axes[o])]
+        fitting = [o for o in places if are_mirrored(places[name], axes[name], places[o], axes[o])]
         if named in fitting or not fitting:
             return named if named in places else name
         return fitting[0]
@@ -34,15 +37,25 @@ def partners(robot: Robot) -> Mapping[str, str]:
     return {name: image(name) for name in places}
 
 
+def are_mirrored(
+    place: np.ndarray, axis: np.ndarray, other_place: np.ndarray, other_axis: np.ndarray, across: int = 1
+) -> bool:
+    """Return whether two joints are mirror images in the plane through the root across an axis."""
+    image = np.ones(3)
+    image[across] = -1.0
+    near = math.dist(image * place, other_place) <= MIRROR_M
+    return near and abs(float((image * axis) @ other_axis)) >= MIRROR_COSINE
+
+
 def mirror_sign(robot: Robot, joint: str, image: str | None = None) -> float:
-    """+1 if a joint and its image turn the same way in motions mirrored left to right, -1 if in opposite ways.
+    """Return +1 if a joint and its image turn the same way in motions mirrored left to right, otherwise -1.
 
     A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z).
 
     Args:
-        robot: whose joints they are.
+        robot: with the joints.
         joint: name.
-        image: of the joint on the other side; None for the one that its name says.
+        image: joint on the other side; None for the partner by name.
 
     Raises:
         UnknownNameError: the robot lacks the joint or its partner.

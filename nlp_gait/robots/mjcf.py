@@ -1,4 +1,4 @@
-"""Robots from MJCF files, in the form of a JSON robot file; MuJoCo itself reads them, with all that they include."""
+"""MJCF files in the form of a JSON robot file; MuJoCo itself reads them, with all files that they include."""
 
 from __future__ import annotations
 
@@ -18,21 +18,19 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.robots.fields import LARGEST_NUMBER, sound
-from nlp_gait.robots.tree import inertia_moments, point_inertia
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from nlp_gait.robots.inertia import Array, Mass, combine_masses
+from nlp_gait.robots.meshes import box_points, cylinder_points
+from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 
 LOG = logging.getLogger("nlp_gait")
-RIM = 24  # points of a cylinder's edge
-UNLIMITED_RAD_S = 1000.0  # MJCF knows no limit of speed
-_READING = threading.Lock()  # MuJoCo has one handler of warnings for all threads
+UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
+_READING = threading.Lock()  # MuJoCo has one warning handler for all threads
 
 
 def mjcf_record(path: str) -> dict[str, Any]:
-    """Links and joints of an MJCF file by the schema of a robot file, without feet.
+    """Read links and joints of an MJCF file by the schema of a robot file, without feet.
 
-    The robot is the heaviest tree of bodies on the world. All frames get its root's axes at the reference pose, where all angles
+    The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
     count as zero. Bodies that do not turn against each other become one.
 
     Args:
@@ -40,27 +38,20 @@ def mjcf_record(path: str) -> dict[str, Any]:
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
-        RobotDataError: it does not read the file.
-        ValueError: there is no robot in it, or a body with several hinges.
+        RobotDataError: MuJoCo cannot read the file.
+        ValueError: it contains no robot, or a body with several hinges.
     """
     _read.cache_clear()  # the file, or one that it includes, may have changed
-    model = _compiled(path)
+    model = _compile(path)
     root, frames, carriers = _tree(model, path)
     names = {i: model.body(i).name or f"body {i}" for i in frames}
     if len(set(names.values())) < len(names):
-        raise ValueError("two bodies have one name")
+        raise ValueError("two bodies have the same name")
     origins = {i: _joint_place(model, frames, i) for i in set(carriers.values())}
     links = {}
     for carrier, origin in origins.items():
-        parts = [_matter(model, i, frames[i]) for i in frames if carriers[i] == carrier]
-        mass = sum(part[0] for part in parts)
-        com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass if mass > 0.0 else origin
-        tensor = sum((about + point_inertia(m, c - com) for m, c, about in parts), np.zeros((3, 3)))
-        links[names[carrier]] = {
-            "mass_kg": float(mass),
-            "com_m": (com - origin).tolist(),
-            "inertia_com_kgm2": list(inertia_moments(tensor)),
-        }
+        parts = [_read_mass(model, i, frames[i]) for i in frames if carriers[i] == carrier]
+        links[names[carrier]] = combine_masses(parts).move(-origin).to_record()
     joints = {}
     for carrier in sorted(set(carriers.values()) - {root}):
         parent = carriers[int(model.body_parentid[carrier])]
@@ -76,10 +67,9 @@ def mjcf_record(path: str) -> dict[str, Any]:
             "velocity_limit_rad_s": UNLIMITED_RAD_S,
             "torque_limit_Nm": _torque_limit(model, joint),
         }
-    name = Path(path).stem
     return {
         "schema": 1,
-        "name": name,
+        "name": Path(path).stem,
         "description": f"from {Path(path).name}",
         "root": names[root],
         "links": links,
@@ -88,8 +78,8 @@ def mjcf_record(path: str) -> dict[str, Any]:
 
 
 def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
-    """Points of all collision shapes that move with a link, as ``urdf.collision_points``; MuJoCo has read every mesh."""
-    model = _compiled(path)
+    """Return points of all collision shapes that move with a link, as ``urdf.collision_points``; MuJoCo reads the meshes."""
+    model = _compile(path)
     _, frames, carriers = _tree(model, path)
     found = [np.zeros((0, 3))]
     for i, frame in frames.items():
@@ -103,13 +93,13 @@ def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     return np.concatenate(found), ()
 
 
-def _compiled(path: str) -> Any:
-    """MuJoCo's model of a file, as it was when its links and joints were read."""
+def _compile(path: str) -> Any:
+    """Return MuJoCo's model of a file, the same for its links and its points."""
     if find_spec("mujoco") is None:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
-    read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses what is no regular file
+    read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses special files
     return _read(os.path.abspath(path), path)
 
 
@@ -117,23 +107,23 @@ def _compiled(path: str) -> Any:
 def _read(place: str, path: str) -> Any:
     mujoco = import_module("mujoco")
     try:
-        with _logged_warnings(mujoco, path):
+        with log_warnings(mujoco, path):
             model = mujoco.MjModel.from_xml_path(path)
         for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
-            if not sound(getattr(model, name)):
+            if not are_plausible(getattr(model, name)):
                 raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
         return model
-    except Exception as error:  # ValueError, and whatever a plugin or decoder raises
-        said = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {said}") from error
+    except Exception as error:  # ValueError, and any error of a plugin or decoder
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}") from error
 
 
 @contextmanager
-def _logged_warnings(mujoco: Any, path: str) -> Iterator[None]:
-    """MuJoCo's warnings in this package's log instead of a file in the user's folder; later ones go where they went before."""
+def log_warnings(mujoco: Any, path: str) -> Iterator[None]:
+    """Write MuJoCo's warnings to this package's log instead of a file in the user's folder; restore its handler at the end."""
     with _READING:
         earlier = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(lambda said: LOG.warning("robot file %r: %s", path, said))
+        mujoco.set_mju_user_warning(lambda text: LOG.warning("robot file %r: %s", path, text))
         try:
             yield
         finally:
@@ -141,10 +131,10 @@ def _logged_warnings(mujoco: Any, path: str) -> Iterator[None]:
 
 
 def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]:
-    """Root body, poses (4, 4) of its tree in its own axes at its origin, and the body with the hinge that carries each."""
+    """Return the root body, poses (4, 4) of its tree in its frame, and the body with the hinge that carries each."""
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     if not tops:
-        raise ValueError("there is no body in it")
+        raise ValueError("it contains no body")
     root = max(tops, key=lambda i: float(model.body_subtreemass[i]))
     frames: dict[int, Array] = {root: np.eye(4)}
     carriers = {root: root}
@@ -156,7 +146,7 @@ def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]
         hinges = _hinges(model, i)
         if len(hinges) > 1:
             raise ValueError(
-                f"body {model.body(i).name!r} has {len(hinges)} hinges; give each a body of its own, with a little mass"
+                f"body {model.body(i).name!r} has {len(hinges)} hinges; give each its own body with a small mass"
             )
         carriers[i] = i if hinges else carriers[parent]
     return root, frames, carriers
@@ -169,21 +159,21 @@ def _hinges(model: Any, body: int) -> list[int]:
 
 
 def _joint_place(model: Any, frames: dict[int, Array], body: int) -> Array:
-    """(3,) of the joint that carries a body; of the root its origin."""
+    """Return the place (3,) of the joint that carries a body; of the root its origin."""
     hinges = _hinges(model, body)
     local = model.jnt_pos[hinges[0]] if hinges and model.body_parentid[body] else np.zeros(3)
     return np.asarray(frames[body][:3, :3] @ local + frames[body][:3, 3])
 
 
-def _matter(model: Any, body: int, frame: Array) -> tuple[float, Array, Array]:
-    """Mass, centre of mass (3,) and tensor about it (3, 3), in the root's frame."""
+def _read_mass(model: Any, body: int, frame: Array) -> Mass:
+    """Return the mass of a body in the root's frame."""
     pose = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
-    tensor = pose[:3, :3] @ np.diag(model.body_inertia[body]) @ pose[:3, :3].T
-    return float(model.body_mass[body]), pose[:3, 3], tensor
+    own = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
+    return own.turn(pose[:3, :3]).move(pose[:3, 3])
 
 
 def _torque_limit(model: Any, joint: int) -> float:
-    """Of the joint, else of its actuator [Nm]; 0 if neither has one."""
+    """Return the limit of the joint, or else of its actuator [Nm]; 0 if neither has one."""
     if model.jnt_actfrclimited[joint]:
         return float(np.abs(model.jnt_actfrcrange[joint]).max())
     for k in range(model.nu):
@@ -191,14 +181,14 @@ def _torque_limit(model: Any, joint: int) -> float:
             gear = abs(float(model.actuator_gear[k, 0]))
             if model.actuator_forcelimited[k]:
                 return gear * float(np.abs(model.actuator_forcerange[k]).max())
-            if model.actuator_ctrllimited[k] and not model.actuator_biasprm[k].any():  # a motor, no servo
+            if model.actuator_ctrllimited[k] and not model.actuator_biasprm[k].any():  # a motor, not a position drive
                 gain = abs(float(model.actuator_gainprm[k, 0]))
                 return gear * gain * float(np.abs(model.actuator_ctrlrange[k]).max())
     return 0.0
 
 
 def _shape_points(model: Any, geom: int, pose: Array) -> Array:
-    """(N, 3) of a shape at a pose (4, 4): corners, edges, or of round shapes the lowest points."""
+    """Return points (N, 3) of a shape at a pose (4, 4): corners, edges, or the lowest points of round shapes."""
     kinds = import_module("mujoco").mjtGeom
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == int(kinds.mjGEOM_MESH):
@@ -206,24 +196,21 @@ def _shape_points(model: Any, geom: int, pose: Array) -> Array:
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         points = np.array(model.mesh_vert[first : first + count], dtype=float)
     elif kind == int(kinds.mjGEOM_BOX):
-        points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size
+        points = box_points(size)
     elif kind == int(kinds.mjGEOM_SPHERE):
         return np.array([pose[:3, 3] - [0.0, 0.0, size[0]]])
     elif kind == int(kinds.mjGEOM_CAPSULE):
         ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]) @ pose[:3, :3].T + pose[:3, 3]
         return np.asarray(ends - [0.0, 0.0, size[0]])
     elif kind == int(kinds.mjGEOM_CYLINDER):
-        turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
-        rim = size[0] * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
-        points = np.concatenate([rim + [0.0, 0.0, end * size[1]] for end in (-1, 1)])
+        points = cylinder_points(size[0], size[1])
     else:
         return np.zeros((0, 3))
     placed = np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
-    return placed if sound(placed) else np.zeros((0, 3))
+    return placed if are_plausible(placed) else np.zeros((0, 3))
 
 
 def _pose(place: Array, quaternion: Array) -> Array:
-    """(4, 4) from a place and (w, x, y, z)."""
     w, x, y, z = (float(part) for part in quaternion)
     pose = np.eye(4)
     pose[:3, :3] = [

@@ -1,14 +1,14 @@
-"""A robot with other masses, leg lengths or soles: for sensitivities, worst cases, and what-if questions.
+"""Robots with other masses, leg lengths or soles: for sensitivities, worst cases, and what-if questions.
 
-Written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, it can stand wherever a robot's name can:
+Changes are written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, wherever the name can be used:
 
     mass            factor on the masses and inertias of all links
     LINK.mass       the same for one link, for example ``LThigh.mass``
-    thigh_m         added between the knees and the joints before them; masses, centres of mass and inertias stay
-    tibia_m         likewise between the upper ankle joints and the knees
+    thigh_m         added between the knees and the joints above; masses, centres of mass and inertias stay
+    tibia_m         added between the upper ankle joints and the knees
     sole_x_m        both soles shifted forwards under their ankles
-    sole_y_m        likewise to the left
-    sole_front_m    added to both soles' extent forwards; likewise ``sole_back_m``, ``sole_left_m``, ``sole_right_m``
+    sole_y_m        both soles shifted to the left
+    sole_front_m    added to both soles' extent forwards; also ``sole_back_m``, ``sole_left_m``, ``sole_right_m``
 """
 
 from __future__ import annotations
@@ -22,48 +22,48 @@ from nlp_gait.robots.robot import Foot, Link, Robot
 
 MARK = "@"
 MASS = "mass"
-# What is added to each extent of a sole, for each unit of a quantity.
+# Change of each extent of a sole per unit of a quantity.
 SOLES: Mapping[str, Mapping[str, int]] = {
     "sole_x_m": {"front_m": 1, "back_m": -1},
     "sole_y_m": {"left_m": 1, "right_m": -1},
     **{f"sole_{extent}": {extent: 1} for extent in ("front_m", "back_m", "left_m", "right_m")},
 }
-# The joint at the lower end of a part of the leg, counted from the foot upwards: two of the ankle, then the knee.
+# Index of the joint at the lower end of a part of the leg, from the foot upwards: two of the ankle, then the knee.
 LENGTHS = {"thigh_m": 2, "tibia_m": 1}
 
 
-def perturbed(robot: Robot, changes: Mapping[str, float]) -> Robot:
-    """The same robot with some quantities changed, in the order given.
+def perturb(robot: Robot, changes: Mapping[str, float]) -> Robot:
+    """Return the robot with some quantities changed, in the given order.
 
     Args:
-        robot: to begin with.
-        changes: by name; factors of masses, and lengths that are added [m].
+        robot: to change.
+        changes: by name; factors of masses, and lengths to add [m].
 
     Raises:
         UnknownNameError: no such quantity, link or joint.
-        RobotDataError: no robot can have the result.
-        InputError: a value that is not a finite number.
+        RobotDataError: the result is physically impossible.
+        InputError: a value is not a finite number.
     """
     for name, value in changes.items():
         if not math.isfinite(value):
             raise InputError(f"robot {robot.name!r}: {name} must be a finite number, got {value}")
-        robot = _changed(robot, name, value)
+        robot = _change(robot, name, value)
     return replace(robot, name=perturbed_name(robot.name, changes)) if changes else robot
 
 
 def perturbed_name(name: str, changes: Mapping[str, float]) -> str:
-    """A robot's name with its changes as text, to the last digit."""
+    """Return a robot's name with its changes as text, to the last digit."""
     return f"{name}{MARK}{','.join(f'{key}={value!r}' for key, value in changes.items())}" if changes else name
 
 
 def split_name(text: str) -> tuple[str, dict[str, float]]:
-    """A robot's name, and its changes if the text has some.
+    """Split a robot's name and its changes.
 
     Raises:
         InputError: the text after the mark is not a list of changes.
     """
     name, mark, listed = text.rpartition(MARK)
-    if not mark or listed.endswith((".json", ".urdf", ".xml")):  # a mark may be part of a file's path
+    if not mark or listed.endswith((".json", ".urdf", ".xml")):  # the mark may be part of a file's path
         return text, {}
     changes: dict[str, float] = {}
     for item in listed.split(","):
@@ -72,39 +72,39 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
             number = float(value)
         except ValueError:
             raise InputError(
-                f"robot {text!r}: after {MARK} it needs NAME=NUMBER, separated by commas, got {item!r}; for example "
+                f"robot {text!r}: after {MARK}, expected NAME=NUMBER, separated by commas, got {item!r}; for example "
                 f"nao-v5{MARK}mass=1.05,thigh_m=0.001"
             ) from None
         if key.strip() in changes:
-            raise InputError(f"robot {text!r}: {key.strip()} stands twice after {MARK}; give it once")
+            raise InputError(f"robot {text!r}: {key.strip()} is duplicated after {MARK}; give it once")
         changes[key.strip()] = number
     return name, changes
 
 
 def quantities(robot: Robot) -> tuple[str, ...]:
-    """Names of everything that can be changed in a robot."""
+    """Return the names of all quantities that can be changed in a robot."""
     return (MASS, *(f"{link}.{MASS}" for link in robot.links), *LENGTHS, *SOLES)
 
 
-def _changed(robot: Robot, name: str, value: float) -> Robot:
+def _change(robot: Robot, name: str, value: float) -> Robot:
     if name in LENGTHS:
         return _with_length(robot, LENGTHS[name], value)
     if name in SOLES:
         feet = {side: _with_sole(foot, SOLES[name], value) for side, foot in robot.feet.items()}
         return replace(robot, feet=feet)
-    heavier = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
-    if not heavier:
+    changed = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
+    if not changed:
         raise unknown(f"quantity of robot {robot.name}", name, quantities(robot))
-    return replace(robot, links={**robot.links, **{link: _heavier(robot.links[link], value) for link in heavier}})
+    return replace(robot, links={**robot.links, **{link: _scale_mass(robot.links[link], value) for link in changed}})
 
 
-def _heavier(link: Link, factor: float) -> Link:
+def _scale_mass(link: Link, factor: float) -> Link:
     ixx, iyy, izz, ixy, ixz, iyz = (factor * value for value in link.inertia_com_kgm2)
     return replace(link, mass_kg=factor * link.mass_kg, inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
 
 
 def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
-    """Both legs longer above a joint, which moves away from the one before it."""
+    """Return the robot with both legs longer above a joint."""
     joints = dict(robot.joints)
     for side, foot in robot.feet.items():
         path = robot.path_to_root(foot.link)
@@ -118,8 +118,8 @@ def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
         length = math.hypot(*origin)
         if not (length > 0.0 and length + metres > 0.0):
             raise InputError(
-                f"robot {robot.name!r}: joint {name!r} is {length:g} m below the one before it; adding {metres:g} m "
-                "leaves nothing"
+                f"robot {robot.name!r}: joint {name!r} is {length:g} m below the one above it; adding {metres:g} m "
+                "leaves no length"
             )
         x, y, z = (value * (1.0 + metres / length) for value in origin)
         joints[name] = replace(joints[name], origin_m=(x, y, z))
@@ -127,16 +127,16 @@ def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
 
 
 def _with_sole(foot: Foot, shares: Mapping[str, int], metres: float) -> Foot:
-    """Extents changed; the true outline is shifted, or stretched on the side whose extent grows."""
+    """Return a foot with other extents; its true outline is shifted, or stretched on the side whose extent changes."""
     extents = {name: getattr(foot, name) + share * metres for name, share in shares.items()}
     outline = tuple(
-        (_along(x, "front_m", "back_m", shares, foot, metres), _along(y, "left_m", "right_m", shares, foot, metres))
+        (_stretch(x, "front_m", "back_m", shares, foot, metres), _stretch(y, "left_m", "right_m", shares, foot, metres))
         for x, y in foot.sole_polygon_m
     )
     return replace(foot, **extents, sole_polygon_m=outline)
 
 
-def _along(value: float, positive: str, negative: str, shares: Mapping[str, int], foot: Foot, metres: float) -> float:
+def _stretch(value: float, positive: str, negative: str, shares: Mapping[str, int], foot: Foot, metres: float) -> float:
     if positive in shares and negative in shares:
         return value + shares[positive] * metres
     extent = positive if value > 0.0 else negative

@@ -1,21 +1,55 @@
-"""Frozen, validated records of a legged robot: links, joints, feet."""
+"""Frozen, validated data of a legged robot: links, joints, motors, feet."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from nlp_gait.errors import RobotDataError, unknown
-from nlp_gait.robots.fields import check_numbers
 
 Vector = tuple[float, float, float]
 
+LONGEST_NAME = 100
+LARGEST_NUMBER = 1e9  # in the unit of its field: above those of any robot, and its squares stay finite
 # Published tensors carry six digits: a rod's triangle equality may be missed by that much.
 TRIANGLE_TOLERANCE = 1e-6
+
+
+def check_name(name: str, where: str) -> None:
+    """Raise ValueError for a name that is empty, too long, or not printable."""
+    if not name or len(name) > LONGEST_NAME or not name.isprintable():
+        raise ValueError(f"{where}: a name has 1 to {LONGEST_NAME} printable characters, got {name[:LONGEST_NAME]!r}")
+
+
+def check_numbers(owner: str, record: Any, positive: Collection[str]) -> None:
+    """Check the numbers of a dataclass.
+
+    Args:
+        owner: for messages.
+        record: the dataclass; fields without numbers are ignored.
+        positive: names of the fields that must be > 0.
+
+    Raises:
+        RobotDataError: a number is not finite, or not within ``LARGEST_NUMBER``, or not positive.
+    """
+    for item in fields(record):
+        value = getattr(record, item.name)
+        if item.name in positive and not value > 0.0:  # NaN fails too
+            raise RobotDataError(f"{owner}: {item.name} must be > 0, got {value}")
+        if isinstance(value, (int, float, tuple)) and not are_plausible(value):
+            raise RobotDataError(
+                f"{owner}: {item.name} must be finite numbers within {LARGEST_NUMBER:g}, got {value!r}"
+            )
+
+
+def are_plausible(numbers: Any) -> bool:
+    """Return whether all numbers of a sequence or array of any depth are finite and within ``LARGEST_NUMBER``."""
+    return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +69,6 @@ class Link:
     inertia_com_kgm2: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
-        """Refuse what no rigid body can have."""
         owner = f"link {self.name!r}"
         check_numbers(owner, self, positive=("mass_kg",))
         low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
@@ -56,7 +89,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
-    """Motor and gear of a joint (data-sheet values at the motor shaft); the rotor's inertia if it is known."""
+    """Motor and gear of a joint (data-sheet values at the motor shaft), and the rotor's inertia if known."""
 
     make: str
     gear_ratio: float
@@ -66,44 +99,43 @@ class Motor:
     rotor_inertia_gcm2: float | None = None
 
     def __post_init__(self) -> None:
-        """All ratings are positive."""
         ratings = ["gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"]
         known = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
         check_numbers(f"motor {self.make!r}", self, positive=known)
 
     @property
     def reflected_inertia_kgm2(self) -> float | None:
-        """Of the rotor at the joint: it turns as many times faster as the gear's ratio, which counts twice [kg m^2]."""
+        """Inertia of the rotor at the joint: multiplied by the square of the gear ratio [kg m^2]."""
         return None if self.rotor_inertia_gcm2 is None else self.gear_ratio**2 * self.rotor_inertia_gcm2 * 1e-7
 
     @property
     def stall_torque_Nm(self) -> float:
-        """At the joint, the gear without loss [Nm]."""
+        """Torque at the joint with a lossless gear [Nm]."""
         return self.gear_ratio * self.stall_torque_mNm / 1000.0
 
     @property
     def continuous_torque_Nm(self) -> float:
-        """At the joint, the gear without loss [Nm]."""
+        """Torque at the joint with a lossless gear [Nm]."""
         return self.gear_ratio * self.continuous_torque_mNm / 1000.0
 
     @property
     def no_load_rad_s(self) -> float:
-        """At the joint [rad/s]."""
+        """Speed at the joint [rad/s]."""
         return self.no_load_rpm * 2.0 * math.pi / 60.0 / self.gear_ratio
 
     @property
     def heat_W_per_Nm2(self) -> float:
-        """Heat of the winding for each squared torque at the joint, R / (k_t gear)^2 [W/(Nm)^2].
+        """Heat of the winding per squared torque at the joint, R / (k_t gear)^2 [W/(Nm)^2].
 
-        With torque k_t I, stall torque k_t V / R and no-load speed V / k_t that is no-load speed / stall torque, at the joint:
-        the voltage V drops out. Friction, and the winding's growing resistance when it is warm, are left out.
+        With torque k_t I, stall torque k_t V / R and no-load speed V / k_t, this is no-load speed / stall torque at the joint:
+        the voltage V cancels. Friction, and the higher resistance of a warm winding, are neglected.
         """
         return self.no_load_rad_s / self.stall_torque_Nm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """Revolute joint; the child frame stands at its origin with the parent's axes when q = 0.
+    """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes.
 
     Attributes:
         name: joint name.
@@ -112,7 +144,7 @@ class Joint:
         origin_m: joint centre in the parent frame [m].
         axis: unit vector of positive rotation.
         limits_rad: (lower, upper) mechanical limits [rad].
-        planning_limits_rad: (lower, upper) that a gait is planned within [rad]; the mechanical ones if none are stated.
+        planning_limits_rad: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones.
         velocity_limit_rad_s: [rad/s].
         torque_limit_Nm: [Nm].
         motor: motor and gear, if known.
@@ -130,7 +162,6 @@ class Joint:
     motor: Motor | None = None
 
     def __post_init__(self) -> None:
-        """Unit axis, ordered limits."""
         owner = f"joint {self.name!r}"
         check_numbers(owner, self, positive=("velocity_limit_rad_s", "torque_limit_Nm"))
         if abs(math.hypot(*self.axis) - 1.0) > 1e-9:
@@ -142,10 +173,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Foot:
-    """Flat sole under an ankle; distances from the ankle's projection on the ground.
+    """Flat sole under an ankle; distances are from the ankle's projection on the ground.
 
     Attributes:
-        link: the foot's link, whose frame stands at the ankle.
+        link: the foot's link, whose frame is at the ankle.
         ankle_height_m: ankle above the sole [m].
         front_m: extent of the sole rectangle forward [m], likewise ``back_m``, ``left_m``, ``right_m``.
         sole_polygon_m: true outline of the sole, (x, y) from the ankle [m], in order.
@@ -160,7 +191,6 @@ class Foot:
     sole_polygon_m: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        """A sole has an extent; the ankle may lie on the ground, and above the sole's rear edge."""
         owner = f"foot {self.link!r}"
         check_numbers(owner, self, positive=("front_m", "left_m", "right_m"))
         for name in ("ankle_height_m", "back_m"):
@@ -175,16 +205,16 @@ class Robot:
     Attributes:
         name: for example ``"nao-v5"``.
         description: one sentence.
-        sources: where each group of numbers comes from.
+        sources: origin of each group of numbers.
         root: link with no parent (the torso).
         links: by name.
         joints: by name.
         feet: ``"left"`` and ``"right"``.
-        toes: what lies on the ground beyond a toe joint, by side; its link's frame stands at that joint.
-        armatures_kgm2: by joint, inertia of rotors at the joint, where the dynamics take it into account; none by default.
-        posture_rad: angles at which joints are held that a gait does not move; zero, or the nearest limit, where not stated.
-        heat_loss_W_per_Nm2: heat of the motors for each squared torque, if the robot's file says it.
-        notes: what was derived from a file, or changed, when the robot was read; a sentence each.
+        toes: soles beyond a toe joint, by side; the frame of a toe's link is at that joint.
+        armatures_kgm2: by joint, inertia of rotors at the joint, if the dynamics include it; none by default.
+        posture_rad: angles of joints that a gait does not move; by default zero, or the nearest limit.
+        heat_loss_W_per_Nm2: heat of the motors per squared torque, if the robot's file states it.
+        notes: what was inferred or changed when the robot was read; a sentence each.
     """
 
     name: str
@@ -201,7 +231,6 @@ class Robot:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Links and joints form one tree."""
         if self.root not in self.links:
             raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not a link")
         children: set[str] = set()
@@ -215,7 +244,7 @@ class Robot:
         loose = set(self.links) - children - {self.root}
         if loose:
             raise RobotDataError(f"robot {self.name!r}: no joint carries link {', '.join(sorted(loose))}")
-        for link in self.links:  # a ring of joints apart from the root has parents all round
+        for link in self.links:  # raises for a ring of joints apart from the root
             self.path_to_root(link)
         for side in ("left", "right"):
             if side not in self.feet or self.feet[side].link not in self.links:
@@ -226,7 +255,7 @@ class Robot:
 
     @cached_property
     def soles(self) -> Mapping[str, Foot]:
-        """Everything that stands on the ground, feet and toes, by link."""
+        """Feet and toes by link."""
         return {foot.link: foot for part in (self.feet, self.toes) for foot in part.values()}
 
     @cached_property
@@ -236,17 +265,17 @@ class Robot:
 
     @cached_property
     def joint_to(self) -> Mapping[str, Joint]:
-        """The joint that carries each link but the root."""
+        """Joint to each link except the root."""
         return {joint.child: joint for joint in self.joints.values()}
 
     def joint(self, name: str) -> Joint:
-        """Joint by name; raises UnknownNameError."""
+        """Return a joint by name; raises UnknownNameError."""
         if name not in self.joints:
             raise unknown(f"joint of robot {self.name}", name, self.joints)
         return self.joints[name]
 
     def path_to_root(self, link: str) -> tuple[Joint, ...]:
-        """Joints from a link up to the root, in that order."""
+        """Return the joints from a link up to the root, in that order."""
         path: list[Joint] = []
         below = link
         while below != self.root:

@@ -1,4 +1,4 @@
-"""A robot's links as seen from any link held fixed, for example the support foot."""
+"""Trees of a robot's links from any fixed link, for example the support foot, and robots with locked or reversed joints."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nlp_gait.errors import InputError
+from nlp_gait.robots.inertia import Mass, combine_masses, inertia_moments
 from nlp_gait.robots.robot import Joint, Link, Robot, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """Link in a tree that starts at the fixed link; its reference point is the joint through which it is reached.
+    """Link in a tree from the fixed link; its reference point is the joint to its parent in the tree.
 
     Attributes:
         link: mass and inertia, in link axes.
-        parent: index of the body before it; -1 for the fixed one.
-        joint: joint to that body; None for the fixed one.
-        direction: +1 if the joint is passed from its parent to its child link, else -1.
+        parent: index of the parent body; -1 for the fixed one.
+        joint: joint to the parent; None for the fixed one.
+        direction: +1 if the joint's child link is this body's, else -1.
         offset_m: from the parent's reference point to this one, in the parent's axes [m].
         com_offset_m: from the reference point to the centre of mass, in link axes [m].
-        armature_kgm2: inertia of the rotor at the joint, if the robot's dynamics take it into account [kg m^2].
+        armature_kgm2: inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2].
     """
 
     link: Link
@@ -35,21 +36,25 @@ class Body:
 
 
 def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:
-    """Bodies ordered from the fixed link outwards, parents before children.
+    """Return the bodies from the fixed link outwards, parents before children.
 
     The fixed link's reference point is its frame's origin.
 
     Args:
-        robot: whose links they are.
+        robot: with the links.
         fixed_link: name of the first body's link.
-        joints: pass through these only, for a part of the robot; None means all.
+        joints: only these, for a part of the robot; None means all.
+
+    Raises:
+        InputError: no such link.
+        UnknownNameError: no such joint.
     """
     if fixed_link not in robot.links:
         raise InputError(f"robot {robot.name!r} has no link {fixed_link!r}")
     neighbours: dict[str, list[tuple[str, Joint]]] = {name: [] for name in robot.links}
-    for passage in robot.joints.values() if joints is None else map(robot.joint, joints):
-        neighbours[passage.parent].append((passage.child, passage))
-        neighbours[passage.child].append((passage.parent, passage))
+    for between in robot.joints.values() if joints is None else map(robot.joint, joints):
+        neighbours[between.parent].append((between.child, between))
+        neighbours[between.child].append((between.parent, between))
     bodies: list[Body] = []
     waiting: list[tuple[str, int, Joint | None, Vector]] = [(fixed_link, -1, None, (0.0, 0.0, 0.0))]
     while waiting:
@@ -76,27 +81,31 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
 
 
 def weld(robot: Robot, joints: Collection[str]) -> Robot:
-    """The same robot with some joints locked at zero: their child links become one with the parents.
-
-    Masses add up, centres of mass and inertias are combined by the parallel-axis theorem.
-    """
+    """Return the robot with some joints locked at zero: their child links become part of the parents."""
     links = dict(robot.links)
     kept = dict(robot.joints)
-    # From the leaves inwards, so that a welded child already holds what was welded to it.
+    # From the leaves inwards, so that a welded child already contains its own welded children.
     by_depth = sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child)))
     for name in by_depth:
         joint = kept.pop(name)
-        links[joint.parent] = _welded(links[joint.parent], links.pop(joint.child), joint.origin_m)
+        child = Mass.from_link(links.pop(joint.child)).move(np.array(joint.origin_m))
+        total = combine_masses([Mass.from_link(links[joint.parent]), child])
+        links[joint.parent] = Link(
+            name=joint.parent,
+            mass_kg=total.mass_kg,
+            com_m=_vector(total.com_m),
+            inertia_com_kgm2=inertia_moments(total.tensor_kgm2),
+        )
         for other in [j for j in kept.values() if j.parent == joint.child]:
             kept[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
     return replace(robot, links=links, joints=kept)
 
 
-def posed(robot: Robot, angles: Mapping[str, float]) -> Robot:
-    """The same robot with some joints turned: where they stand then is zero, and all links get the root's axes there.
+def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
+    """Return the robot with some joints turned: their new angles count as zero, and all links get the root's axes there.
 
     Args:
-        robot: to begin with; its feet must not turn.
+        robot: to turn.
         angles: by joint [rad].
     """
     turns = {robot.root: np.eye(3)}
@@ -106,25 +115,21 @@ def posed(robot: Robot, angles: Mapping[str, float]) -> Robot:
     while waiting:
         joint = waiting.pop()
         before, angle = turns[joint.parent], angles.get(joint.name, 0.0)
-        if angle:
-            turns[joint.child] = before @ _rotation(joint.axis, angle)
-        else:
-            turns[joint.child] = before
-        joints[joint.name] = _seen(joint, before, angle)
-        links[joint.child] = _turned(links[joint.child], turns[joint.child])
+        turns[joint.child] = before @ _rotation(joint.axis, angle) if angle else before
+        joints[joint.name] = _turn_joint(joint, before, angle)
+        links[joint.child] = _turn_link(links[joint.child], turns[joint.child])
         waiting += [other for other in robot.joints.values() if other.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
 
 
 def _rotation(axis: Vector, angle: float) -> np.ndarray:
-    """(3, 3) rotation about a unit axis."""
     k = np.cross(np.eye(3), np.array(axis))
     turn: np.ndarray = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
     return turn
 
 
-def _seen(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
-    """A joint whose parent was turned, counted from an angle of its own."""
+def _turn_joint(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
+    """Return a joint whose parent was turned, with its angle counted from another zero."""
     if not angle and np.array_equal(turn, np.eye(3)):
         return joint
     axis = turn @ np.array(joint.axis)
@@ -138,7 +143,7 @@ def _seen(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
     )
 
 
-def _turned(link: Link, turn: np.ndarray) -> Link:
+def _turn_link(link: Link, turn: np.ndarray) -> Link:
     if np.array_equal(turn, np.eye(3)):
         return link
     tensor = inertia_moments(turn @ link.inertia_matrix @ turn.T)
@@ -150,41 +155,18 @@ def _vector(values: np.ndarray) -> Vector:
     return x, y, z
 
 
-def reversed_joint(joint: Joint) -> Joint:
-    """The same joint with its angle counted the other way round."""
+def reverse_joint(joint: Joint) -> Joint:
+    """Return the joint with its angle counted in the opposite direction."""
     (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
     x, y, z = joint.axis
     return replace(joint, axis=(-x, -y, -z), limits_rad=(-high, -low), planning_limits_rad=(-plan_high, -plan_low))
 
 
 def point_masses(robot: Robot) -> Robot:
-    """The same robot with every link's inertia about its centre of mass set to zero."""
+    """Return the robot with every link's inertia about its centre of mass set to zero."""
     zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     links: Mapping[str, Link] = {n: replace(link, inertia_com_kgm2=zero) for n, link in robot.links.items()}
     return replace(robot, links=links)
-
-
-def inertia_moments(matrix: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    """(ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as ``Link`` has them."""
-    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
-    return ixx, iyy, izz, ixy, ixz, iyz
-
-
-def point_inertia(mass: float, offset: np.ndarray) -> np.ndarray:
-    """(3, 3) tensor of a point mass [kg] about a point at a distance ``offset`` (3,) [m]."""
-    tensor: np.ndarray = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return tensor
-
-
-def _welded(parent: Link, child: Link, origin: Vector) -> Link:
-    mass = parent.mass_kg + child.mass_kg
-    coms = [np.array(parent.com_m), np.array(child.com_m) + np.array(origin)]
-    com = (parent.mass_kg * coms[0] + child.mass_kg * coms[1]) / mass
-    inertia = np.zeros((3, 3))
-    for link, c in zip((parent, child), coms, strict=True):
-        inertia += link.inertia_matrix + point_inertia(link.mass_kg, c - com)
-    x, y, z = com.tolist()
-    return Link(name=parent.name, mass_kg=mass, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(inertia))
 
 
 def _minus(a: Vector, b: Vector) -> Vector:
@@ -192,5 +174,5 @@ def _minus(a: Vector, b: Vector) -> Vector:
 
 
 def plus(a: Vector, b: Vector) -> Vector:
-    """Sum of two vectors."""
+    """Return the sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -27,7 +27,7 @@ from nlp_gait.files import without_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check, read_certificate
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.biped import make_biped
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
 from tests.fuzz.trial import Misread
 
@@ -126,7 +126,7 @@ def read_urdf(path: Path) -> None:
 
 def read_biped(path: Path) -> None:
     """A robot from a URDF alone, as a biped: all masses of the file are in it, and its legs' limits are those of the file."""
-    biped, root = biped_of(load_robot(str(path))), ElementTree.fromstring(path.read_bytes())
+    biped, root = make_biped(load_robot(str(path))), ElementTree.fromstring(path.read_bytes())
     masses = [float(mass.get("value", "")) for mass in root.iterfind("link/inertial/mass")]
     near(math.fsum(masses), biped.model.mass_kg, "mass")
     for name in biped.joints:
@@ -141,7 +141,7 @@ def read_mjcf(path: Path) -> None:
     import mujoco
 
     robot = load_robot(str(path))
-    biped_of(robot)
+    make_biped(robot)
     model = mujoco.MjModel.from_xml_path(str(path))
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     near(max(float(model.body_subtreemass[i]) for i in tops), robot.mass_kg, "mass")

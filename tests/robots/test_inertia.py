@@ -10,7 +10,7 @@ import pytest
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import Link, load_robot, robot_names
-from nlp_gait.robots.inertia import check_inertias, joint_distance_ratio, shifted_to_com
+from nlp_gait.robots.inertia import check_inertias, compute_joint_ratio, shift_to_com
 from tests.robots.custom import about_joints, humanoid, nao, six
 from tests.robots.files import written
 
@@ -22,25 +22,25 @@ BALL = Link(name="ball", mass_kg=1.0, com_m=(0.1, 0.0, 0.0), inertia_com_kgm2=(0
 
 def test_ratios_by_hand() -> None:
     """A rod of 1 m and 3 kg held at its end: 0.25 m^2 against m L^2 / 12 / m = 1/12 m^2; a ball: 0.01 against 0.01."""
-    assert joint_distance_ratio(ROD) == pytest.approx(3.0)
-    assert joint_distance_ratio(BALL) == pytest.approx(1.0)
+    assert compute_joint_ratio(ROD) == pytest.approx(3.0)
+    assert compute_joint_ratio(BALL) == pytest.approx(1.0)
 
 
 def test_the_wrong_tensor_of_a_rod_has_three_quarters_and_is_shifted_back() -> None:
     wrong = Link(name="rod", mass_kg=3.0, com_m=ROD.com_m, inertia_com_kgm2=(1.0, 1.0, 0.0, 0.0, 0.0, 0.0))
-    assert joint_distance_ratio(wrong) == pytest.approx(0.75)
-    assert shifted_to_com(wrong).inertia_com_kgm2 == pytest.approx(ROD.inertia_com_kgm2)
+    assert compute_joint_ratio(wrong) == pytest.approx(0.75)
+    assert shift_to_com(wrong).inertia_com_kgm2 == pytest.approx(ROD.inertia_com_kgm2)
 
 
 def test_a_tensor_that_no_body_has_about_its_joint_is_refused() -> None:
     with pytest.raises(RobotDataError, match="link 'rod': inertia_com_kgm2 has principal moments"):
-        shifted_to_com(ROD)
+        shift_to_com(ROD)
 
 
 @pytest.mark.parametrize("name", robot_names())
 def test_the_real_robots_pass_by_a_wide_margin(name: str) -> None:
     links = load_robot(name).links.values()
-    assert sum(joint_distance_ratio(link) > 1.0 for link in links) > len(links) / 2
+    assert sum(compute_joint_ratio(link) > 1.0 for link in links) > len(links) / 2
 
 
 @pytest.mark.parametrize("make", [nao, humanoid])

@@ -11,7 +11,7 @@ import pytest
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.robots import load_robot, mjcf
-from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.biped import make_biped
 from tests.robots.crooked import crooked, crooked_urdf
 
 mujoco = pytest.importorskip("mujoco", reason="extra sim is not installed")
@@ -38,7 +38,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
-    found, wanted = biped_of(load_robot(path)), biped_of(load_robot(str(Path(path).with_suffix(".urdf"))))
+    found, wanted = make_biped(load_robot(path)), make_biped(load_robot(str(Path(path).with_suffix(".urdf"))))
     assert found.joints == wanted.joints
     assert found.posture_rad == pytest.approx(wanted.posture_rad, abs=DIGITS)
     for side in ("left", "right"):
@@ -62,7 +62,7 @@ def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
     [
         ("<worldbody>", "<wordbody>", "is not read by MuJoCo"),
         (' actuatorfrcrange="-60 60"', "", r"torque_limit_Nm must be > 0, got 0\.0"),
-        ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each a body"),
+        ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each its own body"),
     ],
 )
 def test_what_is_wrong_with_an_mjcf_is_said(path: str, tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -96,7 +96,7 @@ def test_the_engines_warnings_go_where_they_went_before(path: str, tmp_path: Pat
 
 def test_a_warning_while_a_robot_is_read_is_logged(path: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Of MuJoCo's compiler, in this package's log and in no file."""
-    with pytest.MonkeyPatch.context() as patch, mjcf._logged_warnings(mujoco, "robot.xml"):
+    with pytest.MonkeyPatch.context() as patch, mjcf.log_warnings(mujoco, "robot.xml"):
         patch.chdir(tmp_path)
-        mujoco.get_mju_user_warning()("a tensor was mended")
-    assert caplog.messages == ["robot file 'robot.xml': a tensor was mended"] and not list(tmp_path.iterdir())
+        mujoco.get_mju_user_warning()("a tensor was fixed")
+    assert caplog.messages == ["robot file 'robot.xml': a tensor was fixed"] and not list(tmp_path.iterdir())

@@ -10,15 +10,15 @@ import pytest
 
 from nlp_gait.errors import InputError, RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.leg import leg_of
-from nlp_gait.robots.perturbation import perturbed, perturbed_name, quantities, split_name
+from nlp_gait.robots.leg import make_leg
+from nlp_gait.robots.perturbation import perturb, perturbed_name, quantities, split_name
 from tests.robots.crooked import crooked
 
 NAO = load_robot("nao-v5")
 
 
 def test_masses_and_inertias_scale() -> None:
-    heavy = perturbed(NAO, {"mass": 1.1, "LThigh.mass": 2.0})
+    heavy = perturb(NAO, {"mass": 1.1, "LThigh.mass": 2.0})
     assert heavy.links["RTibia"].mass_kg == pytest.approx(1.1 * NAO.links["RTibia"].mass_kg)
     assert heavy.links["LThigh"].mass_kg == pytest.approx(2.2 * NAO.links["LThigh"].mass_kg)
     own, other = (robot.links["LThigh"].inertia_com_kgm2 for robot in (NAO, heavy))
@@ -26,14 +26,14 @@ def test_masses_and_inertias_scale() -> None:
     assert heavy.links["LThigh"].com_m == NAO.links["LThigh"].com_m
 
 
-def test_a_change_that_stands_twice_is_refused() -> None:
+def test_a_duplicate_change_is_refused() -> None:
     for twice in ("mass=2,mass=3", "mass=2, mass =2", "thigh_m=0.001,mass=2,thigh_m=0.002"):
-        with pytest.raises(InputError, match="(mass|thigh_m) stands twice"):
+        with pytest.raises(InputError, match="(mass|thigh_m) is duplicated"):
             load_robot(f"nao-v5@{twice}")
 
 
 def test_both_legs_get_longer() -> None:
-    tall = perturbed(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
+    tall = perturb(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
     for side in "LR":
         assert tall.joints[f"{side}KneePitch"].origin_m == pytest.approx((0.0, 0.0, -0.101))
         assert tall.joints[f"{side}AnklePitch"].origin_m == pytest.approx((0.0, 0.0, -0.1009))
@@ -42,15 +42,15 @@ def test_both_legs_get_longer() -> None:
 def test_the_legs_of_any_robot_get_longer(tmp_path: Path) -> None:
     pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
     robot = load_robot(str(crooked(tmp_path)))
-    tall = perturbed(robot, {"thigh_m": 0.01, "tibia_m": -0.005})
+    tall = perturb(robot, {"thigh_m": 0.01, "tibia_m": -0.005})
     for side in robot.feet:
-        before, after = (leg_of(each, side) for each in (robot, tall))
+        before, after = (make_leg(each, side) for each in (robot, tall))
         steps = [[math.dist(leg.points[k], leg.points[k - 1]) for k in range(1, 6)] for leg in (before, after)]
         assert np.subtract(steps[1], steps[0]) == pytest.approx([0, 0, 0.01, -0.005, 0], abs=1e-12)
 
 
 def test_a_shifted_sole_keeps_its_size_and_shape() -> None:
-    shifted = perturbed(NAO, {"sole_x_m": 0.002, "sole_y_m": -0.001})
+    shifted = perturb(NAO, {"sole_x_m": 0.002, "sole_y_m": -0.001})
     for side, foot in NAO.feet.items():
         other = shifted.feet[side]
         assert other.front_m + other.back_m == pytest.approx(foot.front_m + foot.back_m)
@@ -63,7 +63,7 @@ def test_a_shifted_sole_keeps_its_size_and_shape() -> None:
 
 
 def test_a_longer_sole_reaches_further_on_one_side() -> None:
-    longer = perturbed(NAO, {"sole_front_m": 0.01}).feet["left"]
+    longer = perturb(NAO, {"sole_front_m": 0.01}).feet["left"]
     foot = NAO.feet["left"]
     assert longer.front_m == pytest.approx(foot.front_m + 0.01) and longer.back_m == foot.back_m
     assert min(x for x, _ in longer.sole_polygon_m) == min(x for x, _ in foot.sole_polygon_m)
@@ -84,7 +84,7 @@ def test_a_name_carries_the_changes() -> None:
 def test_every_quantity_can_be_changed() -> None:
     for name in quantities(NAO):
         value = 1.01 if name.endswith("mass") else 1e-3
-        assert perturbed(NAO, {name: value}) is not NAO
+        assert perturb(NAO, {name: value}) is not NAO
 
 
 @pytest.mark.parametrize(
@@ -94,13 +94,13 @@ def test_every_quantity_can_be_changed() -> None:
         ({"LTigh.mass": 1.1}, UnknownNameError, "LThigh.mass"),
         ({"mass": 0.0}, RobotDataError, "mass_kg must be > 0"),
         ({"mass": float("nan")}, InputError, "finite"),
-        ({"thigh_m": -0.2}, InputError, "leaves nothing"),
+        ({"thigh_m": -0.2}, InputError, "leaves no length"),
         ({"sole_x_m": 0.2}, RobotDataError, "back_m must be >= 0"),
     ],
 )
 def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], said: str) -> None:
     with pytest.raises(error, match=said):
-        perturbed(NAO, changes)
+        perturb(NAO, changes)
 
 
 def test_a_name_with_nonsense_behind_the_mark_says_what_it_takes() -> None:

@@ -255,7 +255,7 @@ def test_entities_are_refused_unread(tmp_path: Path, definition: str, use: str) 
 def test_a_urdf_alone_without_shapes_is_answered_with_what_to_write(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()))
     (tmp_path / "robot.json").unlink()
-    with pytest.raises(RobotDataError, match=r"no collision shape to take its sole from; write its sole into the JSON"):
+    with pytest.raises(RobotDataError, match=r"no collision shape for its sole; write its sole into the JSON"):
         load_robot(path)
 
 
@@ -266,7 +266,7 @@ def test_a_roundabout_path_to_a_urdf_is_the_same_path(tmp_path: Path) -> None:
 
 def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
-    with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', beside which it lies"):
+    with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', the file next to it"):
         load_robot(path)
 
 

@@ -24,7 +24,7 @@ from nlp_gait.gaits.biped.cycle_motion import LIFT
 from nlp_gait.gaits.humanoid.cart_table import humanoid_on_a_table
 from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.biped import make_biped
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.walking import Walk
 
@@ -166,7 +166,7 @@ def height_step_m(problem: GaitProblem) -> float:
     if problem.name == CYCLE:
         return HEIGHT_STEP_M
     assert problem.display.robot is not None  # a cycle is some robot's; for the type checker
-    return HEIGHT_STEP_M * biped_of(problem.display.robot).length_scale
+    return HEIGHT_STEP_M * make_biped(problem.display.robot).length_scale
 
 
 def least_torque(spec: ProblemSpec, gait: Gait, starts: int, seed: int, store: Store) -> tuple[Result | None, str]:

@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.instant import BOTH_FEET, PlannedInstant
 from nlp_gait.gaits.humanoid.newton import newton_steps
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.biped import Biped, biped_of
+from nlp_gait.robots.biped import Biped, make_biped
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -180,5 +180,5 @@ def humanoid(robot: str) -> Humanoid:
     Raises:
         InputError: its legs are not such as are solved; GaitError as ``load_robot``.
     """
-    biped = biped_of(load_robot(robot))
+    biped = make_biped(load_robot(robot))
     return Humanoid(biped=biped, steps={side: newton_steps(leg) for side, leg in biped.legs.items()})

@@ -11,7 +11,7 @@ from pathlib import Path
 from nlp_gait.decoding import read_decoded
 from nlp_gait.errors import RobotDataError
 from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, Rod
-from nlp_gait.robots.fields import check_numbers
+from nlp_gait.robots.robot import check_numbers
 
 DEFAULT_FILE = resources.files("nlp_gait.gaits.stairs") / "biped.json"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nlp_gait.decoding import read_decoded
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots.fields import check_numbers
+from nlp_gait.robots.robot import check_numbers
 
 DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "robot.json"
 

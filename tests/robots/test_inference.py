@@ -12,7 +12,7 @@ import pytest
 
 from nlp_gait.errors import GaitError, InputError, RobotDataError
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.biped import biped_of
+from nlp_gait.robots.biped import make_biped
 from nlp_gait.robots.mirror import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
@@ -45,7 +45,7 @@ def test_feet_soles_and_sides_are_found_by_geometry(robot: Robot) -> None:
 
 def test_a_biped_is_its_legs_and_one_body_in_a_posture(robot: Robot) -> None:
     """Arms are held at the nearest limit, 0.2 rad; the finger without mass and the hand with a bad tensor are part of them."""
-    biped = biped_of(robot)
+    biped = make_biped(robot)
     assert biped.joints == tuple(f"{prefix}_{name}" for prefix in "AB" for name in LEG)
     assert biped.posture_rad == {"A_shoulder": 0.2, "B_shoulder": 0.2}
     assert len(biped.model.links) == 13
@@ -64,8 +64,8 @@ def test_what_was_passed_over_is_said(tmp_path: Path, caplog: pytest.LogCaptureF
     with caplog.at_level(logging.WARNING, logger="nlp_gait"):
         found = load_robot(crooked(tmp_path, text))
     assert "dont_collapse" in caplog.text
-    assert any("'A_finger' is one with 'A_arm'" in note for note in found.notes)
-    assert any("'B_hand' is one with 'B_arm'" in note for note in found.notes)
+    assert any("'A_finger' is welded to its parent 'A_arm'" in note for note in found.notes)
+    assert any("'B_hand' is welded to its parent 'B_arm'" in note for note in found.notes)
 
 
 def test_images_are_found_where_names_mislead(robot: Robot) -> None:
@@ -101,17 +101,17 @@ def test_the_file_beside_says_what_it_knows_better(tmp_path: Path) -> None:
         posture_rad={"A_shoulder": 1.0},
         heat_loss_W_per_Nm2=0.001,
     )
-    biped = biped_of(load_robot(path))
+    biped = make_biped(load_robot(path))
     assert biped.model.feet["left"].front_m == 0.2 and biped.model.feet["right"].front_m == pytest.approx(0.105)
     assert biped.posture_rad == {"A_shoulder": 1.0, "B_shoulder": 0.2}
-    assert biped.heat_W_per_Nm2 == 0.001 and biped.heat_source == "of the robot's file"
+    assert biped.heat_W_per_Nm2 == 0.001 and biped.heat_source == "from the robot's file"
 
 
 def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> None:
     text = crooked_urdf().replace("<box size", '<mesh filename="package://feet/sole.stl" size')
     path = crooked(tmp_path, text)
     with pytest.raises(
-        RobotDataError, match=r"mesh 'package://feet/sole\.stl', which is not there; put it there, name its"
+        RobotDataError, match=r"mesh 'package://feet/sole\.stl', which does not exist; put it there, name its"
     ):
         load_robot(path)
     corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (0.0, 0.01)]
@@ -160,12 +160,12 @@ def test_what_matters_is_repaired_where_that_is_asked_for(tmp_path: Path) -> Non
     text = crooked_urdf().replace('<mass value="1.1"/>', '<mass value="0"/>')
     robot = load_robot(beside(crooked(tmp_path, text), unphysical="repair"))
     assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
-    assert sum("repaired as asked" in note for note in robot.notes) == 2
+    assert sum("repaired as requested" in note for note in robot.notes) == 2
 
 
 def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
     feet = {"left": {"link": "B_ankle_roll_link"}, "right": {"link": "A_ankle_roll_link"}}
-    with pytest.raises(RobotDataError, match=r"named the left foot, but it is on the right"):
+    with pytest.raises(RobotDataError, match=r"named the left foot, but it is to the right"):
         load_robot(beside(crooked(tmp_path), feet=feet))
 
 
@@ -174,16 +174,16 @@ def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
     [
         ({"A_shoulder": 3.0}, r"posture_rad of 'A_shoulder' must be within \[0\.2, 2\] rad, got 3"),
         ({"A_knee": 0.1}, r"names 'A_knee', which is a joint of a leg"),
-        ({"tail": 0.1}, r"names 'tail', which is no joint"),
+        ({"tail": 0.1}, r"names 'tail', which is not a joint"),
     ],
 )
 def test_a_posture_that_cannot_be_is_refused(tmp_path: Path, posture: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        biped_of(load_robot(beside(crooked(tmp_path), posture_rad=posture)))
+        make_biped(load_robot(beside(crooked(tmp_path), posture_rad=posture)))
 
 
 def test_five_joints_are_no_leg(tmp_path: Path) -> None:
     extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
     feet = {side: {"link": f"{x}_ankle_pitch_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
-    with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* it has 5"):
-        biped_of(load_robot(beside(crooked(tmp_path), feet=feet)))
+    with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* got 5"):
+        make_biped(load_robot(beside(crooked(tmp_path), feet=feet)))

@@ -1,0 +1,284 @@
+"""Feet of a robot whose file does not state them: their links and soles, and the forward direction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots.inertia import Array
+from nlp_gait.robots.leg import LEG_JOINT_COUNT
+from nlp_gait.robots.mirror import are_mirrored
+from nlp_gait.robots.repair import Records, turn_records
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+# Collision points (N, 3) of a link [m] and the meshes that were not found.
+PointCloud = Callable[[str], tuple[Array, tuple[str, ...]]]
+
+# Keys of a foot in a robot file, except its link.
+EXTENTS = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
+FORWARD_ANGLES = {"x": 0.0, "y": -math.pi / 2, "-x": math.pi, "-y": math.pi / 2}  # about z, of the turn to x
+# Points of a foot this close to its lowest one are on the ground.
+SOLE_THICKNESS_M = 0.004
+# The joints of the feet are lower than those of any other mirrored pair by this.
+CLEARLY_LOWER_M = 0.1
+# Soles whose parts in front of and behind the ankle differ by this show the forward direction.
+CLEAR_LEAD_M = 0.03
+# A narrower sole is a line or a point.
+LEAST_WIDTH_M = 0.01
+
+
+class JointPlace(NamedTuple):
+    """A joint at zero angles, in the root's axes.
+
+    Attributes:
+        parent: link.
+        child: link.
+        place: (3,) from the root's origin [m].
+        axis: (3,).
+        limits: least and greatest angle [rad].
+    """
+
+    parent: str
+    child: str
+    place: Array
+    axis: Array
+    limits: tuple[float, float]
+
+
+Chain = list[JointPlace]  # joints from a link towards the root
+
+
+class Sole(NamedTuple):
+    """Part of a foot that touches the ground, from its joint, along the root's axes [m].
+
+    Attributes:
+        height: of the joint above it.
+        low: (2,) least x and y.
+        high: (2,) greatest x and y.
+        points: their number.
+    """
+
+    height: float
+    low: Array
+    high: Array
+    points: int
+
+
+class Legs(NamedTuple):
+    """The two legs of a robot, left and right or the other way round.
+
+    Attributes:
+        feet: links.
+        chains: joints of each leg from the foot to where both meet.
+    """
+
+    feet: tuple[str, str]
+    chains: tuple[Chain, Chain]
+
+    @property
+    def links(self) -> set[str]:
+        """Links that the joints of the legs carry."""
+        return {joint.child for chain in self.chains for joint in chain}
+
+
+def find_legs(robot: str, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
+    """Find the legs by the feet of the robot file, or else by geometry.
+
+    The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet.
+
+    Args:
+        robot: its name.
+        joints: records of a robot file.
+        feet: records of a robot file by side; empty if it has none.
+
+    Raises:
+        RobotDataError: there is no such pair, or it is not clearly lower than others.
+    """
+    joint_to = {joint.child: joint for joint in _place_joints(joints)}
+    if feet:
+        pair = (str(feet.get("left", {}).get("link")), str(feet.get("right", {}).get("link")))
+        return Legs(pair, _split_chains(_chain_to_root(pair[0], joint_to), _chain_to_root(pair[1], joint_to)))
+    paths = {child: _chain_to_root(child, joint_to) for child in sorted(joint_to)}
+    pairs: list[tuple[float, str, str, tuple[Chain, Chain]]] = []
+    names = list(paths)
+    for i, first in enumerate(names):
+        for second in names[i + 1 :]:
+            chains = _split_chains(paths[first], paths[second])
+            if all(len(chain) == LEG_JOINT_COUNT for chain in chains) and _are_mirror_chains(*chains):
+                pairs.append((chains[0][0].place[2], first, second, chains))
+    pairs.sort(key=lambda pair: pair[:3])
+    remedy = (
+        'name them in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
+        "(docs/custom-robots.md describes the supported legs)"
+    )
+    if not pairs:
+        raise RobotDataError(
+            f"robot {robot!r}: no feet found: two links, mirror images of each other, with {LEG_JOINT_COUNT} turning joints each "
+            f"below the link where both legs meet; {remedy}"
+        )
+    close = [pair for pair in pairs if pair[0] < pairs[0][0] + CLEARLY_LOWER_M]
+    if len(close) > 1:
+        listed = "; ".join(f"{first!r} and {second!r}" for _, first, second, _ in close)
+        raise RobotDataError(f"robot {robot!r}: several pairs of links may be the feet: {listed}; {remedy}")
+    return Legs(pairs[0][1:3], pairs[0][3])
+
+
+def infer_feet(
+    robot: str,
+    legs: Legs,
+    links: Records,
+    joints: Records,
+    feet: Mapping[str, Mapping[str, Any]],
+    cloud: PointCloud,
+    forward: str | None,
+    notes: list[str],
+) -> Records:
+    """Return the records of both feet with their soles, and turn the robot's records so that it faces along x.
+
+    Args:
+        robot: its name.
+        legs: of the robot.
+        links: records, turned in place.
+        joints: records, turned in place.
+        feet: what the robot file states about them.
+        cloud: collision points of a link.
+        forward: direction in the root's axes, if the file states it.
+        notes: receive what was inferred.
+
+    Raises:
+        RobotDataError: a leg without six joints, no flat sole, or no clear forward direction.
+    """
+    for link, chain in zip(legs.feet, legs.chains, strict=True):
+        if len(chain) != LEG_JOINT_COUNT:
+            raise RobotDataError(
+                f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
+                f"{link!r} has {len(chain)}: {', '.join(joint.child for joint in chain) or 'none'}"
+            )
+    soles = [_find_sole(robot, link, cloud) for link in legs.feet]
+    angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs.chains, soles)
+    turn = _quarter_turns(angle)
+    if angle:
+        degrees = math.degrees(angle)
+        notes.append(f"forward is not along the root's x axis: the robot was turned by {degrees:.0f} degrees about z")
+        turn_records(links, joints, turn)
+    across = [float((turn @ chain[0].place)[1]) for chain in legs.chains]
+    sides = SIDES if across[0] > across[1] else SIDES[::-1]
+    if feet and sides[0] != "left":
+        raise RobotDataError(
+            f"robot {robot!r}: {legs.feet[0]!r} is named the left foot, but it is to the right of {legs.feet[1]!r}; "
+            'exchange them, or write the forward direction: "forward": "x", "-x", "y" or "-y"'
+        )
+    found: Records = {}
+    for link, side, sole in zip(legs.feet, sides, soles, strict=True):
+        corners = np.array([sole.low, sole.high]) @ turn[:2, :2].T
+        (back, right), (front, left) = corners.min(axis=0), corners.max(axis=0)
+        # To a tenth of a millimetre: collision shapes are no more exact.
+        extents = [round(float(value), 4) for value in (sole.height, front, -back, left, -right)]
+        foot = {"link": link, **dict(zip(EXTENTS, extents, strict=True)), **feet.get(side, {})}
+        notes.append(
+            f"{side} foot: {link!r}, its sole {foot['back_m'] + foot['front_m']:.3f} m by "
+            f"{foot['left_m'] + foot['right_m']:.3f} m, from {sole.points} lowest points of its collision shapes"
+        )
+        found[side] = foot
+    return found
+
+
+def _place_joints(joints: Records) -> list[JointPlace]:
+    joint_to = {raw["child"]: raw for raw in joints.values()}
+
+    def place(raw: Mapping[str, Any]) -> Array:
+        at, count = np.array(raw["origin_m"], dtype=float), 0
+        while raw["parent"] in joint_to and count < len(joint_to):  # joints may form a ring
+            raw, count = joint_to[raw["parent"]], count + 1
+            at = at + np.array(raw["origin_m"], dtype=float)
+        return at
+
+    return [
+        JointPlace(
+            raw["parent"], raw["child"], place(raw), np.array(raw["axis"], dtype=float), tuple(raw["limits_rad"])
+        )
+        for raw in joints.values()
+    ]
+
+
+def _chain_to_root(link: str, joint_to: Mapping[str, JointPlace]) -> Chain:
+    path: Chain = []
+    while link in joint_to and len(path) <= len(joint_to):  # joints may form a ring
+        path.append(joint_to[link])
+        link = path[-1].parent
+    return path
+
+
+def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
+    """Return two chains without the joints that both have."""
+    shared = {joint.child for joint in first} & {joint.child for joint in second}
+    return [j for j in first if j.child not in shared], [j for j in second if j.child not in shared]
+
+
+def _are_mirror_chains(one: Chain, other: Chain) -> bool:
+    """Return whether two chains are mirror images in x or in y."""
+    return any(
+        all(are_mirrored(a.place, a.axis, b.place, b.axis, across) for a, b in zip(one, other, strict=True))
+        and abs(one[0].place[across] - other[0].place[across]) > LEAST_WIDTH_M
+        for across in (1, 0)
+    )
+
+
+def _find_sole(robot: str, link: str, cloud: PointCloud) -> Sole:
+    """Return the lowest part of a foot's collision shapes."""
+    points, missing = cloud(link)
+    write = (
+        'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '
+        "(see docs/custom-robots.md)"
+    )
+    if missing:
+        raise RobotDataError(
+            f"robot {robot!r}: the sole of {link!r} depends on the mesh {missing[0]!r}, which does not exist; put it there, name "
+            f"its package's folder in ROS_PACKAGE_PATH, or {write}"
+        )
+    if not len(points):
+        raise RobotDataError(f"robot {robot!r}: {link!r} has no collision shape for its sole; {write}")
+    on_ground = points[points[:, 2] < points[:, 2].min() + SOLE_THICKNESS_M]
+    low, high = on_ground.min(axis=0), on_ground.max(axis=0)
+    if min(high[:2] - low[:2]) < LEAST_WIDTH_M:
+        raise RobotDataError(
+            f"robot {robot!r}: the lowest part of {link!r} at zero angles is {1e3 * (high[0] - low[0]):.1f} mm by "
+            f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole; {write}"
+        )
+    return Sole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground))
+
+
+def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) -> float:
+    """Return the angle about z that turns the forward direction to x: a multiple of a quarter turn [rad].
+
+    Forward is perpendicular to the line between the feet, and knees bend so that the feet go back; the longer part of the soles
+    must not contradict.
+    """
+    between = chains[0][0].place - chains[1][0].place
+    axis = 0 if abs(between[1]) >= abs(between[0]) else 1  # forward is along it
+    knees = [_knee_direction(chain)[axis] for chain in chains]
+    lead = sum(sole.high[axis] + sole.low[axis] for sole in soles) / 2
+    contradicted = abs(lead) >= CLEAR_LEAD_M and lead * knees[0] < 0
+    if knees[0] * knees[1] <= 0 or contradicted:
+        raise RobotDataError(
+            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles do not agree on which way "
+            'is forward; write "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
+        )
+    return FORWARD_ANGLES[f"{'' if knees[0] > 0 else '-'}{'xy'[axis]}"]
+
+
+def _knee_direction(chain: Chain) -> Array:
+    """Return the direction (3,) in which the knee points when it bends, to the side of its larger range."""
+    _, fifth, knee, *_ = chain
+    bend = 1.0 if knee.limits[1] >= -knee.limits[0] else -1.0
+    return np.asarray(-bend * np.cross(knee.axis, fifth.place - knee.place))
+
+
+def _quarter_turns(angle: float) -> Array:
+    c, s = round(math.cos(angle)), round(math.sin(angle))  # exact
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
