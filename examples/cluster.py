@@ -13,8 +13,8 @@ from pathlib import Path
 from distributed import LocalCluster
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.table import summarise
-from compare.drawing.distributions import final_gap_figure
+from compare.analysis.solver_table import summarise
+from compare.drawing.distributions import plot_final_gaps
 from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
@@ -31,4 +31,4 @@ if __name__ == "__main__":  # workers import this file
     (comparison,) = compare_problems(records)
     for row in summarise(comparison):
         print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
-    figure = final_gap_figure(comparison)
+    figure = plot_final_gaps(comparison)

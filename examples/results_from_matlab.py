@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.table import summarise
-from compare.drawing.distributions import final_gap_figure
+from compare.analysis.solver_table import summarise
+from compare.drawing.distributions import plot_final_gaps
 from compare.study.imported import imported
 from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Task
@@ -40,4 +40,4 @@ tasks = [Task(problem=spec, algorithm=algorithm, run=k) for algorithm in ("ipopt
 for row in summarise(comparison):
     claim = "no claim" if row.best_claim is None else f"claims {row.best_claim:.4f} W"
     print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
-figure = final_gap_figure(comparison)
+figure = plot_final_gaps(comparison)

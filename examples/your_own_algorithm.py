@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.table import HEADER, cells, summarise
-from compare.drawing.convergence import convergence_figure
+from compare.analysis.solver_table import HEADER, format_cells, summarise
+from compare.drawing.convergence import plot_convergence
 from compare.report.document import Document, text_table
 from compare.report.writing import markdown_page
 from compare.study.study import Study, run_study
@@ -55,6 +55,6 @@ class ShrinkingBoxSearch:
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
 tasks = [Task(problem=problem, algorithm=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
 (comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
-table = text_table(HEADER, [cells(summary, comparison) for summary in summarise(comparison)])
+table = text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
 print(markdown_page(Document(title="A shrinking box", parts=[table])))
-figure = convergence_figure(comparison)
+figure = plot_convergence(comparison)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from compare.analysis.statistics.run_length import best_known
+from compare.analysis.statistics.run_length import find_best_known
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT, Handling, ProblemSpec, Stop, Task
 
@@ -88,4 +88,4 @@ def tasks_of(problem: ProblemSpec, opponent: Opponent, runs: int, reference: flo
 
 def reference_of(problem: ProblemSpec, records: Sequence[RunRecord]) -> float:
     """Best objective of some runs that the judge finds feasible."""
-    return best_known(records, problem.load().objective)
+    return find_best_known(records, problem.load().objective)

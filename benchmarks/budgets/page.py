@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.budgets.opponents import LARGEST, OPPONENTS, TARGETS
-from compare.analysis.statistics.run_length import Curve, Weighting, curve, expected_running_time
-from compare.drawing.figures import logarithmic, looks, new_figure, save, style
+from compare.analysis.statistics.run_length import Curve, Weighting, expected_running_time, make_curve
+from compare.drawing.figures import assign_looks, new_figure, save, style, use_log_axes
 from compare.study.record import RunRecord
 from compare.study.task import ProblemSpec
 
@@ -24,7 +24,7 @@ GREATEST_GAP, LEAST_GAP = 10.0, 1e-5  # of the figure
 
 def curves_of(problem: ProblemSpec, records: Sequence[RunRecord], reference: float) -> list[Curve]:
     """Best so far of runs, derivatives charged as forward differences."""
-    return [curve(record, problem.load().objective, reference, Weighting()) for record in records]
+    return [make_curve(record, problem.load().objective, reference, Weighting()) for record in records]
 
 
 def gap_at(run: Curve, budget: float) -> float:
@@ -99,7 +99,7 @@ def figure(stem: Path, found: Mapping[str, Curves]) -> tuple[Path, Path]:
     labels = [
         label for label in dict.fromkeys(label for curves in found.values() for label in curves) if label != "ipopt"
     ]
-    look = looks(labels)
+    look = assign_looks(labels)
     grid = np.geomspace(BUDGETS[0], LARGEST, 121)
     with style():
         drawing = new_figure(7.4, 3.4)
@@ -114,7 +114,7 @@ def figure(stem: Path, found: Mapping[str, Curves]) -> tuple[Path, Path]:
                     axes.plot(at, shown, look[label].line, color=look[label].colour, label=label, linewidth=1.1)
             axes.set_title(problem, loc="left")
             axes.set_xlabel("evaluations")
-            logarithmic(axes, both=True)
+            use_log_axes(axes, both=True)
             axes.set_xlim(BUDGETS[0], LARGEST)
             axes.set_ylim(LEAST_GAP, GREATEST_GAP)
             for target in TARGETS:

@@ -1,4 +1,4 @@
-"""The runs of all solvers on one problem, brought to one scale: what tables, figures and verdicts are made from."""
+"""The runs of all solvers on one problem on a common scale: the basis of tables, figures and verdicts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy as np
 from compare.analysis.statistics.run_length import (
     Curve,
     Weighting,
-    best_known,
-    curve,
     expected_running_time,
+    find_best_known,
+    make_curve,
     relative_gap,
 )
 from compare.study.record import RunRecord
@@ -61,16 +61,16 @@ class SolverRuns:
         index = int(np.argmin(self.costs))
         return self.records[index] if math.isfinite(self.costs[index]) else None
 
-    def knows(self, axis: str) -> bool:
-        """Whether the cost of every run is known, in evaluations or seconds; of results from elsewhere it may not be."""
+    def has_costs(self, axis: str) -> bool:
+        """Return whether the cost of every run is known, in evaluations or seconds; imported results may lack it."""
         return all(bool(np.isfinite(getattr(curve, axis)).all()) for curve in self.curves)
 
     def expected_cost(self, target: float, axis: str = "evaluations") -> float:
-        """Expected running time to a relative gap, in equivalent evaluations or seconds; NaN where costs are not known."""
-        if not self.knows(axis):
+        """Return the expected running time to a relative gap, in equivalent evaluations or seconds; NaN for unknown costs."""
+        if not self.has_costs(axis):
             return math.nan
-        reached = [c.reached(target, axis) for c in self.curves]
-        return expected_running_time(reached, [c.total(axis) for c in self.curves])
+        reached = [c.cost_to_reach(target, axis) for c in self.curves]
+        return expected_running_time(reached, [c.total_cost(axis) for c in self.curves])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +80,7 @@ class Comparison:
     Attributes:
         problem: label.
         objective: name, unit, sense.
-        reference: best objective known: gaps are measured from it; NaN if nothing feasible was found.
+        reference: best known objective, from which gaps are measured; NaN if nothing feasible was found.
         weighting: of calls.
         solvers: with their runs.
     """
@@ -98,16 +98,16 @@ class Comparison:
 
     @cached_property
     def reference_holder(self) -> RunRecord | None:
-        """Run that found the best objective known."""
+        """Run that found the best known objective."""
         feasible = [record for record in self.records if record.verdict.feasible]
         return min(feasible, key=lambda r: self.objective.sign * r.verdict.objective, default=None)
 
     def value(self, cost: float) -> float:
-        """Objective in the problem's sense."""
+        """Return a cost as an objective in the problem's sense."""
         return self.objective.sign * cost
 
     def gap(self, cost: float) -> float:
-        """Relative distance of a cost from the best objective known."""
+        """Return the relative distance of a cost from the best known objective."""
         return relative_gap(self.value(cost), self.reference, self.objective)
 
 
@@ -116,12 +116,12 @@ def compare_problems(
     weighting: Weighting = DEFAULT_WEIGHTING,
     references: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Comparison]:
-    """One comparison for each problem among records, in their order.
+    """Return one comparison per problem among records, in their order.
 
     Args:
         records: of all runs.
         weighting: of calls.
-        references: by problem, the objective that gaps are measured from; without one, the best of its own records.
+        references: objective from which gaps are measured, by problem; by default the best of its records.
 
     Raises:
         InputError: runs of one problem disagree on its objective.
@@ -134,11 +134,11 @@ def compare_problems(
 
 
 def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting, known: float | None) -> Comparison:
-    objective = objective_of(records[0])
+    objective = read_objective(records[0])
     for record in records:
-        if objective_of(record) != objective:
+        if read_objective(record) != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.algorithm}, run {record.run}")
-    reference = best_known(records, objective) if known is None else known
+    reference = find_best_known(records, objective) if known is None else known
     solvers = []
     for name in dict.fromkeys(record.algorithm for record in records):
         runs = tuple(sorted((r for r in records if r.algorithm == name), key=lambda r: r.run))
@@ -146,7 +146,7 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
             SolverRuns(
                 name=name,
                 records=runs,
-                curves=tuple(curve(r, objective, reference, weighting) for r in runs),
+                curves=tuple(make_curve(r, objective, reference, weighting) for r in runs),
                 costs=tuple(objective.sign * r.verdict.objective if r.verdict.feasible else math.inf for r in runs),
             )
         )
@@ -156,11 +156,11 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
     )
 
 
-def objective_of(record: RunRecord) -> Objective:
-    """Objective that a record was made for.
+def read_objective(record: RunRecord) -> Objective:
+    """Return the objective of a record.
 
     Raises:
-        InputError: the record does not say, or what it says is not an objective.
+        InputError: the record has none, or an invalid one.
     """
     with refusing(f"record of {record.algorithm}, run {record.run}", InputError):
         return decoded(Objective, record.definition.get("objective"), "objective")

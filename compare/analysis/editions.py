@@ -1,4 +1,4 @@
-"""Records of one folder told apart where problems or solvers of one name are of several definitions."""
+"""Different names for problems or solvers of the same name but with different definitions."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
 LONGEST = 30
 
 
-def told_apart(records: Sequence[RunRecord]) -> list[RunRecord]:
-    """Records under names that say how an earlier problem or solver differs from today's: ``pso (evaluations 500)``.
+def label_editions(records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Rename records whose problem or solver differs from the latest one of that name: ``pso (evaluations 500)``.
 
-    Of each name, the definition of the first record keeps it; ``read_records`` puts the latest first.
+    The definition of the first record keeps the name; ``read_records`` puts the latest first.
     """
     first: dict[str, dict[str, Any]] = {}
     named: dict[tuple[str, str], str] = {}
@@ -35,13 +35,13 @@ def told_apart(records: Sequence[RunRecord]) -> list[RunRecord]:
 def _name(
     label: str, definition: Mapping[str, Any], first: dict[str, dict[str, Any]], named: dict[tuple[str, str], str]
 ) -> str:
-    """A label, with what differs from the first definition that had it."""
+    """Return a label with the differences from the first definition of that label."""
     key = label, sha256_of(definition)
     if key not in named:
         name = label
         if label in first:
-            said = NOT_IN_LABELS.sub("", edition(definition, first[label]))[:LONGEST]
-            name = f"{label} ({said})"
+            difference = NOT_IN_LABELS.sub("", edition(definition, first[label]))[:LONGEST]
+            name = f"{label} ({difference})"
             name = name if name not in named.values() else f"{label} ({key[1][:8]})"
         first.setdefault(label, dict(definition))
         named[key] = name

@@ -1,4 +1,4 @@
-"""Runs that failed before they had a point, by solver, with the reason of the first."""
+"""Runs without a result, by solver, with the reason of the first."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Failure:
     Attributes:
         problem: title.
         solver: title.
-        failed: how many runs have no point.
-        runs: of all.
+        failed: number of runs without a point.
+        runs: number of runs.
         reason: status of the first.
     """
 
@@ -27,15 +27,15 @@ class Failure:
     reason: str
 
     @property
-    def in_words(self) -> str:
-        """One sentence."""
+    def sentence(self) -> str:
+        """The failures as one sentence."""
         return (
             f"{self.problem}, {self.solver}: {self.failed} of {self.runs} runs have no result; the first {self.reason}"
         )
 
 
-def failures_of(records: Sequence[RunRecord]) -> list[Failure]:
-    """Solvers with failed runs, in the order of their records."""
+def find_failures(records: Sequence[RunRecord]) -> list[Failure]:
+    """Return the solvers with failed runs, in the order of their records."""
     found = []
     for problem, solver in dict.fromkeys((record.problem, record.algorithm) for record in records):
         own = [record for record in records if (record.problem, record.algorithm) == (problem, solver)]

@@ -1,4 +1,4 @@
-"""Changes of limits and lengths that people think in: one millimetre, a tenth of a newton metre, one degree."""
+"""Steps of limits and lengths for reports: one millimetre, a tenth of a newton metre, one degree."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from nlp_gait.formulation import Parameter
 
 
 class NaturalStep(NamedTuple):
-    """A change of a quantity, in its own unit, and how it is said."""
+    """A change of a quantity, in its own unit, and its description."""
 
     size: float
     words: str
@@ -26,13 +26,13 @@ BY_UNIT = {
     "rad/s^2": NaturalStep(1.0, "1 rad/s^2"),
     "1": NaturalStep(0.01, "0.01"),
 }
-SHARE = 0.05  # of the value, where the unit has no step of its own
+SHARE = 0.05  # of the value, where the unit has no step
 MASS = NaturalStep(SHARE, f"{100 * SHARE:g} %")
 LENGTH = BY_UNIT["m"]
 
 
-def natural_step(parameter: Parameter, value: float) -> NaturalStep:
-    """Step of a parameter at its current value."""
+def choose_natural_step(parameter: Parameter, value: float) -> NaturalStep:
+    """Return the step of a parameter at its current value."""
     if parameter.unit in BY_UNIT:
         return BY_UNIT[parameter.unit]
     if value:

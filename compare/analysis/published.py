@@ -1,4 +1,4 @@
-"""Values that papers report for problems of this package, to stand beside a study's own."""
+"""Values that papers report for problems of this package, for comparison with a study."""
 
 from __future__ import annotations
 
@@ -15,25 +15,24 @@ FILE = "published.json"
 
 
 @cache
-def published() -> Mapping[str, Any]:
-    """By problem: ``note``, and ``rows`` with ``source`` and ``indexes`` by name."""
+def load_published() -> Mapping[str, Any]:
+    """Return by problem: ``note``, and ``rows`` with ``source`` and ``indexes`` by name."""
     found: Mapping[str, Any] = json.loads(files("compare.analysis").joinpath(FILE).read_text(encoding="utf-8"))[
         "problems"
     ]
     return found
 
 
-def published_rows(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]], str] | None:
-    """Header, rows and note: the paper's values, then the best run of each solver; None if nothing was published.
+def make_published_rows(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]], str] | None:
+    """Return header, rows and note: the paper's values, then the best run of each solver; None without published values.
 
-    Only a problem at its published setting counts: default options and parameters are not known from records, so the
-    settings that differ are in the records' definitions and shown with the machine's data.
+    Only problems with default parameters are compared.
     """
     record = comparison.reference_holder
     if record is None:
         return None
     problem = str(record.definition.get("problem", {}).get("name"))
-    entry = published().get(problem)
+    entry = load_published().get(problem)
     if entry is None or record.definition["problem"].get("parameters"):
         return None
     names = list(entry["rows"][0]["indexes"])

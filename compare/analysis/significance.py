@@ -1,4 +1,4 @@
-"""All pairs of solvers tested against each other on one problem."""
+"""Tests of all pairs of solvers on one problem."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
+from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
 from compare.study.record import RunRecord
 from compare.study.task import FUNCTION
 
@@ -16,12 +16,12 @@ class Pair:
     """Two solvers; p-values are Holm-corrected over all pairs of the problem.
 
     Attributes:
-        first: the one with the better median.
+        first: solver with the better median.
         second: the other.
         rank_sum: p-value over all runs of both.
         signed_rank: p-value over the runs that both have; None if fewer than two or if they do not share starting points.
         a12: probability that a run of the first is better.
-        paired_runs: how many.
+        paired_runs: their number.
     """
 
     first: str
@@ -33,7 +33,7 @@ class Pair:
 
 
 def compare_pairs(comparison: Comparison) -> list[Pair]:
-    """Every pair of solvers with at least two runs each."""
+    """Test every pair of solvers with at least two runs each."""
     pairs = list(combinations([s for s in comparison.solvers if len(s.records) > 1], 2))
     if not pairs:
         return []
@@ -55,7 +55,7 @@ def compare_pairs(comparison: Comparison) -> list[Pair]:
 
 
 def _paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float]]:
-    """Costs of runs with equal seeds, which share their starting points; gradient methods start elsewhere."""
+    """Return the costs of runs with equal seeds, which share their starting points; gradient methods do not."""
     first = {r.seed: cost for r, cost in zip(a.records, a.costs, strict=True) if _shares_start(r)}
     second = {r.seed: cost for r, cost in zip(b.records, b.costs, strict=True) if _shares_start(r)}
     seeds = sorted(first.keys() & second.keys())
@@ -63,6 +63,6 @@ def _paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float
 
 
 def _shares_start(record: RunRecord) -> bool:
-    if record.settings.get("kind") == FUNCTION:  # it is given no starting points
+    if record.settings.get("kind") == FUNCTION:  # it receives no starting points
         return False
     return "handling" in record.definition or "polishes" in record.definition

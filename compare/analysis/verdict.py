@@ -1,4 +1,4 @@
-"""The verdict in three sentences: who found the best known, how far the others stay, what it costs."""
+"""The verdict in three sentences: who found the best known value, the median gaps, the costs."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from collections.abc import Sequence
 from compare.analysis.comparison import Comparison
 from compare.analysis.proven import proven_of
 from compare.analysis.significance import compare_pairs
-from compare.analysis.table import count, percent
-from compare.analysis.units import listed, with_unit
+from compare.analysis.solver_table import count, percent
+from compare.analysis.units import join_words, with_unit
 
-# A run whose gap is at most this has found the best known.
+# A run with at most this gap has found the best known value.
 FOUND = 1e-6
 SIGNIFICANT = 0.05
 
 
-def verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
-    """Three sentences over all problems."""
+def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
+    """Return three sentences over all problems."""
     known = [c for c in comparisons if math.isfinite(c.reference)]
     if not known:
         names = ", ".join(c.problem for c in comparisons)
         return (
             f"No solver found a feasible point of {names}.",
-            "Nothing can be said about distances.",
-            "The failed runs below say what stood in the way.",
+            "There are no gaps to compare.",
+            "The failed runs below give the reasons.",
         )
     return (
         "Best known: " + "; ".join(_found(c) for c in known) + ".",
-        "Distance of the medians: " + "; ".join(_distance(c) for c in known) + ".",
-        "Expected cost to come within 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
+        "Median gap to the best known value: " + "; ".join(_distance(c) for c in known) + ".",
+        "Expected cost to reach a gap of 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
     )
 
 
@@ -37,9 +37,7 @@ def _found(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
     best, words = with_unit(comparison.reference, comparison.objective.unit), proven_of(comparison)
-    text = (
-        f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {listed(finders) or 'one run'}"
-    )
+    text = f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {join_words(finders) or 'one run'}"
     return text + (f", and {words}" if words else "")
 
 
@@ -51,7 +49,7 @@ def _distance(comparison: Comparison) -> str:
     pairs = compare_pairs(comparison)
     different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)
     tests = f" ({different} of {len(pairs)} pairs differ at the 5 % level, Holm-corrected)" if pairs else ""
-    return f"on {comparison.problem} {listed(parts)}{tests}"
+    return f"on {comparison.problem} {join_words(parts)}{tests}"
 
 
 def _cost(comparison: Comparison) -> str:
@@ -63,5 +61,5 @@ def _cost(comparison: Comparison) -> str:
         f"{solver.name} {count(cost)} evaluations" + ("" if math.isnan(seconds) else f" or {seconds:.2g} s")
         for solver, cost, seconds in reached
     ]
-    text = f"on {comparison.problem} {listed(parts) or 'no solver'}"
-    return text + (f", never by {listed(never)}" if never else "")
+    text = f"on {comparison.problem} {join_words(parts) or 'no solver'}"
+    return text + (f", never by {join_words(never)}" if never else "")

@@ -10,8 +10,8 @@ import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, compare_problems
 from compare.analysis.statistics.distribution import ECDF_TARGETS
+from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
 from compare.bench.baseline import baseline_records
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
@@ -146,7 +146,9 @@ def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     rows = rows[np.isfinite(rows).any(axis=1)]
     ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), math.nan)
     solved = [
-        float(np.mean([math.isfinite(c.reached(t)) for on in found for c in on[name].curves for t in ECDF_TARGETS]))
+        float(
+            np.mean([math.isfinite(c.cost_to_reach(t)) for on in found for c in on[name].curves for t in ECDF_TARGETS])
+        )
         for name in names
     ]
     places = rankdata([-share for share in solved], method="min")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from compare.analysis.comparison import Comparison
+from compare.analysis.solver_table import count, percent
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.table import count, percent
 from compare.bench.leaderboard import Leaderboard, Standing
 from compare.bench.tasks import EVALUATIONS, RUNS
-from compare.drawing.distributions import suite_figure
+from compare.drawing.distributions import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, text_table
 from nlp_gait import gaitbench
 
@@ -35,7 +35,7 @@ def leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Docu
                 name="gaitbench-runtime",
                 caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
                 "31 targets, from 100 % to 1e-4 % above the best known.",
-                drawing=suite_figure(board.comparisons),
+                drawing=plot_suite_ecdf(board.comparisons),
             ),
             *(() if solver is None else (_duels(board, solver),)),
             Section(title="Instance by instance", parts=(instances_table(board, solver),)),

@@ -29,20 +29,20 @@ def animate(
 
     Example: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
-    from compare.drawing.animation import contact_sheet, frames
-    from compare.drawing.skeletons import skeleton_of
+    from compare.drawing.animation import draw_frames, write_contact_sheet
+    from compare.drawing.skeletons import make_skeleton
     from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
     loaded = stored.load()
     target = output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() != SHEET:
         check_video_path(target)
-    skeleton = skeleton_of(loaded, frames_per_s / speed)
+    skeleton = make_skeleton(loaded, frames_per_s / speed)
     with interruptible():
         if target.suffix.lower() == SHEET:
-            contact_sheet(skeleton, target, poses)
+            write_contact_sheet(skeleton, target, poses)
         else:
             played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
             check_frames(played_s, frames_per_s)
-            write_video(target, frames(skeleton), (len(skeleton.t) - 1) / played_s)
+            write_video(target, draw_frames(skeleton), (len(skeleton.t) - 1) / played_s)
     print_written(target)

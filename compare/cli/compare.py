@@ -141,13 +141,13 @@ def compare(
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:
     """Say on stderr whose runs failed, and end with status 1 if a solver has no run left on some problem."""
-    from compare.analysis.failures import failures_of
+    from compare.analysis.failures import find_failures
 
     nothing_left = []
-    for failure in failures_of(records):
+    for failure in find_failures(records):
         if failure.failed == failure.runs:
             nothing_left.append(failure.solver)
-        say_error(failure.in_words)
+        say_error(failure.sentence)
     if nothing_left:
         fail(
             f"without any result: {', '.join(nothing_left)}; mend the reason, and delete the failed records to run them again"
@@ -162,7 +162,7 @@ def _advance_by(advance: Callable[[str], None], count: int) -> None:
 def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
     """By problem, what the table of solvers says, as plain data."""
     from compare.analysis.comparison import compare_problems
-    from compare.analysis.table import summarise
+    from compare.analysis.solver_table import summarise
 
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
@@ -177,19 +177,19 @@ HOW_TO_READ = (
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
-    from compare.analysis.failures import failures_of
+    from compare.analysis.failures import find_failures
     from compare.analysis.proven import proven_of
-    from compare.analysis.table import HEADER, cells, summarise
+    from compare.analysis.solver_table import HEADER, format_cells, summarise
 
     for comparison in compare_problems(records):
-        rows = [cells(summary, comparison) for summary in summarise(comparison)]
+        rows = [format_cells(summary, comparison) for summary in summarise(comparison)]
         order = [HEADER.index(name) for name in (*READ_FIRST, *(n for n in HEADER if n not in READ_FIRST))]
         print_table(
             title or f"{comparison.problem}: judged by the exact functions",
             [HEADER[i] for i in order],
             [[row[i] for i in order] for row in rows],
         )
-        failures = failures_of([record for solver in comparison.solvers for record in solver.records])
+        failures = find_failures([record for solver in comparison.solvers for record in solver.records])
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)

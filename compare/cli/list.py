@@ -98,9 +98,9 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
             f"humanoid-dsp and humanoid-cycle with --robot {name}"
         )
     if target is not None:
-        from compare.drawing.robot_figure import draw_robot
+        from compare.drawing.robot_figure import plot_robot
 
-        print_written(*draw_robot(body.biped, target.with_suffix("")))
+        print_written(*plot_robot(body.biped, target.with_suffix("")))
 
 
 def _overview(as_json: bool) -> None:

@@ -56,7 +56,7 @@ def report(
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
-    from compare.analysis.editions import told_apart
+    from compare.analysis.editions import label_editions
     from compare.analysis.statistics.run_length import Weighting
     from compare.report import rebuild_report
     from compare.study.study import read_records
@@ -68,7 +68,7 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     name_all(code)
-    plays = play_best(folder, told_apart(read_records(folder)), servos.make()) if engine else []
+    plays = play_best(folder, label_editions(read_records(folder)), servos.make()) if engine else []
     written = rebuild_report(folder, weighting, as_csv=as_csv)
     print_result(as_json, plain_plays(plays), written, lambda: print_plays(plays))
 
@@ -79,10 +79,10 @@ def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[
     Raises:
         InputError: none of the problems can be played.
     """
-    from compare.analysis.engine import best_gaits
+    from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.engine import play_records
 
-    gaits = best_gaits(records)
+    gaits = select_best_gaits(records)
     try:
         with progress_bar("gaits", len(gaits)) as advance:
             plays = play_records(folder, gaits, drive, advance)
@@ -98,21 +98,27 @@ def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[
 
 def plain_plays(plays: Sequence[Played]) -> dict[str, Any]:
     """What was played, by problem, and how far the engine confirms the model, as plain data; nothing if nothing was."""
-    from compare.analysis.engine import agreement_of, by_problem
+    from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
 
     found = {
-        problem: {"gaits": [asdict(played) for played in own], "agreement": asdict(agreement_of(own))}
-        for problem, own in by_problem(plays).items()
+        problem: {"gaits": [asdict(played) for played in own], "agreement": asdict(measure_agreement(own))}
+        for problem, own in group_by_problem(plays).items()
     }
     return {"engine": found} if found else {}
 
 
 def print_plays(plays: Sequence[Played]) -> None:
     """A table for each problem, and how far the engine confirms the model."""
-    from compare.analysis.engine import HEADER, agreement_of, by_problem, drive_in_words, engine_rows
+    from compare.analysis.simulated_gaits import (
+        HEADER,
+        describe_drive,
+        group_by_problem,
+        make_engine_rows,
+        measure_agreement,
+    )
 
-    for problem, own in by_problem(plays).items():
-        print_table(f"{problem} played: {drive_in_words(own[0].drive)}", HEADER, engine_rows(own))
-        stdout.print(agreement_of(own).sentence())
+    for problem, own in group_by_problem(plays).items():
+        print_table(f"{problem} played: {describe_drive(own[0].drive)}", HEADER, make_engine_rows(own))
+        stdout.print(measure_agreement(own).describe())
     if plays:
         stdout.print(ENGINE_TABLE)

@@ -64,7 +64,7 @@ def simulate(
     `nlp-gait simulate best.json --video walk.mp4`,
     `nlp-gait simulate best.json --beside other.json --video both.gif --speed 0.25`
     """
-    from compare.drawing.playback_figure import plot_playback
+    from compare.drawing.simulation_figure import plot_simulation
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.formulation.result import load_result
@@ -113,7 +113,7 @@ def simulate(
         write_json(folder / "report.json", without_nan(data))
         write_text(folder / "model.xml", plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
-        written += plot_playback(plan, traces[0], drive, folder / "playback")
+        written += plot_simulation(plan, traces[0], drive, folder / "playback")
     if robustness:
         try:
             survival = sweep(plan, drive)

@@ -1,1 +1,5 @@
-"""Pictures of gaits, runs and distributions."""
+"""Figures and animations, in the project's matplotlib style."""
+
+from pathlib import Path
+
+STYLE = Path(__file__).with_name("gait.mplstyle")

@@ -26,7 +26,7 @@ MARGIN = 0.04  # [m] around everything that moves
 FRAME_DPI, SHEET_DPI = 120, 150
 # Views by name: the coordinates across and up.
 VIEWS = {"side": (0, 2), "front": (1, 2), "above": (0, 1)}
-# Of a frame [inch], and in it of the picture in 3D, the views, and the upper left corner of the legend.
+# Size of a frame [inch]; positions of the 3-D view, the other views and the upper left corner of the legend.
 FRAME, PLANAR_FRAME = (8.0, 4.5), (6.4, 4.0)
 PLACE_3D = (-0.02, 0.0, 0.42, 0.94)
 PLACES = {"side": (0.455, 0.53, 0.15, 0.38), "front": (0.67, 0.53, 0.15, 0.38), "above": (0.455, 0.12, 0.365, 0.28)}
@@ -35,37 +35,37 @@ LEGEND_CORNER, PLANAR_LEGEND_CORNER = (0.835, 0.92), (0.76, 0.92)
 AXIS_NAMES = ("x [m]", "y [m]", "z [m]")
 
 
-def frames(skeleton: Skeleton) -> Iterator[Frame]:
-    """One picture a sample: in 3D, from the side, the front and above; a planar gait from the side only."""
+def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
+    """Yield one frame per sample: in 3D, from the side, the front and above; a planar gait from the side only."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with style():
         figure = new_figure(*(PLANAR_FRAME if skeleton.planar else FRAME))
-        figure.set_layout_engine("none")  # fixed places: solving for them costs more than drawing
+        figure.set_layout_engine("none")  # fixed positions: computing a layout costs more than drawing
         figure.set_dpi(FRAME_DPI)
         canvas: Any = FigureCanvasAgg(figure)
         for k in range(len(skeleton.t)):
-            with delay_interrupts():  # Matplotlib's compiled code makes errors of its own of it
+            with delay_interrupts():  # Matplotlib's compiled code turns Ctrl-C into other errors
                 figure.clear()
                 _draw_frame(figure, skeleton, k)
                 canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
-    """Some instants side by side as one PNG, a row for each view.
+def write_contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
+    """Write some instants as one PNG, one row per view.
 
     Raises:
         OutputError: the file cannot be written.
     """
     times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
     with style(), new_file(path) as file, delay_interrupts():
-        figure = poses_figure(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
+        figure = plot_poses(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
         figure.savefig(file, format="png", dpi=SHEET_DPI)
 
 
-def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str]) -> Figure:
-    """One row for each view, one column for each instant: the sample nearest to it."""
+def plot_poses(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str]) -> Figure:
+    """Plot one row per view and one column per instant, at the nearest sample."""
     chosen = [int(np.abs(skeleton.t - time).argmin()) for time in times_s]
     low, high = skeleton.box()
     widths, heights = ([float((high - low)[VIEWS[view][i]] + 2 * MARGIN) for view in views] for i in (0, 1))
@@ -80,7 +80,7 @@ def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[s
                     axis.set_ylabel("")
         for axis, k in zip(axes[0], chosen, strict=True):
             axis.set_title(f"{skeleton.t[k]:.2f} s")
-        handles = _legend(skeleton, views)
+        handles = _make_legend(skeleton, views)
         figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 1 + len(chosen)))
         figure.suptitle(skeleton.title, fontsize=9)
     return figure
@@ -89,7 +89,7 @@ def poses_figure(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[s
 def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
     figure.text(0.01, 0.985, f"{skeleton.t[k]:.2f} s   {skeleton.title}", fontsize=10, va="top")
     views, corner = (["side"], PLANAR_LEGEND_CORNER) if skeleton.planar else (list(VIEWS), LEGEND_CORNER)
-    figure.legend(handles=_legend(skeleton, views), loc="upper left", bbox_to_anchor=corner, borderaxespad=0.0)
+    figure.legend(handles=_make_legend(skeleton, views), loc="upper left", bbox_to_anchor=corner, borderaxespad=0.0)
     if skeleton.planar:
         _draw_view(figure.add_axes(PLANAR_PLACE), skeleton, k, "side")
         return
@@ -122,9 +122,9 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
 
 
 def _draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opacity: float = 1.0) -> None:
-    """Soles, limbs, centre of mass and ZMP at sample k, in axes of two or three dimensions that show these coordinates."""
+    """Draw soles, limbs, centre of mass and ZMP at sample k in axes of two or three dimensions with these coordinates."""
     for sole in skeleton.soles:
-        axis.plot(*outline(sole, k)[:, seen].T, color=COLOURS[sole.side], lw=1.0)
+        axis.plot(*close_outline(sole, k)[:, seen].T, color=COLOURS[sole.side], lw=1.0)
     for limb in skeleton.limbs:
         axis.plot(*limb.points[k][:, seen].T, color=COLOURS[limb.side], marker="o", ms=2.5, alpha=opacity)
     for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
@@ -132,8 +132,8 @@ def _draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opaci
             axis.plot(*points[k : k + 1, seen].T, color=colour, marker=marker, ms=5, ls="none", zorder=5)
 
 
-def outline(sole: Sole, k: int) -> Array:
-    """Corners of a sole at sample k, the first one again at the end, (N, 3) [m]."""
+def close_outline(sole: Sole, k: int) -> Array:
+    """Return the corners of a sole at sample k, the first one repeated at the end, (N, 3) [m]."""
     return np.concatenate([sole.corners[k], sole.corners[k, :1]])
 
 
@@ -153,8 +153,8 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
     axis.set(xticklabels=[], yticklabels=[], zticklabels=[])
 
 
-def _legend(skeleton: Skeleton, views: Collection[str]) -> list[Artist]:
-    """Samples of everything that is drawn, with their names."""
+def _make_legend(skeleton: Skeleton, views: Collection[str]) -> list[Artist]:
+    """Return legend entries of everything drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

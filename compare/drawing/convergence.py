@@ -1,4 +1,4 @@
-"""Convergence: gap to the best known, against evaluations and against seconds."""
+"""Convergence: gap to the best known over evaluations and seconds."""
 
 from __future__ import annotations
 
@@ -8,43 +8,43 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.distribution import band
-from compare.drawing.figures import Look, legend_below, logarithmic, looks, new_figure, style
+from compare.analysis.statistics.distribution import compute_band
+from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Relative gaps below this are drawn at this value: both solvers' tolerances end near it.
+# Relative gaps below this are drawn at this value: solvers' tolerances are near it.
 SMALLEST_GAP = 1e-8
 GRID_POINTS = 300
 Draw = Callable[["Axes", SolverRuns, Look, str], None]
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
 
 
-def convergence_figure(comparison: Comparison) -> Figure:
-    """Bands from the least to the greatest gap of all runs, with the median; against evaluations and seconds.
+def plot_convergence(comparison: Comparison) -> Figure:
+    """Plot bands from the least to the greatest gap of all runs, with the median, over evaluations and seconds.
 
-    A line begins where half of the runs are feasible, a band where all are. A gradient method is known at its ends only:
-    its runs are points, at what all their calls cost.
+    A line begins where half of the runs are feasible, a band where all are. Runs of a gradient method are points at
+    their total cost.
     """
-    return cost_figure(comparison, _draw_gaps, "gap to the best known [%]", both=True)
+    return plot_by_cost(comparison, _draw_gaps, "gap to the best known [%]", both=True)
 
 
-def cost_figure(comparison: Comparison, draw: Draw, words: str, both: bool = False) -> Figure:
-    """Axes of evaluations and of seconds; ``draw`` gets the axes, a solver, its look, and which of both the costs are."""
-    look = looks([solver.name for solver in comparison.solvers])
+def plot_by_cost(comparison: Comparison, draw: Draw, words: str, both: bool = False) -> Figure:
+    """Plot over evaluations and over seconds; ``draw`` receives the axes, a solver, its look and the kind of cost."""
+    look = assign_looks([solver.name for solver in comparison.solvers])
     with style():
         figure = new_figure(7.4, 2.8)
         for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
             for solver in comparison.solvers:
-                if solver.knows(axis):
+                if solver.has_costs(axis):
                     draw(axes, solver, look[solver.name], axis)
             axes.set_xlabel(AXES[axis])
-            logarithmic(axes, both)
+            use_log_axes(axes, both)
         figure.axes[0].set_ylabel(words)
-        legend_below(figure)
+        add_legend_below(figure)
     return figure
 
 
@@ -52,10 +52,10 @@ def _draw_gaps(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
     if any(len(curve.gap) > 1 for curve in solver.curves):
         _draw_band(axes, solver, look, axis)
         return
-    ends = [(c.total(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
+    ends = [(c.total_cost(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
     label = f"{solver.name}, {len(ends)} of {len(solver.curves)} runs"
     cost, gap = np.array(ends).T if ends else (np.empty(0), np.empty(0))
-    axes.plot(cost, shown_percent(gap), look.marker, color=look.colour, label=label, markerfacecolor="none")
+    axes.plot(cost, clip_percent(gap), look.marker, color=look.colour, label=label, markerfacecolor="none")
 
 
 def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
@@ -68,14 +68,14 @@ def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
         return
     grid = np.geomspace(used.min(), used.max(), GRID_POINTS)
     best_so_far = [np.minimum.accumulate(c.gap) for c in solver.curves]
-    low, middle, high = band(costs, best_so_far, grid)
+    low, middle, high = compute_band(costs, best_so_far, grid)
     known, whole = np.isfinite(middle), np.isfinite(high)
-    axes.plot(grid[known], shown_percent(middle[known]), color=look.colour, linestyle=look.line, label=label)
+    axes.plot(grid[known], clip_percent(middle[known]), color=look.colour, linestyle=look.line, label=label)
     axes.fill_between(
-        grid[whole], shown_percent(low[whole]), shown_percent(high[whole]), color=look.colour, alpha=0.15, linewidth=0
+        grid[whole], clip_percent(low[whole]), clip_percent(high[whole]), color=look.colour, alpha=0.15, linewidth=0
     )
 
 
-def shown_percent(gap: Array) -> Array:
-    """Gap in percent, drawn no lower than the smallest one."""
+def clip_percent(gap: Array) -> Array:
+    """Return the gap in percent, not below the smallest one shown."""
     return 100.0 * np.maximum(gap, SMALLEST_GAP)

@@ -1,4 +1,4 @@
-"""What every figure shares: the project's style, and saving as PNG and SVG without a display."""
+"""Style, colours, legends and files (PNG, SVG) of all figures."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from compare.drawing import STYLE
 from nlp_gait.files import new_file, write_text
 from nlp_gait.interrupts import delay_interrupts
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# One colour for each solver in every figure (Okabe and Ito); others take those that are left in their order.
+# One colour for each solver in every figure (Okabe and Ito); others get the remaining ones in order.
 COLOURS = {
     "ipopt": "#000000",
     "pso": "#0072B2",
@@ -45,12 +46,12 @@ class Look:
     marker: str
 
 
-def looks(names: Collection[str]) -> dict[str, Look]:
-    """By solver, a look of its own: known solvers have their colours; where two share one, their lines differ."""
+def assign_looks(names: Collection[str]) -> dict[str, Look]:
+    """Assign a look to each solver: known solvers have fixed colours; solvers with the same colour get different lines."""
     used: Counter[str] = Counter()
     found: dict[str, Look] = {}
     for name in sorted(names, key=lambda name: name not in COLOURS):
-        # A polished search shares its search's colour; what is unknown takes the least used one.
+        # A polished search has its search's colour; an unknown solver gets the least used one.
         known = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
         colour = known or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
         kind = used[colour]
@@ -61,33 +62,33 @@ def looks(names: Collection[str]) -> dict[str, Look]:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The project's matplotlib style, for the figures made inside."""
+    """Use the project's matplotlib style within the context."""
     import matplotlib
 
-    with matplotlib.rc_context(fname=Path(__file__).with_name("gait.mplstyle")):
+    with matplotlib.rc_context(fname=STYLE):
         yield
 
 
 def new_figure(width_in: float = 6.3, height_in: float = 3.0) -> Figure:
-    """Empty figure of a size [inch] that fits a printed column; to be used inside ``style()``."""
-    from compare.drawing.shown_figure import ShownFigure
+    """Return an empty figure of a size [inch] that fits a printed column; use inside ``style()``."""
+    from compare.drawing.notebook_figure import NotebookFigure
 
-    return ShownFigure(figsize=(width_in, height_in))
+    return NotebookFigure(figsize=(width_in, height_in))
 
 
-def legend_below(figure: Figure, axes: Axes | None = None) -> None:
-    """Legend of some axes, or else the first ones, below the figure, which grows by its height."""
+def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
+    """Add the legend of some axes, by default the first ones, below the figure, which grows accordingly."""
     handles, labels = (axes or figure.axes[0]).get_legend_handles_labels()
     if not labels:
         return
-    letters = 14 * figure.get_figwidth()  # that fit beside each other at the legend's size
+    letters = 14 * figure.get_figwidth()  # in a row at the legend's size
     columns = max(1, min(len(labels), int(letters / (max(map(len, labels)) + 8))))
     figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN * -(-len(labels) // columns))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
-def logarithmic(axes: Axes, both: bool = False) -> None:
-    """Make the x axis logarithmic, or both, once something positive is drawn.
+def use_log_axes(axes: Axes, both: bool = False) -> None:
+    """Make the x axis use_log_axes, or both, once something positive is drawn.
 
     Powers of ten are plain text: parsing mathematics takes most of a figure's time.
     """
@@ -97,12 +98,12 @@ def logarithmic(axes: Axes, both: bool = False) -> None:
     for axis, positive in ((axes.xaxis, drawn.minposx), (axes.yaxis, drawn.minposy if both else math.inf)):
         if math.isfinite(positive):
             axes.set(**{"xscale" if axis is axes.xaxis else "yscale": "log"})
-            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
             axis.set_minor_formatter(NullFormatter())
 
 
-def power_of_ten(value: float) -> str:
-    """For example 10\u207b\u2076; plain from 0.1 to 1000."""
+def format_power_of_ten(value: float) -> str:
+    """Format a power of ten, for example 10\u207b\u2076; plain from 0.1 to 1000."""
     if 0.09 < value < 1001.0:
         return f"{value:g}"
     exponent = round(math.log10(value)) if value > 0.0 else 0
@@ -112,32 +113,32 @@ def power_of_ten(value: float) -> str:
 
 
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``<stem>.svg``; returns both paths.
+    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths.
 
     Raises:
         OutputError: they cannot be written.
     """
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
-    write_text(paths[1], svg_text(figure))
-    figure.set_layout_engine("none")  # it stands; finding it again takes as long as drawing
+    write_text(paths[1], render_svg(figure))
+    figure.set_layout_engine("none")  # the layout is final; computing it again takes as long as drawing
     with style(), new_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths
 
 
-def svg_text(figure: Figure) -> str:
-    """Figure as an SVG file; equal figures give equal text."""
+def render_svg(figure: Figure) -> str:
+    """Return a figure as an SVG file; equal figures give equal text."""
     text = io.StringIO()
-    with delay_interrupts(), style():  # Matplotlib's compiled code makes errors of its own of Ctrl-C
+    with delay_interrupts(), style():  # Matplotlib's compiled code turns Ctrl-C into other errors
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     return text.getvalue()
 
 
 def inline_svg(svg: str, prefix: str, title: str) -> str:
-    """SVG file as an element of an HTML page: without background, its ink in the page's colour.
+    """Return an SVG file as an element of an HTML page: without background, with ink in the page's colour.
 
     Args:
-        svg: of ``svg_text``.
+        svg: of ``render_svg``.
         prefix: letters and digits, unique in the page, for ids.
         title: alternative text, plain letters.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
-from compare.drawing.figures import INK, Look, legend_below, looks, new_figure, style
+from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, new_figure, style
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sampled
 from nlp_gait.formulation.locking import one_at_a_time
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PERIOD_S = 0.02  # between samples
-SIDES = COLOURS | {TRUNK: INK}  # the page's own ink, light or dark
+SIDES = COLOURS | {TRUNK: INK}  # the page's ink, light or dark
 POSES = 6
 FAINTEST = 0.25  # opacity of the first pose; the last one has 1
 WIDTH_IN, ROW_IN = 7.4, 2.1
@@ -30,8 +30,8 @@ CURVES = {"power": "mechanical power [W]", "margin": "balance margin [mm]"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DrawnGait:
-    """What is drawn of a gait.
+class GaitCurves:
+    """Time histories of a gait for a figure.
 
     Attributes:
         skeleton: over time; None for a problem that has none.
@@ -47,8 +47,8 @@ class DrawnGait:
 
 
 @one_at_a_time
-def drawn_gait(result: Result) -> DrawnGait:
-    """Time histories of a result as they are drawn.
+def prepare_gait(result: Result) -> GaitCurves:
+    """Compute the time histories of a result for a figure.
 
     Raises:
         InputError: the problem has no time histories, or time does not run forward in them.
@@ -59,7 +59,7 @@ def drawn_gait(result: Result) -> DrawnGait:
     skeleton = None if problem.display.skeleton is None else problem.display.skeleton(signals, problem.parameter_values)
     margin = None if skeleton is None else skeleton.margin()
     has_power = all(name in arrays and name in JOINT_UNITS for name in ("tau", "qd"))
-    return DrawnGait(
+    return GaitCurves(
         skeleton=skeleton,
         t=arrays["t"],
         power=np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1) if has_power else None,
@@ -67,8 +67,8 @@ def drawn_gait(result: Result) -> DrawnGait:
     )
 
 
-def gaits_figure(gaits: Mapping[str, DrawnGait]) -> Figure:
-    """Stick figures of each gait beside each other, and below them the curves of all; gaits by solver or any other name.
+def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
+    """Plot stick figures of each gait and below them the curves of all; gaits by solver or any other name.
 
     Raises:
         InputError: there is nothing to draw.
@@ -77,7 +77,7 @@ def gaits_figure(gaits: Mapping[str, DrawnGait]) -> Figure:
     curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in gaits.values())]
     if not figures and not curves:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
-    look = looks(list(gaits))
+    look = assign_looks(list(gaits))
     with style():
         if len(gaits) == 1:
             figure = new_figure(WIDTH_IN, ROW_IN)
@@ -98,7 +98,7 @@ def gaits_figure(gaits: Mapping[str, DrawnGait]) -> Figure:
         for axis, curve in zip(axes[len(figures) :], curves, strict=True):
             _draw_curves(axis, gaits, look, curve)
         if len(gaits) > 1 and curves:
-            legend_below(figure, axes[-1])
+            add_legend_below(figure, axes[-1])
     return figure
 
 
@@ -110,7 +110,7 @@ def _in_rows(figures: Mapping[str, Skeleton]) -> list[list[str]]:
 
 
 def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:
-    """Poses of equal distance in time over each other, later ones darker, from the side."""
+    """Draw poses at equidistant times over each other, later ones darker, from the side."""
     axes.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
     chosen = np.unique(np.linspace(0, len(skeleton.t) - 1, POSES).round().astype(int)).tolist()
     for k, opacity in zip(chosen, np.linspace(FAINTEST, 1.0, len(chosen)).tolist(), strict=True):
@@ -127,7 +127,7 @@ def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:
     axes.set_title(name, fontsize=8)
 
 
-def _draw_curves(axes: Axes, gaits: Mapping[str, DrawnGait], look: Mapping[str, Look], curve: str) -> None:
+def _draw_curves(axes: Axes, gaits: Mapping[str, GaitCurves], look: Mapping[str, Look], curve: str) -> None:
     for name, gait in gaits.items():
         values = getattr(gait, curve)
         if values is not None:

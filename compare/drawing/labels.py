@@ -1,4 +1,4 @@
-"""Names of variables as people read them: ``hip_vx_start_m_s`` is the hip vx start in m/s."""
+"""Readable names of variables: ``hip_vx_start_m_s`` is the hip vx start in m/s."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from nlp_gait.formulation import GaitProblem
 
 
 def axis_label(name: str, unit: str) -> str:
-    """Label of an axis, for example ``hip height [m]``."""
+    """Return the label of an axis, for example ``hip height [m]``."""
     return heading(name_in_words(name, unit), unit)
 
 
 def quantity(name: str, unit: str, value: float) -> str:
-    """For example ``hip height = 0.31 m``."""
+    """Format a value with its name, for example ``hip height = 0.31 m``."""
     return f"{name_in_words(name, unit)} = {with_unit(value, unit, 'g')}"
 
 
 def name_in_words(name: str, unit: str) -> str:
-    """Name without its unit, for example ``hip height``."""
+    """Return a name without its unit, for example ``hip height``."""
     for end in ("lower", "upper"):
         if name.endswith(f".{end}"):
             return f"{end} bound of {name_in_words(name.removesuffix(f'.{end}'), unit)}"
@@ -25,6 +25,6 @@ def name_in_words(name: str, unit: str) -> str:
 
 
 def units_of(problem: GaitProblem) -> dict[str, str]:
-    """Units of a problem's variables and parameters, by name."""
+    """Return the units of a problem's variables and parameters by name."""
     variables = {variable.name: variable.unit for variable in problem.variables}
     return variables | {parameter.name: parameter.unit for parameter in problem.parameters}

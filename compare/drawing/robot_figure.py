@@ -1,4 +1,4 @@
-"""A robot as it was understood: from the front and from the side at zero angles, and its soles from above."""
+"""Figure of a robot as read: from behind and from the side at zero angles, and its soles from above."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ COLOURS = {"left": "#0072B2", "right": "#D55E00"}
 OTHERS = "#999999"
 
 
-def draw_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
+def plot_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``<stem>.svg``; returns both paths.
 
     Raises:

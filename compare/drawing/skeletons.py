@@ -11,7 +11,7 @@ from nlp_gait.formulation.motion.skeleton import Skeleton
 
 
 @one_at_a_time
-def skeleton_of(result: Result, frames_per_s: float) -> Skeleton:
+def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
     """Skeleton of a gait at about the given number of samples a second.
 
     Raises:

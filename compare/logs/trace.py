@@ -59,7 +59,7 @@ def trace_of(record: RunRecord, curve: Curve) -> Trace:
         if at == lines[-1][0]:  # both in one evaluation: the better one
             lines.pop()
         lines.append((at, gap))
-    total = max(1, math.ceil(curve.total()))
+    total = max(1, math.ceil(curve.total_cost()))
     return Trace(run=record.run, x=tuple(record.x.values()), lines=tuple(lines), total=total)
 
 

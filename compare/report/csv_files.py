@@ -1,4 +1,4 @@
-"""All runs, and all judged points, as CSV files."""
+"""All runs and all judged points as CSV files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nlp_gait.files import csv_text, without_nan, write_text
 
 
 def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
-    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; what is not known is an empty cell.
+    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; unknown values are empty cells.
 
     Args:
         folder: to write to.

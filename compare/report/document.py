@@ -1,7 +1,7 @@
-"""What a report is made of, for studies, papers and questions alike: text, tables, figures and sections of them.
+"""Documents for studies, papers and questions: text, tables, figures and sections of them.
 
-``compare.report.writing`` writes it: ``write_document`` a page as HTML and as Markdown with everything on it, ``write_parts``
-tables and figures alone. ``compare.report.template`` makes a document from a text with places for them.
+``compare.report.writing`` writes them: ``write_document`` an HTML and a Markdown page with everything, ``write_parts``
+tables and figures alone. ``compare.report.template`` makes a document from a text with fields.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 Value = str | float | int | bool | None
-"""Content of a cell; None where there is nothing to say."""
+"""Content of a cell; None for an empty one."""
 
 
 Rows = Sequence[Sequence[Value]]
@@ -34,14 +34,14 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A table of values with all their digits, and how people read them.
+    """Table of values with all digits, and their format on a page.
 
     Attributes:
         columns: heading, with its unit, to the format of its numbers on a page, such as ``".4f"``; an empty one shows all digits.
         rows: one value for each column.
-        name: stem of its CSV file; empty for a table that stands on the page only.
-        caption: what it shows.
-        prose: the cells are sentences, so that all columns are set flush left, not only the first.
+        name: stem of its CSV file; empty for a table without a CSV file.
+        caption: description.
+        prose: the cells are sentences: all columns are left-aligned.
     """
 
     columns: Mapping[str, str]
@@ -52,7 +52,7 @@ class Table:
 
     @property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
-        """Rows as a page shows them."""
+        """Rows as shown on a page."""
         return tuple(
             tuple(_cell(value, form) for value, form in zip(row, self.columns.values(), strict=True))
             for row in self.rows
@@ -60,14 +60,14 @@ class Table:
 
     @property
     def csv_rows(self) -> list[list[object]]:
-        """Headings and rows with all digits, fit for ``csv_text``: truth values in lower case, nothing for None."""
+        """Headings and rows with all digits for ``csv_text``: booleans in lower case, empty cells for None."""
         rows: list[list[object]] = [[str(v).lower() if isinstance(v, bool) else v for v in row] for row in self.rows]
         return [list(self.columns), *rows]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Figure:
-    """A drawing, the stem of its PNG and SVG files, and what it shows."""
+    """A drawing, the stem of its PNG and SVG files, and its caption."""
 
     name: str
     caption: str
@@ -76,14 +76,14 @@ class Figure:
 
 @dataclass(frozen=True)
 class Prose:
-    """Markdown that the program itself writes. Words of users belong in plain strings and tables, which are shown literally."""
+    """Markdown written by the program. Text of users belongs in plain strings and tables, which are shown literally."""
 
     markdown: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Section:
-    """A heading and what stands below it, in this order; a plain string is a paragraph."""
+    """A heading and its parts in order; a plain string is a paragraph."""
 
     title: str
     parts: Sequence[Part]
@@ -98,8 +98,8 @@ class Document:
 
     Attributes:
         title: of the page.
-        verdict: the essence, in at most three sentences; may be empty.
-        parts: the rest, in this order.
+        verdict: summary in at most three sentences; may be empty.
+        parts: the rest, in order.
     """
 
     title: str
@@ -108,15 +108,15 @@ class Document:
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", prose: bool = False) -> Table:
-    """Table of texts, sorted by the number that a cell begins with."""
+    """Return a table of texts, sortable by the number at the beginning of a cell."""
     return Table(columns=dict.fromkeys(header, ""), rows=rows, caption=caption, prose=prose)
 
 
-def leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figure]:
-    """Everything but sections, in the order of the page."""
+def iterate_leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figure]:
+    """Yield all parts except sections, in the order of the page."""
     for part in parts:
         if isinstance(part, Section):
-            yield from leaves(part.parts)
+            yield from iterate_leaves(part.parts)
         else:
             yield part
 
@@ -132,7 +132,7 @@ def _cell(value: Value, form: str) -> Cell:
 
 
 def _leading_number(text: str) -> float | None:
-    """For example 10000 of "10 000 calls", with a thin space; infinity for a dash, so that what is missing comes last."""
+    """Return for example 10000 for "10 000 calls", with a thin space; infinity for a dash, so that missing values come last."""
     if text == "-":
         return math.inf
     first = text.replace("\u202f", "").split(" ")[0].split("/")[0]

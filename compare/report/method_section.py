@@ -1,4 +1,4 @@
-"""The section of a report on how its numbers came about: counting, settings, machine, versions, seeds, command."""
+"""The section of a report on methods: counting, settings, machine, versions, seeds, command."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from compare.study.manifest import Manifest, Session
 
 
 def method_section(comparisons: Sequence[Comparison], manifest: Manifest, weighting: Weighting) -> Section:
-    """Everything that somebody needs to repeat the study or to doubt it."""
+    """Return everything needed to reproduce or question the study."""
     return Section(
-        title="How these numbers came about",
+        title="Methods",
         parts=(
             _counting(comparisons, weighting),
             _solver_settings(comparisons),
@@ -30,12 +30,12 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
         title="Counting",
         parts=(
             "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1, a "
-            "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints on their own: what finite differences"
-            " would cost, so gradient methods are never flattered. A gradient run is taken to reach its targets at its end. A "
-            "polished run carries the whole cost of the search before it. Times are wall times of the solve, without building or "
+            "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints separately, like finite differences,"
+            " so gradient methods are never favoured. A gradient run reaches its targets at its end. A "
+            "polished run includes the cost of its search. Times are wall times of the solve, without building or "
             "compiling.",
-            "Search algorithms of equal seed begin from the same points; run k has the study's seed plus k. Parameters of all "
-            "algorithms are their sources' defaults; none was tuned on these problems.",
+            "Searches with equal seeds start from the same points; run k has the study's seed plus k. Settings of all "
+            "algorithms are the defaults of their sources; none was tuned on these problems.",
             text_table(("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"), rows),
         ),
     )
@@ -65,7 +65,7 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
 def _session(number: int, session: Session) -> Section:
     rows = [
         ("command", session.command),
-        ("begun", session.started),
+        ("started", session.started),
         *session.machine.items(),
         ("workers", session.jobs),
         ("compiled objective", session.kernel),

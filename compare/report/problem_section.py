@@ -7,16 +7,16 @@ from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.natural_steps import BY_UNIT
-from compare.analysis.published import published_rows
+from compare.analysis.published import make_published_rows
 from compare.analysis.significance import compare_pairs
+from compare.analysis.solver_table import HEADER, SolverSummary, count, format_cells, summarise
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.table import HEADER, SolverSummary, cells, count, summarise
 from compare.analysis.units import heading, seconds
-from compare.drawing.convergence import SMALLEST_GAP, convergence_figure
-from compare.drawing.distributions import ecdf_figure, final_gap_figure
+from compare.drawing.convergence import SMALLEST_GAP, plot_convergence
+from compare.drawing.distributions import plot_ecdf, plot_final_gaps
 from compare.report.document import Figure, Section, text_table
 from compare.report.engine_section import engine_section
-from compare.report.gait_section import gaits_part
+from compare.report.gait_section import make_gaits_part
 from compare.study.engine import Played
 from compare.study.record import RunRecord
 from nlp_gait.files import file_safe
@@ -26,7 +26,7 @@ SHOWN_CONSTRAINTS = 15
 
 
 def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Section:
-    """Tables, figures and lists on one problem, and how its best gaits fared in the engine if they were played."""
+    """Return the section on one problem: tables, figures, lists, and its best gaits in the engine if simulated."""
     summaries = summarise(comparison)
     objective = comparison.objective
     stem = file_safe(comparison.problem)
@@ -35,16 +35,16 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
             name=f"{stem}-convergence",
             caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. "
             f"Gaps below {100 * SMALLEST_GAP:g} % are drawn at that value: the solvers' tolerances end near it.",
-            drawing=convergence_figure(comparison),
+            drawing=plot_convergence(comparison),
         ),
         Figure(
             name=f"{stem}-runtime",
             caption="Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
-            drawing=ecdf_figure(comparison),
+            drawing=plot_ecdf(comparison),
         ),
-        Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=final_gap_figure(comparison)),
+        Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=plot_final_gaps(comparison)),
     )
-    gaits = gaits_part(comparison)
+    gaits = make_gaits_part(comparison)
     where_needed = (
         engine_section(plays),
         _tests(comparison),
@@ -56,9 +56,10 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
     return Section(
         title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
-            "Claims are the solvers' own. Everything else is the judge's: the exact functions at the reported point, on the "
-            "problem's own samples. Gaps are measured from the best feasible value known here; evaluations are equivalent ones.",
-            text_table(HEADER, [cells(s, comparison) for s in summaries], "Solvers, best median first"),
+            "Claimed is what the solvers report. Everything else is what the judge finds with the exact functions at "
+            "the reported point and the problem's samples. Gaps are relative to the best feasible value of these runs; evaluations "
+            "are equivalent ones.",
+            text_table(HEADER, [format_cells(s, comparison) for s in summaries], "Solvers, best median first"),
             *(() if gaits is None else (gaits,)),
             *figures,
             _costs(comparison, summaries),
@@ -76,7 +77,7 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
             (s.algorithm, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
             for s in summaries
         ],
-        "Expected running time to targets above the best known: all runs' cost until then, divided by the successes",
+        "Expected running time to targets: cost of all runs until then, divided by the number that reached it",
     )
     times = text_table(
         ("solver", "feasible between samples", "95 % interval of the median", "build", "compile", "solve, median"),
@@ -91,15 +92,15 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
             )
             for s in summaries
         ],
-        f"Uncertainty of the median [{unit}] over the feasible runs (bootstrap), and where the time goes; build and compile are "
-        "the longest, paid once by each process",
+        f"Uncertainty of the median [{unit}] (feasible runs, bootstrap), and times; build and compile are "
+        "the longest, needed once per process",
     )
     calls = text_table(
         ("solver", "f", "g", "gradient", "Jacobian", "Hessian", "failed"),
         [(solver.name, *_mean_calls(solver.records)) for solver in comparison.solvers],
-        "Calls in a run, mean",
+        "Mean calls per run",
     )
-    return Section(title="What it costs", parts=(runtime, times, calls))
+    return Section(title="Costs", parts=(runtime, times, calls))
 
 
 def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
@@ -126,7 +127,7 @@ def _tests(comparison: Comparison) -> Section | None:
         for pair in pairs
     ]
     return Section(
-        title="Are the differences real?",
+        title="Significance of differences",
         parts=(
             "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over "
             "runs with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no "
@@ -157,19 +158,19 @@ def _binding(comparison: Comparison) -> Section | None:
         for a in record.active_constraints[:SHOWN_CONSTRAINTS]
     ]
     left_out = len(record.active_constraints) - len(rows)
-    note = f" {left_out} cheaper ones are left out." if left_out else ""
+    note = f" {left_out} lower ones are omitted." if left_out else ""
     return Section(
-        title="What binds at the optimum",
+        title="Active constraints at the optimum",
         parts=(
             f"At the best optimum of {record.algorithm} (run {record.run}). The price is the change of the optimal "
-            f"{comparison.objective.name} for each unit by which the bound is raised; the dearest come first.{note}",
-            text_table(("constraint", "side", "at", "price of raising it", "for a step"), rows),
+            f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
+            text_table(("constraint", "side", "at", "price", "for a step"), rows),
         ),
     )
 
 
 def _for_one_step(active: ActiveConstraint, unit: str) -> str:
-    """For example +0.0237 W for 1 mm."""
+    """Return for example ``+0.0237 W for 1 mm``."""
     step = BY_UNIT.get(active.unit)
     if step is None:
         return "-"
@@ -177,11 +178,11 @@ def _for_one_step(active: ActiveConstraint, unit: str) -> str:
 
 
 def _published(comparison: Comparison) -> Section | None:
-    found = published_rows(comparison)
+    found = make_published_rows(comparison)
     if found is None:
         return None
     header, rows, note = found
-    return Section(title="The paper's values next to ours", parts=(note, text_table(header, rows)))
+    return Section(title="The paper's values and ours", parts=(note, text_table(header, rows)))
 
 
 def _failures(comparison: Comparison) -> Section | None:
@@ -189,8 +190,8 @@ def _failures(comparison: Comparison) -> Section | None:
     if not failed:
         return None
     rows = [(r.algorithm, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
-    made = text_table(("solver", "run", "seed", "why it ended", "violated, worst first"), rows, prose=True)
-    return Section(title="Runs that ended infeasible or failed", parts=(made,))
+    table = text_table(("solver", "run", "seed", "status", "violated, worst first"), rows, prose=True)
+    return Section(title="Runs that ended infeasible or failed", parts=(table,))
 
 
 def _between(comparison: Comparison) -> Section | None:
@@ -201,14 +202,14 @@ def _between(comparison: Comparison) -> Section | None:
     ]
     if not rows:
         return None
-    made = text_table(
+    table = text_table(
         ("solver", "run", "violated on a dense grid, worst first", "proven at all times"), rows, prose=True
     )
-    return Section(title="Feasible on their own samples, not at all times", parts=(made,))
+    return Section(title="Feasible at the samples, not at all times", parts=(table,))
 
 
 def _proven(record: RunRecord) -> str:
-    """What is proven to fail between the samples, or is not proven to hold."""
+    """Return what is violated between the samples, or not proven to be satisfied."""
     found = record.verdict.guaranteed
     return "-" if found is None or found.holds or found.reason else str(found)
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
-from compare.analysis.editions import told_apart
-from compare.analysis.engine import best_gaits
+from compare.analysis.editions import label_editions
+from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.statistics.run_length import Weighting
-from compare.analysis.verdict import verdict
-from compare.drawing.distributions import expected_costs, profile_figure
+from compare.analysis.verdict import write_verdict
+from compare.drawing.distributions import list_expected_costs, plot_performance_profile
 from compare.report.csv_files import write_csv_files
 from compare.report.document import Document, Figure, Section
 from compare.report.engine_section import HOW
@@ -25,13 +25,13 @@ from nlp_gait.files import file_safe
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
-    """Write the report of all records of a folder anew, those of earlier definitions too; returns the paths of its files.
+    """Rewrite the report of all records of a folder, earlier definitions included, and return the paths of its files.
 
     Raises:
         InputError: no records there, or a damaged one.
         OutputError: the files cannot be written.
     """
-    return write_report(folder, told_apart(read_records(folder)), read_manifest(folder), weighting, as_csv=as_csv)
+    return write_report(folder, label_editions(read_records(folder)), read_manifest(folder), weighting, as_csv=as_csv)
 
 
 def write_report(
@@ -42,31 +42,31 @@ def write_report(
     *,
     as_csv: bool = False,
 ) -> list[Path]:
-    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and CSV files if asked for; returns all paths.
+    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and optionally CSV files; return all paths.
 
-    What the folder keeps of gaits that were played in the engine is part of it.
+    Simulations stored in the folder are included.
     """
-    plays = kept_plays(folder, best_gaits(records))
-    written = write_document(folder, document_of(records, manifest, weighting, plays))
+    plays = kept_plays(folder, select_best_gaits(records))
+    written = write_document(folder, make_study_document(records, manifest, weighting, plays))
     if as_csv:
         written += write_csv_files(folder, records, {record.problem: file_safe(record.problem) for record in records})
     return written
 
 
-def document_of(
+def make_study_document(
     records: Sequence[RunRecord],
     manifest: Manifest,
     weighting: Weighting = DEFAULT_WEIGHTING,
     plays: Sequence[Played] = (),
 ) -> Document:
-    """Document of a study's records, and of their best gaits that were played in the engine."""
+    """Return the document of a study's records and of their best gaits simulated in the engine."""
     comparisons = compare_problems(records, weighting)
     sections = [problem_section(c, [play for play in plays if play.problem == c.problem]) for c in comparisons]
-    if len(comparisons) > 1 and expected_costs(comparisons):
+    if len(comparisons) > 1 and list_expected_costs(comparisons):
         sections.append(_over_problems(comparisons))
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
-        verdict=verdict(comparisons),
+        verdict=write_verdict(comparisons),
         parts=(*sections, *(() if plays else (HOW,)), method_section(comparisons, manifest, weighting)),
     )
 
@@ -75,6 +75,6 @@ def _over_problems(comparisons: Sequence[Comparison]) -> Section:
     figure = Figure(
         name="performance-profile",
         caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected evaluations.",
-        drawing=profile_figure(comparisons),
+        drawing=plot_performance_profile(comparisons),
     )
     return Section(title="Over all problems", parts=(figure,))

@@ -1,4 +1,4 @@
-"""Documents from a text in Markdown with places for numbers, tables and figures."""
+"""Documents from a Markdown text with fields for numbers, tables and figures."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ TABLE = re.compile(r"\{([\w-]+)\}\n\|(.+)\|\n\|(.+)\|")
 FIGURE = re.compile(r"!\[(.*)\]\((.+)\.png\)", re.DOTALL)
 
 
-def document_from(
+def fill_template(
     text: str, *, values: Mapping[str, Any], tables: Mapping[str, Rows], figures: Mapping[str, Drawing]
 ) -> Document:
-    """Document of a text.
+    """Return the document of a text.
 
-    Blocks of the text are parted by empty lines. A block is the title after ``#``, a heading after ``##`` or ``###``, a table,
+    Blocks of the text are separated by empty lines. A block is the title after ``#``, a heading after ``##`` or ``###``, a table,
     or ``![what it shows](name.png)`` for the drawing of that name. Anything else is a paragraph, a list or a table in Markdown,
     in which ``{name:.3f}`` is a value as ``str.format`` writes it. A table has three lines, the last one with the formats of the
     columns; ``:--`` in all of them makes it a table of sentences::
@@ -31,7 +31,7 @@ def document_from(
         | | .3f |
 
     Raises:
-        KeyError: a value, table or drawing that the text names is not there.
+        KeyError: the text names a value, table or drawing that is missing.
     """
     title, *blocks = re.split(r"\n{2,}", text.strip())
     open_sections: list[tuple[str, list[Part]]] = [(title.removeprefix("# "), [])]

@@ -11,7 +11,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, save
-from compare.report.document import Document, Figure, Part, Table, leaves
+from compare.report.document import Document, Figure, Part, Table, iterate_leaves
 from nlp_gait.files import csv_text, write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
@@ -34,7 +34,7 @@ def write_document(folder: Path, document: Document, page: str = "report") -> li
 def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
     """Write each table that has a name as ``<name>.csv`` and each figure as ``<name>.png`` and ``.svg``; returns the paths."""
     files: list[Path] = []
-    for part in leaves(parts):
+    for part in iterate_leaves(parts):
         if isinstance(part, Figure):
             files += save(part.drawing, folder / part.name)
         elif isinstance(part, Table) and part.name:
@@ -50,7 +50,7 @@ def html(document: Document, drawings: Sequence[str]) -> str:
         document: what to show.
         drawings: its figures as SVG files, in their order.
     """
-    figures = [part for part in leaves(document.parts) if isinstance(part, Figure)]
+    figures = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
     svg = {
         figure.name: Markup(inline_svg(drawing, f"f{i}", f"figure {i}"))
         for i, (figure, drawing) in enumerate(zip(figures, drawings, strict=True), start=1)

@@ -13,7 +13,7 @@ from typing import get_args, get_origin, get_type_hints
 from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
 from compare.analysis.published import published
 from compare.analysis.units import with_unit
-from compare.drawing.gait_figure import drawn_gait, gaits_figure
+from compare.drawing.gait_figure import plot_gaits, prepare_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, Result, load, problem_names
@@ -110,8 +110,8 @@ def _words(problem: GaitProblem) -> str:
 def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     if best is None or problem.display.motion is None:
         return ""
-    gait = drawn_gait(Result(problem=problem, x=problem.check_x(best.x)))
-    drawing = gaits_figure({problem.name: gait})
+    gait = prepare_gait(Result(problem=problem, x=problem.check_x(best.x)))
+    drawing = plot_gaits({problem.name: gait})
     drawing.savefig(folder / f"{problem.name}.png", dpi=150)
     return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
 

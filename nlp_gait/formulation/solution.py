@@ -259,8 +259,8 @@ class Solution:
 
         drawing = import_module("compare.drawing.gait_figure")  # by name: it stands above, and few results are drawn
         found = self._of(problem)
-        gait = drawing.drawn_gait(Result(problem=found, x=found.check_x(self.x)))
-        return drawing.gaits_figure({self.solver: gait})
+        gait = drawing.prepare_gait(Result(problem=found, x=found.check_x(self.x)))
+        return drawing.plot_gaits({self.solver: gait})
 
     def _of(self, problem: GaitProblem | None) -> GaitProblem:
         """The problem that was solved, with the values that it had."""

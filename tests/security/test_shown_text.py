@@ -14,9 +14,9 @@ from rich.console import Console
 
 from compare.cli import common
 from compare.cli.common import PlainConsole, harmless
-from compare.drawing.figures import inline_svg, new_figure, style, svg_text
-from compare.report.document import Figure, leaves
-from compare.report.study_report import document_of
+from compare.drawing.figures import inline_svg, new_figure, render_svg, style
+from compare.report.document import Figure, iterate_leaves
+from compare.report.study_report import make_study_document
 from compare.report.writing import html, markdown_page
 from compare.study.manifest import Manifest, Session
 from compare.study.settings import SolverSpec, StudySettings
@@ -75,9 +75,11 @@ def hostile_report() -> tuple[Page, str]:
     settings = StudySettings(
         problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(algorithm=MARKED),)
     )
-    document = document_of(records, Manifest(settings=settings, sessions=(session,)))
+    document = make_study_document(records, Manifest(settings=settings, sessions=(session,)))
     page = Page()
-    page.feed(html(document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in leaves(document.parts))))
+    page.feed(
+        html(document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in iterate_leaves(document.parts)))
+    )
     return page, markdown_page(document)
 
 
@@ -97,7 +99,7 @@ def test_text_in_figures_is_escaped() -> None:
     with style():
         figure = new_figure()
         figure.subplots().set_xlabel(f"{SCRIPT} {QUOTED}")
-        svg = svg_text(figure)
+        svg = render_svg(figure)
     root = ElementTree.fromstring(svg)
     assert not [element for element in root.iter() if element.tag.endswith(("script", "img"))]
     page = Page()

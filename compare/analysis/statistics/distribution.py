@@ -13,7 +13,7 @@ ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(
 
 
 def ecdf(costs: Array) -> tuple[Array, Array]:
-    """Share of all pairs of run and target that are solved within a cost.
+    """Return the share of all pairs of run and target that are solved within a cost.
 
     Args:
         costs: (pairs,) cost at which each was solved; infinite if never.
@@ -30,7 +30,7 @@ def ecdf(costs: Array) -> tuple[Array, Array]:
 
 
 def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
-    """Share of instances that a solver solves within a factor of the cheapest solver.
+    """Return the share of instances that a solver solves within a factor of the cheapest solver.
 
     Args:
         costs: by solver, (I,) cost of each instance, in the same order; infinite if not solved. Instances that no solver
@@ -50,8 +50,8 @@ def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple
     return {solver: ecdf(row) for solver, row in zip(costs, ratios, strict=True)}
 
 
-def band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> tuple[Array, Array, Array]:
-    """Least, median and greatest gap of all runs at each cost.
+def compute_band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> tuple[Array, Array, Array]:
+    """Return the least, median and greatest gap of all runs at each cost.
 
     Args:
         costs: of each run, (G,) ascending.

@@ -1,4 +1,4 @@
-"""What a run has cost when it reaches a target."""
+"""The cost at which a run reaches a target."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Array, Objective
 
-# Relative distances from the best known objective for which the expected running time is tabled.
+# Relative distances from the best known objective for which reports give the expected running time.
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Weighting:
-    """What each call counts, in evaluations of objective and constraints at one point.
+    """Weight of each kind of call, in evaluations of objective and constraints at one point.
 
-    The defaults charge derivatives as forward differences would cost them, objective and constraints each on their own:
-    n + 1 for a first derivative, (n + 1)(n + 2) / 2 for the second. Gradient methods are thereby never flattered.
+    The defaults count derivatives like forward differences, objective and constraints separately: n + 1 for a first
+    derivative, (n + 1)(n + 2) / 2 for the second. This never favours gradient methods.
 
     Attributes:
         f: of the objective (in searches with all constraints).
@@ -37,7 +37,7 @@ class Weighting:
     hessian: float | None = None
 
     def of_kind(self, n: int) -> dict[str, float]:
-        """Weight of each kind of call for n variables."""
+        """Return the weight of each kind of call for n variables."""
         second = (n + 1) * (n + 2) / 2
         defaults = {"f": 1.0, "g": 1.0, "gradient": n + 1.0, "jacobian": n + 1.0, "hessian": second}
         return {
@@ -45,7 +45,7 @@ class Weighting:
         }
 
     def equivalent(self, calls: Mapping[str, int], n: int) -> float:
-        """Equivalent evaluations of counted calls."""
+        """Return the equivalent evaluations of counted calls."""
         weights = self.of_kind(n)
         return float(sum(weights[kind] * count for kind, count in calls.items()))
 
@@ -54,31 +54,31 @@ class Weighting:
 class Curve:
     """Best so far of one run against what it cost.
 
-    A gradient method has one entry, its end: it is not known to be feasible earlier.
+    A gradient method has one entry, its end, as it may be infeasible earlier.
 
     Attributes:
         evaluations: (G,) equivalent evaluations.
         seconds: (G,) wall time of the solve.
-        gap: (G,) relative distance from the reference, infinite while nothing was feasible; negative beyond it.
+        gap: (G,) relative distance from the reference, infinite while nothing was feasible; negative if better.
     """
 
     evaluations: Array
     seconds: Array
     gap: Array
 
-    def reached(self, target: float, axis: str = "evaluations") -> float:
-        """Cost at which the gap is first at most the target; infinite if never."""
+    def cost_to_reach(self, target: float, axis: str = "evaluations") -> float:
+        """Return the cost at which the gap is first at most the target; infinite if never."""
         hit = np.flatnonzero(self.gap <= target)
         return float(getattr(self, axis)[hit[0]]) if hit.size else math.inf
 
-    def total(self, axis: str = "evaluations") -> float:
-        """Cost of the whole run; 0 if it failed before it began."""
+    def total_cost(self, axis: str = "evaluations") -> float:
+        """Return the cost of the whole run; 0 if it failed before its first evaluation."""
         costs = getattr(self, axis)
         return float(costs[-1]) if len(costs) else 0.0
 
 
-def curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
-    """Best so far of a run.
+def make_curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
+    """Return the best so far of a run.
 
     Args:
         record: the run.
@@ -87,47 +87,47 @@ def curve(record: RunRecord, objective: Objective, reference: float, weighting: 
         weighting: of calls.
     """
     evaluations = np.array(record.history.evaluations, dtype=float)
-    if evaluations.size:  # derivatives, where there are any, are spent by the end
+    if evaluations.size:  # derivatives are counted at the end
         evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))
     values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
     if not record.verdict.feasible:
-        values[:] = math.nan  # what the judge refuses has reached nothing
+        values[:] = math.nan  # an infeasible result has reached no target
     gaps = np.array([relative_gap(value, reference, objective) for value in values])
     return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
 
 
 def relative_gap(value: float, reference: float, objective: Objective) -> float:
-    """Distance of an objective from the reference, positive if worse, in units of the reference unless that is 0.
+    """Return the distance of an objective from the reference, positive if worse, relative unless the reference is 0.
 
-    Infinite for NaN: nothing feasible was found.
+    Infinite for NaN, where nothing feasible was found.
     """
     if math.isnan(value) or math.isnan(reference):
         return math.inf
     return objective.sign * (value - reference) / (abs(reference) or 1.0)
 
 
-def best_known(records: Sequence[RunRecord], objective: Objective) -> float:
-    """Best objective that the judge finds feasible; NaN if none is."""
+def find_best_known(records: Sequence[RunRecord], objective: Objective) -> float:
+    """Return the best objective of the feasible records; NaN without any."""
     costs = [objective.sign * r.verdict.objective for r in records if r.verdict.feasible]
     return objective.sign * min(costs) if costs else math.nan
 
 
 def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:
-    """Cost spent over all runs until the target or their end, divided by the number of successes.
+    """Return the cost of all runs until the target or their end, divided by the number that reached it.
 
     Args:
         reached: (R,) cost at which each run reached the target; infinite if never.
         totals: (R,) cost of each whole run.
 
     Returns:
-        Expected cost until the first success if runs are repeated; infinite without a success.
+        Expected cost of reaching the target with restarts; infinite if no run reached it.
 
     Source:
         Hansen, Auger, Ros, Mersmann, Tusar, Brockhoff (2021), COCO: a platform for comparing continuous optimizers in a
         black-box setting, section 4 (ERT, there also aRT).
     """
-    successes = [cost for cost in reached if math.isfinite(cost)]
-    if not successes:
+    hits = [cost for cost in reached if math.isfinite(cost)]
+    if not hits:
         return math.inf
     spent = sum(cost if math.isfinite(cost) else total for cost, total in zip(reached, totals, strict=True))
-    return spent / len(successes)
+    return spent / len(hits)

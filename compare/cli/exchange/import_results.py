@@ -37,7 +37,7 @@ def import_results(
 
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
-    from compare.analysis.editions import told_apart
+    from compare.analysis.editions import label_editions
     from compare.report import write_report
     from compare.study.imported import imported
     from compare.study.manifest import read_manifest
@@ -47,7 +47,7 @@ def import_results(
     spec = problem.spec()
     records = imported(spec, finals, label, history, evaluations)
     kept = [keep_record(record, writable_folder(out)) for record in records]
-    everything = told_apart(read_records(out))
+    everything = label_editions(read_records(out))
     written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
     shown = [record for record in everything if record.problem == spec.title]
     print_result(as_json, {"problems": summaries_of(shown)}, written, lambda: print_summaries(shown))

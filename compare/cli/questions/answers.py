@@ -56,9 +56,9 @@ class Output:
 
 def _print(answer: Answer) -> None:
     """Sentences and tables in the document's order, without what stands on the page for other programs."""
-    from compare.report.document import Table, leaves
+    from compare.report.document import Table, iterate_leaves
 
-    for part in (answer.title, *answer.verdict, *leaves(answer.parts)):
+    for part in (answer.title, *answer.verdict, *iterate_leaves(answer.parts)):
         if isinstance(part, str):
             stdout.print(part, soft_wrap=True)
         elif isinstance(part, Table) and not part.name:

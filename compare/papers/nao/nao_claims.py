@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.statistics.tests import a12
+from compare.analysis.statistics.inference import a12
 from compare.papers.nao.nao_findings import Findings, PhaseFindings
 from compare.papers.nao.nao_paper import SWING_POWER_W, VELOCITY_RANGES, VelocityRange
 from compare.papers.nao.nao_runs import ALGORITHMS, Held

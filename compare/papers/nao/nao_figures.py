@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.animation import poses_figure
+from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
-from compare.drawing.skeletons import skeleton_of
+from compare.drawing.skeletons import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings, Points
 from compare.papers.nao.nao_paper import SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS
@@ -33,14 +33,14 @@ READING_TOLERANCE_M = 5e-4  # within which a solution counts as having a swing h
 def all_figures(findings: Findings) -> Iterator[tuple[str, Figure]]:
     """File name without suffix, and figure."""
     for letter, phase in zip("ab", findings.phases, strict=True):
-        yield f"fig{phase.paper.convergence_figure:02d}", convergence_figure(phase)
+        yield f"fig{phase.paper.plot_convergence:02d}", plot_convergence(phase)
         for number, positions in phase.paper.scatter_figures.items():
             yield f"fig{number}", scatter_figure(phase, positions)
         yield f"fig20{letter}", gait_figure(phase)
     yield "swing-height", swing_figure(findings)
 
 
-def convergence_figure(phase: PhaseFindings) -> Figure:
+def plot_convergence(phase: PhaseFindings) -> Figure:
     """Figs. 9, 15: least, mean and greatest of the runs' best power so far in each generation.
 
     A line begins where every run has found a feasible solution.
@@ -149,9 +149,9 @@ def gait_figure(phase: PhaseFindings) -> Figure:
     """Fig. 20: IPOPT's gait from behind and from the side."""
     x = np.array(point(phase.optimum))
     duration = float(x[phase.paper.duration])
-    skeleton = skeleton_of(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)
+    skeleton = make_skeleton(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)
     count = int(duration / POSES_EVERY_S[phase.problem.name] + 1e-6) + 1
-    return poses_figure(skeleton, [k * POSES_EVERY_S[phase.problem.name] for k in range(count)], ("front", "side"))
+    return plot_poses(skeleton, [k * POSES_EVERY_S[phase.problem.name] for k in range(count)], ("front", "side"))
 
 
 def _power_scale(axes: Axes) -> None:

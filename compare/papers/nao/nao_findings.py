@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from compare.analysis.statistics.rank_sum_normal import RankSum, rank_sum_normal
+from compare.analysis.statistics.inference import RankSum, rank_sum_normal
 from compare.judge import evaluate
 from compare.papers.nao.nao_paper import PrintedPhase
 from compare.papers.nao.nao_runs import Held, power_with_legs_twice

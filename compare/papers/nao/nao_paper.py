@@ -46,7 +46,7 @@ class PrintedPhase:
         optima: by search algorithm (Tables 6 and 8, 7 and 9).
         test: section 5.3.
         tables: numbers of the tables of variables and of indexes.
-        convergence_figure: number of the figure of best per generation.
+        plot_convergence: number of the figure of best per generation.
         scatter_figures: number of each figure of the objective against variables, to the positions of these in x.
         duration: position of the phase's time in x.
     """
@@ -56,7 +56,7 @@ class PrintedPhase:
     optima: Mapping[str, PrintedOptimum]
     test: PrintedTest
     tables: tuple[int, int]
-    convergence_figure: int
+    plot_convergence: int
     scatter_figures: Mapping[int, tuple[int, ...]]
     duration: int
 
@@ -83,7 +83,7 @@ SSP = PrintedPhase(
     },
     test=PrintedTest(rank_sum=70.0, z=-3.6772, p_two_sided=0.000235, p_less=0.000117),
     tables=(6, 7),
-    convergence_figure=9,
+    plot_convergence=9,
     scatter_figures={10: (0, 1, 2), 11: (3, 4), 12: (5, 6), 13: (7,), 14: (8,)},
     duration=8,
 )
@@ -104,7 +104,7 @@ DSP = PrintedPhase(
     },
     test=PrintedTest(rank_sum=90.0, z=-2.3639, p_two_sided=0.0181, p_less=None),
     tables=(8, 9),
-    convergence_figure=15,
+    plot_convergence=15,
     scatter_figures={16: (0, 1, 2), 17: (3, 4), 18: (5, 6), 19: (7,)},
     duration=7,
 )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from compare.analysis.statistics.tests import a12
+from compare.analysis.statistics.inference import a12
 from compare.papers.nao.nao_claims import claims
 from compare.papers.nao.nao_figures import read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings

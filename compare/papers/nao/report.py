@@ -11,13 +11,13 @@ from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings
 from compare.papers.nao.nao_runs import ALGORITHMS
 from compare.papers.nao.nao_tables import all_tables
 from compare.report.document import Document
-from compare.report.template import document_from
+from compare.report.template import fill_template
 
 
 def document(findings: Findings) -> Document:
     """The whole report."""
     text = (resources.files("compare.papers.nao") / "nao_report.md").read_text(encoding="utf-8")
-    return document_from(
+    return fill_template(
         text, values=_values(findings), tables=all_tables(findings), figures=dict(all_figures(findings))
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.statistics.tests import rank_sum
+from compare.analysis.statistics.inference import rank_sum
 from compare.papers.nao.nao_claims import FAILS, HOLDS, SIGNIFICANT
 from compare.papers.nao_pareto.nao_pareto_findings import NAMES, Findings, Measured, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS

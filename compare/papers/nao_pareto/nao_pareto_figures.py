@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, logarithmic, new_figure, style
+from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, style, use_log_axes
 from compare.drawing.labels import axis_label
 from compare.papers.nao_pareto.nao_pareto_findings import NAMES, Findings, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS
@@ -49,7 +49,7 @@ def running_figure(phase: PhaseFindings) -> Figure:
         right.set_ylabel("inverted generational distance [1]")
         for axes in (left, right):
             axes.set_xlabel("evaluations")
-            logarithmic(axes, both=True)
+            use_log_axes(axes, both=True)
         _legend(figure, left, 4)
     return figure
 

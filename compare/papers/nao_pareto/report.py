@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
-from compare.analysis.units import listed
+from compare.analysis.units import join_words
 from compare.papers.nao.nao_claims import FAILS, HOLDS
 from compare.papers.nao_pareto.nao_pareto_claims import NEAR, claims
 from compare.papers.nao_pareto.nao_pareto_figures import all_figures
@@ -13,13 +13,13 @@ from compare.papers.nao_pareto.nao_pareto_findings import EVEN_POINTS, Findings,
 from compare.papers.nao_pareto.tables import all_tables
 from compare.questions.pareto.search import REFERENCE
 from compare.report.document import Document
-from compare.report.template import document_from
+from compare.report.template import fill_template
 
 
 def document(findings: Findings) -> Document:
     """The whole report."""
     text = (resources.files("compare.papers.nao_pareto") / "nao_pareto_report.md").read_text(encoding="utf-8")
-    return document_from(text, values=_values(findings), tables=all_tables(findings), figures=all_figures(findings))
+    return fill_template(text, values=_values(findings), tables=all_tables(findings), figures=all_figures(findings))
 
 
 def _values(findings: Findings) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def _values(findings: Findings) -> dict[str, Any]:
     effort, verdicts = findings.effort, [claim.verdict for claim in claims(findings)]
     return {
         "runs": effort.runs,
-        "budgets": listed(f"{budget:,}" for budget in effort.budgets),
+        "budgets": join_words(f"{budget:,}" for budget in effort.budgets),
         "largest": f"{effort.budgets[-1]:,}",
         "points": effort.points,
         "samples": effort.intervals + 1,

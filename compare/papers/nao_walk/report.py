@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
-from compare.analysis.units import listed
+from compare.analysis.units import join_words
 from compare.papers.nao_walk.effort import Effort
 from compare.papers.nao_walk.nao_walk_claims import claims
 from compare.papers.nao_walk.nao_walk_figures import all_figures
@@ -13,7 +13,7 @@ from compare.papers.nao_walk.nao_walk_findings import Findings
 from compare.papers.nao_walk.nao_walk_runs import FRICTIONS, KINDS, MASS_FACTORS, PUSHES_NS, SLOPES_DEG, total
 from compare.papers.nao_walk.nao_walk_sources import LIFT_M, SPEED_M_S, STEP_M, STRETCHED_M, TORSO_M, documented
 from compare.report.document import Document, Rows
-from compare.report.template import document_from
+from compare.report.template import fill_template
 from nlp_gait.simulation.drive import Drive
 
 NAMES = {
@@ -28,7 +28,7 @@ HEATS = {"paper": "paper", "sheet": "data sheet"}
 def document(findings: Findings, effort: Effort) -> Document:
     """The whole report."""
     text = (resources.files("compare.papers.nao_walk") / "nao_walk_report.md").read_text(encoding="utf-8")
-    return document_from(text, values=_values(effort), tables=all_tables(findings), figures=dict(all_figures(findings)))
+    return fill_template(text, values=_values(effort), tables=all_tables(findings), figures=dict(all_figures(findings)))
 
 
 def _values(effort: Effort) -> dict[str, Any]:
@@ -42,11 +42,11 @@ def _values(effort: Effort) -> dict[str, Any]:
         "starts": effort.starts,
         "full_error": Drive().full_error_rad,
         "walked": effort.walked,
-        "pushes": listed(f"{value:g}" for value in PUSHES_NS),
-        "slopes": listed(f"{value:g}" for value in SLOPES_DEG),
-        "frictions": listed(f"{value:g}" for value in FRICTIONS),
-        "masses": listed(f"{value:g}" for value in MASS_FACTORS),
-        "lengths": listed(f"{1000 * length:.0f}" for length in effort.steps_m),
+        "pushes": join_words(f"{value:g}" for value in PUSHES_NS),
+        "slopes": join_words(f"{value:g}" for value in SLOPES_DEG),
+        "frictions": join_words(f"{value:g}" for value in FRICTIONS),
+        "masses": join_words(f"{value:g}" for value in MASS_FACTORS),
+        "lengths": join_words(f"{1000 * length:.0f}" for length in effort.steps_m),
     }
 
 

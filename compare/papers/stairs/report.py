@@ -12,7 +12,7 @@ from compare.papers.stairs.stairs_replay import FEEDBACK, STEP_S
 from compare.papers.stairs.stairs_runs import ALGORITHMS, LOST_RAD, RULES, Effort, track_spec
 from compare.papers.stairs.stairs_tables import Findings, all_tables
 from compare.report.document import Document
-from compare.report.template import document_from
+from compare.report.template import fill_template
 from compare.study.task import IPOPT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.governing import GOVERNING_VARIABLES
@@ -38,7 +38,7 @@ def document(findings: Findings) -> Document:
         **_gains(findings),
         **_growth(findings),
     }
-    return document_from(text, values=values, tables=all_tables(findings), figures=all_figures(findings))
+    return fill_template(text, values=values, tables=all_tables(findings), figures=all_figures(findings))
 
 
 def _settings(effort: Effort) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import legend_below, new_figure, style
+from compare.drawing.figures import add_legend_below, new_figure, style
 from compare.papers.paper_runs import point
 from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
 from compare.papers.stairs.stairs_paper import TABLE_4
@@ -85,7 +85,7 @@ def _segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tupl
         axes.plot(*place[part].T, label=name)
     axes.set_ylabel("z [m]")
     axes.set_title(f"Fig. 3: swing ankle, case {DRAWN_CASE}")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure
 
 
@@ -126,7 +126,7 @@ def _ankle(arrays: Mapping[str, Array]) -> Figure:
         axes.set_ylabel(unit)
     figure.axes[0].set_title(f"Figs. 10, 11: swing ankle, case {DRAWN_CASE}")
     figure.axes[1].set_xlabel("time [s]")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure
 
 
@@ -143,7 +143,7 @@ def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
             axes.plot(*getattr(swing, name).T, label=name)
         axes.set_title(f"case {case}: {step[1] * 100:.1f} cm on {tread * 100:.1f} cm")
     figure.axes[0].set_ylabel("z [m]")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure
 
 
@@ -154,7 +154,7 @@ def _pose_times(network: Mapping[str, Any], case: int) -> Figure:
         label = f"{rule}: {found['converged']} of {found['poses']} poses"
         axes.plot(np.array(found["time_s"]) * 1e3, label=label, linewidth=0.9)
     axes.set(xlabel="pose", ylabel="time [ms]", yscale="log", title=f"Fig. 13: training time of each pose, case {case}")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure
 
 
@@ -171,7 +171,7 @@ def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str)
     for axes in panels[-3:]:
         axes.set_xlabel("time [s]")
         axes.tick_params(labelbottom=True)  # also where the panel below is empty
-    legend_below(figure)
+    add_legend_below(figure)
     figure.suptitle("solid: rolled out, dotted: desired", fontsize=8)
     return figure
 
@@ -189,7 +189,7 @@ def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mappin
         )
         axes.axvline(lift, color=line.get_color(), linewidth=0.6, linestyle=":")
     axes.set(xlabel="time [s]", ylabel="ZMP ahead of the stance ankle [m]", title="Fig. 28: ZMP of the rollout")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure
 
 
@@ -203,5 +203,5 @@ def _torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
             axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)
         axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
     figure.axes[0].set_ylabel("torque on the link [N m]")
-    legend_below(figure)
+    add_legend_below(figure)
     return figure

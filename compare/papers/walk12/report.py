@@ -26,7 +26,7 @@ from compare.papers.walk12.walk12_runs import (
 )
 from compare.papers.walk12.walk12_tables import SAME_OPTIMUM, Findings, all_tables, dense, f_of_runs
 from compare.report.document import Document
-from compare.report.template import document_from
+from compare.report.template import fill_template
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
@@ -50,7 +50,7 @@ def document(findings: Findings, effort: Effort) -> Document:
         **_tradeoff(findings),
         **_errata(findings),
     }
-    return document_from(text, values=values, tables=all_tables(findings), figures=all_figures(findings))
+    return fill_template(text, values=values, tables=all_tables(findings), figures=all_figures(findings))
 
 
 def _settings() -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.drawing.figures import COLOURS, legend_below, new_figure, style
+from compare.drawing.figures import COLOURS, add_legend_below, new_figure, style
 from compare.questions.answer import Answer, all_digits, table_of
 from compare.questions.motions.study import Motion, limit
 from compare.questions.motions.tasks import COARSE_KIND, FREED, PLANNED, SMOOTHED
@@ -135,7 +135,7 @@ def power_figure(found: Sequence[Motion]) -> Drawing:
         axes.set_xlabel("coefficients beyond the paper's cubics")
         axes.set_ylabel("least mean power [W]")
         axes.set_ylim(bottom=0.0)
-        legend_below(figure)
+        add_legend_below(figure)
     return figure
 
 
@@ -162,7 +162,7 @@ def path_figure(found: Sequence[Motion]) -> Drawing:
         names = [("hip x [mm]", "hip y [mm]"), ("hip x [mm]", "hip height [mm]"), ("foot x [mm]", "foot height [mm]")]
         for axes, (along, up) in zip(panels, names, strict=False):
             axes.set(xlabel=along, ylabel=up)
-        legend_below(figure)
+        add_legend_below(figure)
     return figure
 
 

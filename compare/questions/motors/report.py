@@ -8,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.drawing.figures import legend_below, new_figure, style
+from compare.drawing.figures import add_legend_below, new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
 from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.motors.study import Variant
@@ -91,7 +91,7 @@ def motors_figure(found: Sequence[Variant], problem: GaitProblem) -> Drawing:
         left.invert_yaxis()
         left.grid(visible=False, axis="y")
         left.set_xlabel(axis_label("power", "W"))
-        legend_below(figure)
+        add_legend_below(figure)
         shares = np.array([(np.array(list(v.x.values())) - problem.lower) / problem.scale for v in found])
         image = right.imshow(shares, aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0)
         units = units_of(problem)

@@ -85,7 +85,7 @@ def _agreement(price: Price) -> str:
 def _numbers(stem: str, found: Prices) -> Table:
     """All quantities; slopes are those of the objective and of x* for each unit of the quantity."""
     header = [
-        *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
+        *("kind", "quantity", "unit", "value", "slope", "choose_natural_step", "change_per_step", "resolved_slope"),
         *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in found.x)),
     ]
     rows: list[list[Value]] = [

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, natural_step
+from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, choose_natural_step
 from compare.questions.other_robot import is_mass, present_value, with_robot
 from compare.questions.prices.price import STANDS, Price, Prices, price_from
 from compare.study.store import Store
@@ -152,7 +152,7 @@ def _parameter_prices(found: Optimum) -> list[Price]:
             if (sides[problem.variable_index(stem)] > 0) != (end == "upper"):
                 continue
             name = stem
-        prices.append(_price(problem, derivatives, i, name, q.unit, value, natural_step(q, value)))
+        prices.append(_price(problem, derivatives, i, name, q.unit, value, choose_natural_step(q, value)))
     return prices
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import millimetres
-from compare.drawing.figures import legend_below, new_figure, style
+from compare.drawing.figures import add_legend_below, new_figure, style
 from compare.questions.answer import Answer, all_digits, optima_table, table_of
 from compare.questions.other_robot import is_mass
 from compare.questions.robust.family import Worst
@@ -118,7 +118,7 @@ def robust_figure(found: Sequence[Robust], runs: Sequence[Played]) -> Drawing:
         left.set_xlim(left=0.8 * nominal)
         left.set_xlabel("power [W], axis cut off")
         left.set_title("uncertain")
-        legend_below(figure)
+        add_legend_below(figure)
         for axes in others:
             for gait, colour, marker in (("nominal", NOMINAL, "s"), ("robust", ROBUST, "o")):
                 own = [run for run in runs if run.gait == gait]

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.engine import agreement
+from compare.analysis.simulated_gaits import compute_agreement
 from compare.analysis.units import millimetres, with_unit
 from compare.drawing.figures import new_figure, style
 from compare.drawing.labels import axis_label, name_in_words, units_of
@@ -70,7 +70,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait], rivals: Sequence[Rival
     costs = Figure(
         name=f"{problem.name}-cost",
         caption="Cost of transport, step and times; crosses where no feasible cycle was found.",
-        drawing=cost_figure(gaits, problem),
+        drawing=plot_by_cost(gaits, problem),
     )
     parts: list[Part] = [
         cheapest_cycles,
@@ -119,12 +119,12 @@ def _walks(name: str, gaits: Sequence[Gait]) -> list[Part]:
         "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".4f"),
     }
     steps = walks[0][1].steps
-    agreed = agreement(
+    agreed = compute_agreement(
         [walk.model_J_per_m for _, walk, _ in walks], [walk.engine_J_per_planned_m for _, walk, _ in walks]
     )
     return [
         table_of(f"Energy of {steps} steps in the physics engine, for each planned metre", walks, energies),
-        agreed.sentence(),
+        agreed.describe(),
         table_of(f"Course of the {steps} steps", walks, courses),
     ]
 
@@ -164,7 +164,7 @@ def _numbers(stem: str, gaits: Sequence[Gait]) -> Table:
     return all_digits(stem, header, rows)
 
 
-def cost_figure(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
+def plot_by_cost(gaits: Sequence[Gait], problem: GaitProblem) -> Drawing:
     """Cost of transport, step length and times along the axis; infeasible points as crosses at the bottom."""
     (name,) = gaits[0].found.at
     good = [gait for gait in gaits if gait.found.feasible]

@@ -30,7 +30,7 @@ def problem_named(name: str) -> GaitProblem:
 
 
 @functools.cache
-def objective_of(name: str, lanes: int | None = None) -> CompiledObjective:
+def read_objective(name: str, lanes: int | None = None) -> CompiledObjective:
     return compile_objective(problem_named(name), require_compiler=True, lanes=lanes, threads=1)
 
 
@@ -55,7 +55,7 @@ def expected(name: str) -> tuple[Array, Array, Array]:
 @pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_agrees_with_the_virtual_machine(name: str, lanes: int) -> None:
-    objective, X = objective_of(name, lanes), candidates(problem_named(name))
+    objective, X = read_objective(name, lanes), candidates(problem_named(name))
     cost, violation, g = expected(name)
     f, total = objective(X)
     rows = objective.constraints(X)
@@ -69,7 +69,7 @@ def test_agrees_with_the_virtual_machine(name: str, lanes: int) -> None:
 @pytest.mark.parametrize("lanes", LANES)
 def test_batch_size_and_threads_change_no_bit(lanes: int) -> None:
     problem = problem_named("nao-ssp")
-    objective, X = objective_of("nao-ssp", lanes), candidates(problem, 203)
+    objective, X = read_objective("nao-ssp", lanes), candidates(problem, 203)
     f, violation = objective(X)
     for size in (1, 3, 8, 50):
         parts = [objective(X[i : i + size]) for i in range(0, len(X), size)]
@@ -80,7 +80,7 @@ def test_batch_size_and_threads_change_no_bit(lanes: int) -> None:
 def test_threads_change_no_bit() -> None:
     problem = problem_named("nao-ssp")
     X = candidates(problem, 5001)
-    f, violation = objective_of("nao-ssp")(X)
+    f, violation = read_objective("nao-ssp")(X)
     several = compile_objective(problem, threads=3)
     for _ in range(3):  # the first call has no measured time yet and uses one thread
         shared = several(X)
@@ -90,7 +90,7 @@ def test_threads_change_no_bit() -> None:
 
 def test_takes_any_memory_and_leaves_it_as_it_was() -> None:
     problem = problem_named("nao-ssp")
-    objective, X = objective_of("nao-ssp"), candidates(problem, 21)
+    objective, X = read_objective("nao-ssp"), candidates(problem, 21)
     f, violation = objective(X)
     raw = np.zeros(X.nbytes + 1, dtype=np.uint8)
     misaligned = raw[1:].view(np.float64).reshape(X.shape)
@@ -111,14 +111,17 @@ def test_takes_any_memory_and_leaves_it_as_it_was() -> None:
 
 
 def test_an_empty_batch_gives_empty_results() -> None:
-    f, violation = objective_of("nao-ssp")(np.empty((0, 9)))
+    f, violation = read_objective("nao-ssp")(np.empty((0, 9)))
     assert f.shape == violation.shape == (0,)
-    assert objective_of("nao-ssp").constraints(np.empty((0, 9))).shape == (0, len(objective_of("nao-ssp").row_names))
+    assert read_objective("nao-ssp").constraints(np.empty((0, 9))).shape == (
+        0,
+        len(read_objective("nao-ssp").row_names),
+    )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_row_that_is_not_finite_fails_alone(bad: float) -> None:
-    objective, X = objective_of("nao-ssp"), candidates(problem_named("nao-ssp"), 20)
+    objective, X = read_objective("nao-ssp"), candidates(problem_named("nao-ssp"), 20)
     f, violation = objective(X)
     X[7, 3] = bad
     got_f, got_violation = objective(X)
@@ -131,12 +134,12 @@ def test_a_row_that_is_not_finite_fails_alone(bad: float) -> None:
 @pytest.mark.parametrize("X", [np.zeros(9), np.zeros((2, 8)), np.zeros((1, 2, 9))])
 def test_says_which_shape_it_wants(X: Array) -> None:
     with pytest.raises(InputError, match="one candidate a row and 9 columns .*hip_height_m.*got shape"):
-        objective_of("nao-ssp")(X)
+        read_objective("nao-ssp")(X)
 
 
 def test_refuses_what_is_not_numbers() -> None:
     with pytest.raises(InputError, match="must be numbers, got list"):
-        objective_of("nao-ssp")([["high"] * 9])  # type: ignore[arg-type]
+        read_objective("nao-ssp")([["high"] * 9])  # type: ignore[arg-type]
 
 
 def test_refuses_impossible_settings() -> None:
@@ -148,7 +151,7 @@ def test_refuses_impossible_settings() -> None:
 
 def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_named("nao-ssp")
-    before = objective_of("nao-ssp")
+    before = read_objective("nao-ssp")
     X = candidates(problem, 40)
     f, violation = before(X)
     monkeypatch.setattr("nlp_gait.backends.kernel.native_kernel.load_library", None)  # would raise if it were called
@@ -183,7 +186,7 @@ def test_interpreted_gives_the_same(monkeypatch: pytest.MonkeyPatch, caplog: pyt
     problem = problem_named("nao-ssp")
     X = candidates(problem, 70)
     X[3, 0] = np.nan
-    compiled = objective_of("nao-ssp")
+    compiled = read_objective("nao-ssp")
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("CXX", "")
     monkeypatch.setenv("CC", "")
@@ -225,7 +228,7 @@ def test_the_tracked_step_is_the_same_on_every_lane_count(lanes: int) -> None:
     """There a rounding error decides steps of the quantised controller: with vector functions 5 % of candidates differ."""
     assert problem_named("stairs-track").hints.amplifies_rounding
     X = candidates(problem_named("stairs-track"), 240)
-    one, several = objective_of("stairs-track", 1), objective_of("stairs-track", lanes)
+    one, several = read_objective("stairs-track", 1), read_objective("stairs-track", lanes)
     assert all(np.array_equal(a, b) for a, b in zip(one(X), several(X), strict=True))
     assert np.array_equal(one.constraints(X), several.constraints(X), equal_nan=True)
 
@@ -245,7 +248,7 @@ def test_the_tracked_step_is_the_same_on_every_lane_count(lanes: int) -> None:
     ids=["complex", "masked", "text", "true", "date", "none", "text object", "true among numbers"],
 )
 def test_what_numpy_would_make_numbers_of_in_silence_is_refused(given: Any) -> None:
-    problem, objective = problem_named("nao-ssp"), objective_of("nao-ssp")
+    problem, objective = problem_named("nao-ssp"), read_objective("nao-ssp")
     for refuse in (
         lambda: objective(given),
         lambda: objective.constraints(given),
@@ -258,7 +261,7 @@ def test_what_numpy_would_make_numbers_of_in_silence_is_refused(given: Any) -> N
 
 
 def test_numbers_of_every_kind_that_mean_one_are_taken() -> None:
-    objective, X = objective_of("nao-ssp"), candidates(problem_named("nao-ssp"), 4)
+    objective, X = read_objective("nao-ssp"), candidates(problem_named("nao-ssp"), 4)
     unmasked = np.ma.masked_array(X, mask=np.zeros(X.shape))
     exact = [[Fraction(value) for value in row] for row in X.tolist()]
     for given in (unmasked, exact, X.astype(np.longdouble), X.astype(object)):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import mannwhitneyu
 
-from compare.analysis.statistics.rank_sum_normal import rank_sum_normal
+from compare.analysis.statistics.inference import rank_sum_normal
 
 SAMPLES = st.lists(st.integers(0, 6), min_size=1, max_size=14)
 

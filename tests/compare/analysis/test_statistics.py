@@ -10,19 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from compare.analysis.statistics.distribution import ECDF_TARGETS, band, ecdf, performance_profile
-from compare.analysis.statistics.intervals import bootstrap_interval
-from compare.analysis.statistics.rank_sum_normal import rank_sum_normal
+from compare.analysis.statistics.distribution import ECDF_TARGETS, compute_band, ecdf, performance_profile
+from compare.analysis.statistics.inference import a12, bootstrap_interval, holm, rank_sum, rank_sum_normal, signed_rank
 from compare.analysis.statistics.run_length import (
     TARGETS,
     Curve,
     Weighting,
-    best_known,
-    curve,
     expected_running_time,
+    find_best_known,
+    make_curve,
     relative_gap,
 )
-from compare.analysis.statistics.tests import a12, holm, rank_sum, signed_rank
 from nlp_gait.formulation import Objective
 from tests.compare.records import record
 
@@ -54,19 +52,19 @@ def test_gap_is_relative_to_the_reference_and_positive_if_worse() -> None:
 
 
 def test_curve_of_a_search_and_of_a_gradient_method() -> None:
-    found = curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
+    found = make_curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
     assert found.gap.tolist() == pytest.approx([math.inf, 0.1, 0.0])
-    assert (found.reached(0.1), found.reached(0.05), found.reached(-1.0)) == (20.0, 30.0, math.inf)
-    assert found.reached(0.05, "seconds") == pytest.approx(0.3)
+    assert (found.cost_to_reach(0.1), found.cost_to_reach(0.05), found.cost_to_reach(-1.0)) == (20.0, 30.0, math.inf)
+    assert found.cost_to_reach(0.05, "seconds") == pytest.approx(0.3)
     # 2 variables: 4 + 3 * 3 + 2 * 6 = 25, all spent by the end.
     calls = {"f": 4, "gradient": 3, "hessian": 2}
-    ended = curve(record("ipopt", 0, [(4, 10.0)], evaluations=calls), POWER, 10.0, Weighting())
-    assert ended.evaluations.tolist() == [25.0] and ended.reached(0.0) == 25.0
+    ended = make_curve(record("ipopt", 0, [(4, 10.0)], evaluations=calls), POWER, 10.0, Weighting())
+    assert ended.evaluations.tolist() == [25.0] and ended.cost_to_reach(0.0) == 25.0
 
 
-def test_what_the_judge_refuses_has_reached_nothing() -> None:
-    refused = curve(record("pso", 0, [(10, 9.0)], feasible=False), POWER, 10.0, Weighting())
-    assert refused.reached(1.0) == math.inf
+def test_an_infeasible_run_reaches_no_target() -> None:
+    refused = make_curve(record("pso", 0, [(10, 9.0)], feasible=False), POWER, 10.0, Weighting())
+    assert refused.cost_to_reach(1.0) == math.inf
 
 
 def test_ecdf_counts_unsolved_pairs() -> None:
@@ -84,7 +82,7 @@ def test_performance_profile() -> None:
 def test_band_keeps_the_last_gap_of_a_run_that_has_ended() -> None:
     costs = [np.array([1.0, 3.0]), np.array([2.0])]
     gaps = [np.array([0.5, 0.1]), np.array([0.2])]
-    low, middle, high = band(costs, gaps, np.array([0.5, 1.0, 2.0, 3.0]))
+    low, middle, high = compute_band(costs, gaps, np.array([0.5, 1.0, 2.0, 3.0]))
     assert low.tolist() == [np.inf, 0.5, 0.2, 0.1]
     assert middle.tolist() == [np.inf, 0.5, 0.2, 0.1]
     assert high.tolist() == [np.inf, np.inf, 0.5, 0.2]
@@ -174,34 +172,36 @@ def test_best_known_is_the_best_that_the_judge_accepts() -> None:
     records = [
         record("pso", run, [(10, value)], feasible=run != 2) for run, value in enumerate((12.0, 11.0, 9.0, 13.0))
     ]
-    assert best_known(records, POWER) == 11.0
-    assert best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
-    assert math.isnan(best_known(records[2:3], POWER)) and math.isnan(best_known([], POWER))
+    assert find_best_known(records, POWER) == 11.0
+    assert find_best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
+    assert math.isnan(find_best_known(records[2:3], POWER)) and math.isnan(find_best_known([], POWER))
 
 
 def test_total_cost_of_a_run() -> None:
-    found = curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
-    assert (found.total(), found.total("seconds")) == (30.0, pytest.approx(0.3))
+    found = make_curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
+    assert (found.total_cost(), found.total_cost("seconds")) == (30.0, pytest.approx(0.3))
     nothing = np.empty(0)
     failed = Curve(evaluations=nothing, seconds=nothing, gap=nothing)
-    assert (failed.total(), failed.total("seconds"), failed.reached(1.0)) == (0.0, 0.0, math.inf)
+    assert (failed.total_cost(), failed.total_cost("seconds"), failed.cost_to_reach(1.0)) == (0.0, 0.0, math.inf)
     assert found.evaluations.dtype == found.gap.dtype == found.seconds.dtype == float
 
 
 def test_a_history_of_nothing_feasible_is_a_curve_without_a_gap() -> None:
-    empty = curve(record("pso", 0, [(10, None), (20, None)]), POWER, 10.0, Weighting())
+    empty = make_curve(record("pso", 0, [(10, None), (20, None)]), POWER, 10.0, Weighting())
     assert np.isposinf(empty.gap).all()
 
 
 def test_statistics_are_frozen_and_take_keywords_only() -> None:
-    found = curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())
+    found = make_curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())
     test = rank_sum_normal([1.0], [2.0])
     for value, name in ((Weighting(), "f"), (found, "gap"), (test, "z")):
         with pytest.raises(FrozenInstanceError):
             setattr(value, name, 0.0)
         with pytest.raises(TypeError):
             type(value)(*(getattr(value, field.name) for field in fields(value)))
-    assert found != curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())  # by identity: arrays have no truth
+    assert found != make_curve(
+        record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting()
+    )  # by identity: arrays have no truth
     assert not hasattr(test, "__dict__")
 
 
@@ -209,7 +209,7 @@ def test_unequal_lengths_are_refused() -> None:
     with pytest.raises(ValueError, match="zip"):
         expected_running_time([1.0, 2.0], [1.0])
     with pytest.raises(ValueError, match="zip"):
-        band([np.array([1.0])], [np.array([1.0])] * 2, np.array([1.0]))
+        compute_band([np.array([1.0])], [np.array([1.0])] * 2, np.array([1.0]))
 
 
 def test_the_share_of_no_pairs_is_empty() -> None:
@@ -228,7 +228,7 @@ def test_performance_profile_takes_whole_numbers_and_each_instance_has_its_own_c
 def test_band_of_four_and_five_runs_takes_the_lower_middle() -> None:
     for count, middle in ((4, 2.0), (5, 3.0), (6, 3.0)):
         gaps = [np.array([float(run)]) for run in range(1, count + 1)]
-        assert band([np.array([1.0])] * count, gaps, np.array([1.0]))[1].tolist() == [middle]
+        assert compute_band([np.array([1.0])] * count, gaps, np.array([1.0]))[1].tolist() == [middle]
 
 
 def test_a_run_without_a_feasible_point_is_worse_than_any_difference() -> None:

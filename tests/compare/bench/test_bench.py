@@ -50,7 +50,7 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
         np.testing.assert_allclose(new.costs, old.costs, rtol=1e-12)
         for target in (1.0, *TARGETS):
             assert new.expected_cost(target) == old.expected_cost(target)
-        assert [c.total() for c in new.curves] == [c.total() for c in old.curves]
+        assert [c.total_cost() for c in new.curves] == [c.total_cost() for c in old.curves]
     with pytest.raises(InputError, match="does not belong"):
         pack("ssp-v5", runs, tmp_path)
     with pytest.raises(InputError, match="differ in their settings"):

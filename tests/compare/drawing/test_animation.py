@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 import nlp_gait
-from compare.drawing.animation import contact_sheet, frames
-from compare.drawing.skeletons import skeleton_of
+from compare.drawing.animation import draw_frames, write_contact_sheet
+from compare.drawing.skeletons import make_skeleton
 from nlp_gait.formulation import Result, problem_names
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
@@ -16,7 +16,7 @@ WALK = (0.13, 0.1135, 0.02, 0.0204)
 def drawn(name, x=None, frames_per_s=2.5, **options):
     problem = nlp_gait.load(name, **options)
     point = problem.start_point(np.random.default_rng(0)) if x is None else problem.check_x(x)
-    return skeleton_of(Result(problem=problem, x=point), frames_per_s)
+    return make_skeleton(Result(problem=problem, x=point), frames_per_s)
 
 
 @pytest.fixture(scope="module")
@@ -76,11 +76,11 @@ def test_stairs_are_drawn_under_the_feet():
 
 @pytest.mark.slow
 def test_frames_differ_and_a_sheet_is_written(nao, tmp_path):
-    made = frames(nao)
+    made = draw_frames(nao)
     first, second = next(made), next(made)
     assert first.shape == second.shape and first.dtype == np.uint8
     assert (first != second).any() and first.min() < 100
     sheet = tmp_path / "sheet.png"
-    contact_sheet(nao, sheet, poses=2)
+    write_contact_sheet(nao, sheet, poses=2)
     with Image.open(sheet) as image:
         assert min(image.size) > 300

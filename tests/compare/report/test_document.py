@@ -8,7 +8,7 @@ import pytest
 
 from compare.drawing.figures import new_figure
 from compare.report.document import Document, Figure, Prose, Section, Table
-from compare.report.template import document_from
+from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 
 TEXT = """
@@ -43,7 +43,7 @@ POWERS = Table(
 
 
 def made() -> Document:
-    return document_from(
+    return fill_template(
         TEXT,
         values={"count": 3, "low": 0.125, "third": "feasible"},
         tables={"powers": POWERS.rows},
@@ -65,7 +65,7 @@ def test_a_text_with_places_becomes_a_document() -> None:
 
 def test_a_value_that_is_not_there_is_an_error() -> None:
     with pytest.raises(KeyError, match="power"):
-        document_from("# Title\n\n{power:.2f}", values={}, tables={}, figures={})
+        fill_template("# Title\n\n{power:.2f}", values={}, tables={}, figures={})
 
 
 def test_pages_are_rounded_for_people_and_files_are_not(tmp_path: Path) -> None:

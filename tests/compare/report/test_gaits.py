@@ -9,7 +9,7 @@ import pytest
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.drawing.gait_figure import CURVES
 from compare.report.document import Figure
-from compare.report.gait_section import gaits_part
+from compare.report.gait_section import make_gaits_part
 from tests.compare.records import DSP_X, record, study
 
 
@@ -22,7 +22,7 @@ def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
 
 @pytest.mark.slow
 def test_best_gait_of_each_solver_is_drawn() -> None:
-    part = gaits_part(comparison("nao-dsp", DSP_X, "pso", "ga"))
+    part = make_gaits_part(comparison("nao-dsp", DSP_X, "pso", "ga"))
     assert isinstance(part, Figure) and part.name == "dsp-gaits"
     axes = part.drawing.axes
     assert {axis.get_title() for axis in axes} >= {"pso", "ga"}
@@ -38,9 +38,9 @@ def test_best_gait_of_each_solver_is_drawn() -> None:
 )
 def test_what_cannot_be_drawn_is_said(name: str, x: dict[str, float], why: str) -> None:
     """Code that a record names is not run for it."""
-    part = gaits_part(comparison(name, x, "pso"))
+    part = make_gaits_part(comparison(name, x, "pso"))
     assert isinstance(part, str) and part.startswith("The gaits are not drawn: ") and why in part
 
 
 def test_a_problem_that_nobody_knows_is_no_reason_to_fail() -> None:
-    assert "unknown problem 'walk'" in str(gaits_part(compare_problems(study())[0]))
+    assert "unknown problem 'walk'" in str(make_gaits_part(compare_problems(study())[0]))

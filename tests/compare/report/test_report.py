@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from compare.analysis.comparison import compare_problems
+from compare.analysis.solver_table import summarise
 from compare.analysis.statistics.run_length import Weighting
-from compare.analysis.table import summarise
 from compare.report import rebuild_report, write_report
 from compare.study.manifest import Manifest, Session
 from compare.study.study import RECORDS

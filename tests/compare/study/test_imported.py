@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.editions import told_apart
-from compare.analysis.table import cells, summarise
+from compare.analysis.editions import label_editions
+from compare.analysis.solver_table import format_cells, summarise
 from compare.judge import evaluate
 from compare.report import rebuild_report
 from compare.study.imported import imported, imported_records, read_points
@@ -78,7 +78,7 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     assert {record.algorithm for record in again} == {"pso", "GA (MATLAB)"}
     (comparison,) = compare_problems(again)
     (ga,) = [s for s in summarise(comparison) if s.algorithm == "GA (MATLAB)"]
-    row = cells(ga, comparison)
+    row = format_cells(ga, comparison)
     assert row[-1] == "-" and row[2] == "-" and "nan" not in " ".join(row)
     assert all(math.isnan(seconds) for seconds in ga.expected_s) and ga.evaluations == 5000
     files = rebuild_report(tmp_path, as_csv=True)
@@ -137,7 +137,7 @@ def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
     from dataclasses import replace
 
     run_study(Study(tasks=replace(study, runs=1, stop=Stop(evaluations=300)).tasks(), folder=tmp_path))
-    labels = [(r.problem, r.algorithm, r.run) for r in told_apart(read_records(tmp_path))]
+    labels = [(r.problem, r.algorithm, r.run) for r in label_editions(read_records(tmp_path))]
     earlier = "pso (evaluations 200)"
     assert sorted(labels) == [("walk12", "pso", 0), ("walk12", earlier, 0), ("walk12", earlier, 1)]
 

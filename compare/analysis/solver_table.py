@@ -1,4 +1,4 @@
-"""The table of solvers: what they claim, what the judge finds, what it cost."""
+"""The table of solvers: claims, verdicts of the judge, costs."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from dataclasses import dataclass
 from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.intervals import bootstrap_interval
+from compare.analysis.statistics.inference import bootstrap_interval
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import seconds, with_unit
 
-ROUNDING = 1e-12  # a share below this is none
+ROUNDING = 1e-12  # a share below this is shown as zero
 HEADER = (
     "solver",
     "runs",
-    "claim success",
-    "judged feasible",
+    "claimed",
+    "feasible",
     "guaranteed",
-    "best claim",
+    "best claimed",
     "best",
     "median",
     "worst",
     "median gap",
     "evaluations",
-    "time a run",
+    "time per run",
 )
 
 
@@ -35,11 +35,11 @@ class SolverSummary:
 
     Attributes:
         algorithm: name of the solver.
-        runs: how many.
-        claimed: how many claim success; None for results from elsewhere that claim nothing.
-        feasible: how many end feasible, by the judge, on the problem's own samples.
-        dense_feasible: how many are feasible between the samples too; None without a dense grid.
-        guaranteed: how many are proven to keep all limits at all times; None where that was not asked or cannot be.
+        runs: their number.
+        claimed: number whose solver claims a feasible result; None for imported results without claims.
+        feasible: number that the judge finds feasible at the problem's samples.
+        dense_feasible: number also feasible between the samples; None without a dense grid.
+        guaranteed: number proven to satisfy all limits at all times; None where that was not requested or is impossible.
         best_claim: best objective that a run claims to be feasible.
         best: best objective that the judge finds feasible; likewise ``median`` and ``worst`` over the feasible runs.
         median_interval: 95 % bootstrap interval of the median.
@@ -73,7 +73,7 @@ class SolverSummary:
 
 
 def summarise(comparison: Comparison) -> list[SolverSummary]:
-    """One summary for each solver."""
+    """Return one summary per solver."""
     return [_summary(comparison, solver) for solver in comparison.solvers]
 
 
@@ -97,7 +97,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         worst=comparison.value(costs[-1]) if costs else None,
         median_interval=(interval[0], interval[1]) if interval else None,
         gap=comparison.gap(median(costs)) if costs else None,
-        evaluations=median(c.total() for c in solver.curves),
+        evaluations=median(c.total_cost() for c in solver.curves),
         time_s=_if_known(median, [r.time_s.solve for r in records]),
         build_s=_if_known(max, [r.time_s.build for r in records]),
         compile_s=_if_known(max, [r.time_s.compile for r in records]),
@@ -106,8 +106,8 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     )
 
 
-def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
-    """One row of text under ``HEADER``."""
+def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
+    """Return one row of text under ``HEADER``."""
     values = (summary.best_claim, summary.best, summary.median, summary.worst)
     return (
         summary.algorithm,
@@ -123,12 +123,12 @@ def cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, ...]:
 
 
 def _if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
-    """A statistic of numbers; NaN if one is not known."""
+    """Return a statistic of numbers; NaN if one is NaN."""
     return math.nan if any(math.isnan(value) for value in values) else statistic(values)
 
 
 def percent(share: float | None) -> str:
-    """Share in percent, to four decimals or in scientific notation below."""
+    """Format a share in percent, with four decimals or in scientific notation."""
     if share is None or not math.isfinite(share):
         return "-"
     if abs(share) < ROUNDING:
@@ -137,5 +137,5 @@ def percent(share: float | None) -> str:
 
 
 def count(number: float) -> str:
-    """Number of evaluations; a dash if it is infinite."""
+    """Format a number of evaluations; a dash if it is infinite."""
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"

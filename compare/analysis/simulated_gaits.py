@@ -1,4 +1,4 @@
-"""Does the physics engine rank gaits as the model does? Ranks, correlation and errors of gaits that were played."""
+"""Agreement of model and physics engine on the energies of gaits: ranks, correlation and errors."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from compare.study.record import RunRecord
 from nlp_gait.simulation.drive import Drive
 
 HEADER = ("solver", "model", "engine", "error", "rank", "engine's", "fate")
-DIGITS = "#.4g"  # of energies; ranks are those of the printed numbers, for the engine resolves no finer differences
-FEWEST = 3  # gaits that a rank correlation can be said of
+DIGITS = "#.4g"  # of energies; ranks use the printed numbers, as the engine resolves no finer differences
+FEWEST = 3  # gaits for a rank correlation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """How far the engine confirms the model, over the gaits that stayed up.
+    """Agreement of model and engine over the gaits that did not fall.
 
     Attributes:
-        gaits: how many were played.
-        fallen: how many of them fell.
-        spearman: rank correlation; None for fewer than three gaits, or if one of the two does not tell them apart.
+        gaits: number simulated.
+        fallen: number that fell.
+        spearman: rank correlation; None for fewer than three gaits, or if all values of one are equal.
         mean_error: mean of |engine / model - 1|; None if all fell.
         largest_error: of these.
-        spread: the model's largest energy over its least, minus 1; None if all fell.
-        error_spread: largest less least signed error: gaits that the model sets less apart than this have no sure order.
+        spread: the model's largest energy divided by its smallest, minus 1; None if all fell.
+        error_spread: largest minus smallest signed error; gaits closer than this in the model have no certain order.
     """
 
     gaits: int
@@ -39,39 +39,39 @@ class Agreement:
     spread: float | None
     error_spread: float | None
 
-    def sentence(self) -> str:
-        """For people."""
+    def describe(self) -> str:
+        """Return the agreement as sentences."""
         upright = self.gaits - self.fallen
         fate = (
             "none fell"
             if not self.fallen
             else f"{self.fallen} fell and {'has' if self.fallen == 1 else 'have'} no rank"
         )
-        said = f"{self.gaits} gait{'s were' if self.gaits != 1 else ' was'} played, {fate}."
+        text = f"{self.gaits} gait{'s were' if self.gaits != 1 else ' was'} simulated, {fate}."
         if self.mean_error is not None and self.largest_error is not None:
-            said += f" Error of the model: {100 * self.mean_error:.2f} % in the mean, {100 * self.largest_error:.2f} % at most."
+            text += (
+                f" Error of the model: {100 * self.mean_error:.2f} % mean, {100 * self.largest_error:.2f} % at most."
+            )
         if self.spearman is None or self.spread is None or self.error_spread is None:
             reason = f"with fewer than {FEWEST} gaits" if upright < FEWEST else "where all gaits are equal"
-            return f"{said} A rank correlation says nothing {reason}."
-        said += f" Spearman correlation of the ranks: {self.spearman:.3f} over {upright} gaits"
-        apart = (
-            f"that the model sets {100 * self.spread:.2f} % apart, with errors {100 * self.error_spread:.2f} % apart"
-        )
-        doubt = "; their order is not sure" if self.spread < self.error_spread else ""
-        return f"{said} {apart}{doubt}."
+            return f"{text} There is no rank correlation {reason}."
+        text += f" Spearman correlation of the ranks: {self.spearman:.3f} over {upright} gaits;"
+        apart = f"energies spread by {100 * self.spread:.2f} % in the model, errors by {100 * self.error_spread:.2f} %"
+        doubt = "; their order is not certain" if self.spread < self.error_spread else ""
+        return f"{text} {apart}{doubt}."
 
 
-def agreement(model: Sequence[float], engine: Sequence[float | None]) -> Agreement:
-    """From energies or powers of the same gaits by both, None after a fall."""
+def compute_agreement(model: Sequence[float], engine: Sequence[float | None]) -> Agreement:
+    """Compare energies or powers of the same gaits; None after a fall."""
     pairs = [(m, e) for m, e in zip(model, engine, strict=True) if e is not None]
     signed = [e / m - 1.0 for m, e in pairs]
     errors = [abs(error) for error in signed]
-    ranked = [([printed(m) for m, _ in pairs]), ([printed(e) for _, e in pairs])]
-    told_apart = len(pairs) >= FEWEST and all(len(set(values)) > 1 for values in ranked)
+    ranked = [([round_as_printed(m) for m, _ in pairs]), ([round_as_printed(e) for _, e in pairs])]
+    comparable = len(pairs) >= FEWEST and all(len(set(values)) > 1 for values in ranked)
     return Agreement(
         gaits=len(model),
         fallen=len(model) - len(pairs),
-        spearman=_spearman(*ranked) if told_apart else None,
+        spearman=_spearman(*ranked) if comparable else None,
         mean_error=sum(errors) / len(errors) if errors else None,
         largest_error=max(errors, default=None),
         spread=max(m for m, _ in pairs) / min(m for m, _ in pairs) - 1.0 if pairs else None,
@@ -79,8 +79,8 @@ def agreement(model: Sequence[float], engine: Sequence[float | None]) -> Agreeme
     )
 
 
-def printed(value: float) -> float:
-    """A number as it is printed."""
+def round_as_printed(value: float) -> float:
+    """Round a number to its printed digits."""
     return float(format(value, DIGITS))
 
 
@@ -91,23 +91,23 @@ def _spearman(a: Sequence[float], b: Sequence[float]) -> float:
     return float(spearmanr(a, b).statistic)
 
 
-def best_gaits(records: Sequence[RunRecord]) -> list[RunRecord]:
-    """Every solver's best feasible run on every problem."""
+def select_best_gaits(records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Return every solver's best feasible run on every problem."""
     return [
         solver.best for problem in compare_problems(records) for solver in problem.solvers if solver.best is not None
     ]
 
 
-def by_problem(plays: Sequence[Played]) -> dict[str, list[Played]]:
-    """Gaits of each problem."""
+def group_by_problem(plays: Sequence[Played]) -> dict[str, list[Played]]:
+    """Group gaits by problem."""
     return {name: [p for p in plays if p.problem == name] for name in dict.fromkeys(p.problem for p in plays)}
 
 
-def engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
-    """Rows of text under ``HEADER`` for gaits of one problem, the model's best first."""
+def make_engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
+    """Return rows of text under ``HEADER`` for gaits of one problem, the model's best first."""
     ordered = sorted(plays, key=lambda played: (played.model, played.algorithm))
-    model = [printed(played.model) for played in ordered]
-    engine = [math.inf if played.engine is None else printed(played.engine) for played in ordered]
+    model = [round_as_printed(played.model) for played in ordered]
+    engine = [math.inf if played.engine is None else round_as_printed(played.engine) for played in ordered]
     return [
         (
             played.algorithm,
@@ -122,8 +122,8 @@ def engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
     ]
 
 
-def drive_in_words(drive: Drive) -> str:
-    """For example ``linear set-points every 10 ms, nothing fed forward``."""
+def describe_drive(drive: Drive) -> str:
+    """Describe a drive, for example ``linear set-points every 10 ms, nothing fed forward``."""
     fed = {
         "torque": "velocity and torque fed forward",
         "velocity": "velocity fed forward",
@@ -132,9 +132,9 @@ def drive_in_words(drive: Drive) -> str:
     return f"{drive.interpolation} set-points every {1e3 * drive.period_s:g} ms, {fed[drive.feed_forward]}"
 
 
-def agreement_of(plays: Sequence[Played]) -> Agreement:
-    """How far the engine confirms the model on gaits of one problem."""
-    return agreement([played.model for played in plays], [played.engine for played in plays])
+def measure_agreement(plays: Sequence[Played]) -> Agreement:
+    """Return the agreement of model and engine on gaits of one problem."""
+    return compute_agreement([played.model for played in plays], [played.engine for played in plays])
 
 
 def _rank(values: Sequence[float], i: int) -> str:

@@ -1,4 +1,4 @@
-"""Picture of a simulation: centre of pressure, power and load against the plan."""
+"""Figure of a simulation: centre of pressure, power and loads compared with the plan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ENGINE, MODEL = "#56B4E9", "#000000"
 SIDE_COLOURS = dict(zip(SIDES, ("#0072B2", "#D55E00"), strict=True))
 
 
-def plot_playback(plan: Plan, trace: Trace, drive: Drive, stem: Path) -> tuple[Path, Path]:
+def plot_simulation(plan: Plan, trace: Trace, drive: Drive, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``.svg``; raises OutputError."""
     planned, shown = plan.signals.arrays, slice(None, None, EVERY)
     t = trace.t[shown]
