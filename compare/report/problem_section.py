@@ -57,8 +57,8 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
         title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
             "Claimed is what the solvers report. Everything else is what the judge finds with the exact functions at "
-            "the reported point and the problem's samples. Gaps are relative to the best feasible value of these runs; evaluations "
-            "are equivalent ones.",
+            "the reported point and the problem's samples. Gaps are relative to the best feasible value of these runs; "
+            "evaluations are equivalent ones.",
             text_table(HEADER, [format_cells(s, comparison) for s in summaries], "Solvers, best median first"),
             *(() if gaits is None else (gaits,)),
             *figures,
