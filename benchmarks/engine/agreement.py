@@ -145,7 +145,7 @@ def ranking() -> Iterator[str]:
             )
 
 
-def published() -> Iterator[str]:
+def load_published() -> Iterator[str]:
     """Optima and the paper's gaits: model and engine, in watts."""
     yield header(
         "gait", "model W", "engine W", "held drive W", "net W, model", "CoP mm", "middle", "slip mm", "landing mm"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args, get_origin, get_type_hints
 
 from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
-from compare.analysis.published import published
+from compare.analysis.published import load_published
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gaits, prepare_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
@@ -259,7 +259,7 @@ def _source(problem: GaitProblem) -> str:
 
 
 def _published(problem: GaitProblem) -> str:
-    entry = published().get(problem.name)
+    entry = load_published().get(problem.name)
     return "" if entry is None else literal(entry["note"])
 
 
