@@ -38,7 +38,7 @@ DOORS = {
     "compare.study.imported": ("imported",),
     "compare.study.rows": ("frame_of",),
     "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
-    "compare.analysis.solver_table": ("SolverSummary", "cells", "summarise", "HEADER"),
+    "compare.analysis.solver_table": ("SolverSummary", "format_cells", "summarise", "HEADER"),
     "compare.report": (),
     "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "text_table"),
     "compare.report.writing": ("markdown_page", "write_document"),
