@@ -51,7 +51,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/gaits/biped/cart_table/preview_control.py": ("tests/gaits/nao/test_cart_table.py",),
     "nlp_gait/gaits/biped/cart_table/walker.py": ("tests/gaits/nao/test_cart_table.py",),
     "nlp_gait/symbolic/general_leg.py": ("tests/symbolic/test_general_leg.py",),
-    "nlp_gait/backends/kernel/affine.py": ("tests/backends/kernel/test_affine.py",),
+    "nlp_gait/proofs/affine.py": ("tests/proofs/test_affine.py",),
     "nlp_gait/backends/over_time": ("tests/backends/over_time/test_guarantee.py",),
     "nlp_gait/backends/derivatives/plan.py": ("tests/backends/derivatives/test_compiled_nlp.py",),
     "nlp_gait/backends/solvers/working_set.py": ("tests/backends/solvers/test_working_set.py",),

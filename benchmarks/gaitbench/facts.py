@@ -21,7 +21,6 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.analysis.proven import CERTIFICATES
 from compare.bench.baseline import baseline_records, shipped
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
@@ -31,7 +30,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import read_certificate
+from nlp_gait.proofs.certificate import CERTIFICATES, read_certificate
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal

@@ -1,109 +1,16 @@
-"""What affine bounds of NAO's single support are worth, by the form of the dynamics: ``python -m benchmarks.guarantees.bounds``.
-
-Boxes around the best known gait, in variables in which the geometry does not depend on the time: hip height, half sums and half
-differences of w = v T at both ends, swing height, T.
-"""
+"""Affine bounds of NAO's single support by the form of the dynamics: ``python -m benchmarks.guarantees.bounds``."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from tests.gaits.nao.torque_bounds import enclose_sample
 
-import casadi as ca
-import numpy as np
-from casadi import SX
-
-import nlp_gait
-from nlp_gait.formulation import InstantPoint
-from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.gaits.biped.curves import hip_motion
-from nlp_gait.gaits.biped.single_support import swing_foot
-from nlp_gait.gaits.nao.body import (
-    GRAVITY,
-    JOINTS,
-    arm_joints,
-    nao,
-    upright_frames,
-    upright_links,
-    upright_plan,
-)
-from nlp_gait.gaits.nao.single_support import ARM_SWING, stance_of
-from nlp_gait.proofs.affine import AffineFunction
-from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
-from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.trajectories import Motion, cubic_of_sums, resting_point, stack
-from nlp_gait.symbolic.world_frame import world_frame_dynamics
-
-STEP_M, PHASE, REACH_MARGIN = 0.06, 0.3, 0.01
 EDGES = (4, 5, 6)
-
-
-class Errors(NamedTuple):
-    """What affine forms leave open: the largest error of a torque [Nm] and of the ZMP [m]; operations of one sample."""
-
-    torque_Nm: float
-    zmp_m: float
-    operations: int
-
-
-def errors(edge: float) -> tuple[Errors, Errors]:
-    """Of the recursion and of the world frame, over a box with this part of every range."""
-    problem, x = nlp_gait.load("nao-ssp"), np.array(load_facts()["ssp-v5"].best_x)
-    time, ranges = x[-1], problem.upper - problem.lower
-    halves = np.array([[0.5, 0.5], [0.5, -0.5]])
-    middle = np.concatenate([x[:1], *(time * halves @ x[k : k + 2] for k in (1, 3, 5)), x[7:]])
-    width = np.concatenate([ranges[:1], problem.upper[-1] * ranges[1:7], ranges[7:]]) * edge / 2
-    box = np.stack([middle - width, middle + width], -1)[None]
-    found = []
-    for in_world in (False, True):
-        function = _sample(in_world, problem.names)
-        forms = AffineFunction(function)(box, np.arange(len(x)))
-        error, n = forms.error[0], len(JOINTS)
-        found.append(Errors(float(error[:n].max()), float(error[n:].max()), function.n_instructions()))
-    return found[0], found[1]
-
-
-def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
-    """Torques and ZMP at one instant."""
-    robot = nao("nao-v5", rotational_inertia=True)
-    stance, foot, tree = stance_of(robot, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
-    z = SX.sym("z", len(names))
-    time, phase = z[-1], SX(PHASE)
-    sums = [part / time for k in (1, 3, 5) for part in (z[k] + z[k + 1], z[k] - z[k + 1])]
-    at = InstantPoint.of(ca.vertcat(z[0], *sums, z[-2], time), SX(0, 1), names, ())
-    if in_world:  # without the quotients, which cancel
-        ends = ((z[0], z[0]), stance.hip_x, stance.hip_y)
-        parts = [
-            _timed(cubic_of_sums(*end, z[k], z[k + 1], phase), time) for end, k in zip(ends, (1, 3, 5), strict=True)
-        ]
-        hip = stack(parts[1], parts[2], parts[0])
-    else:
-        hip = hip_motion(at, stance.hip_x, stance.hip_y, time, phase)
-    path = (SX(end) for end in stance.swing_x)
-    swing = swing_foot(*path, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], time, phase)
-    ankles = {"L": resting_point((*stance.support_xy, foot.ankle_height_m)), "R": swing}
-    arms = arm_joints(ARM_SWING, time, phase)
-    if in_world:
-        frames = upright_frames(robot, hip, ankles, arms, 1 - REACH_MARGIN)
-        torques, wrench = world_frame_dynamics(tree, frames, {}, GRAVITY)
-    else:
-        joints = upright_plan(robot, hip, ankles, arms, SX(REACH_MARGIN), Exact()).joints
-        q, qd, qdd = ({name: joint[order] for name, joint in joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright_links(robot))
-    zmp = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
-    return ca.Function("sample", [z], [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS), zmp))])
-
-
-def _timed(motion: Motion, time: SX) -> Motion:
-    """A motion of unit time in another time."""
-    return Motion(motion.position, motion.velocity / time, motion.acceleration / time**2)
 
 
 def main() -> None:
     """Print a table."""
     for edge in EDGES:
-        for name, found in zip(("recursion", "world frame"), errors(2.0**-edge), strict=True):
+        for name, found in zip(("recursion", "world frame"), enclose_sample(2.0**-edge), strict=True):
             print(
                 f"edge 2^-{edge}, {name}: error of a torque {found.torque_Nm:.3g} Nm, of the ZMP {1000 * found.zmp_m:.3g} mm; "
                 f"{found.operations:,} operations"

@@ -19,25 +19,12 @@ from nlp_gait.files import write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.definitions import get_definition, names
 from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import certificate_file
-from nlp_gait.proofs.power_form import has_power_form
+from nlp_gait.proofs.certificate import make_certificate_file
+from tests.proofs.soundness import narrow_around
 
 REPORT_S = 30.0
-
-
-def within(problem: GaitProblem, lower: Array, upper: Array) -> GaitProblem:
-    """A problem with other bounds of its variables."""
-    named = (("lower", lower), ("upper", upper))
-    return problem.with_values(
-        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
-    )
-
-
-def around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
-    """A problem with bounds that are this part of the ranges around a point, and nowhere wider."""
-    half = part * (problem.upper - problem.lower) / 2
-    return within(problem, np.maximum(problem.lower, x - half), np.minimum(problem.upper, x + half))
 
 
 def instance_problem(id: str) -> tuple[GaitProblem, Array]:
@@ -56,7 +43,7 @@ def prove(out: Path, id: str, tolerance: float, hours: float, part: float | None
         print(f"{stem} is there")
         return
     problem, x = instance_problem(id)
-    problem, told = problem if part is None else around(problem, x, part), time.perf_counter()
+    problem, told = problem if part is None else narrow_around(problem, x, part), time.perf_counter()
 
     def progress(note: str) -> None:
         nonlocal told
@@ -67,7 +54,7 @@ def prove(out: Path, id: str, tolerance: float, hours: float, part: float | None
     kept = out / f".{stem}.open.npz"
     found = certify(problem, x, tolerance=tolerance, time_limit_s=3600.0 * hours, progress=progress, checkpoint=kept)
     if found.closed:
-        write_json(out / f"{stem}.json", certificate_file(problem, found).to_json())
+        write_json(out / f"{stem}.json", make_certificate_file(problem, found).to_json())
         kept.unlink()
     print(
         f"{stem}: f {found.objective:.7g}, proven {found.bound:.7g}, {found.boxes:,} boxes, {found.left:,} left, "

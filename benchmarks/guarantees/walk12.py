@@ -15,7 +15,7 @@ import nlp_gait
 from compare.papers.walk12.walk12_paper import TABLE_3
 from nlp_gait.files import write_json
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import certificate_file
+from nlp_gait.proofs.certificate import make_certificate_file
 
 TOLERANCES = (0.01, 0.001)
 STARTS = 20
@@ -35,7 +35,7 @@ def main() -> None:
             best = nlp_gait.solve(problem, starts=STARTS)
             x = np.array(list(best.x.values()))
             found = certify(problem, x, tolerance=tolerance, time_limit_s=LIMIT_S, checkpoint=out / f".{name}.open.npz")
-            write_json(out / f"{name}.json", certificate_file(problem, found).to_json())
+            write_json(out / f"{name}.json", make_certificate_file(problem, found).to_json())
             (out / f".{name}.open.npz").unlink()
             print(
                 f"{name}: f {found.objective:.7g}, proven {found.bound:.7g}, {found.boxes:,} boxes, {found.cpu_s:.1f} s of CPU, "

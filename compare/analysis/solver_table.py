@@ -82,7 +82,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     claims = [sign * r.objective for r in records if r.success and r.objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
     unsaid = all("imported" in r.definition and r.objective is None for r in records)
-    asked = [g.holds for r in records if (g := r.verdict.guaranteed) is not None and not g.reason]
+    proven = [g.satisfied for r in records if (g := r.verdict.guaranteed) is not None and not g.reason]
     dense = [r.verdict.dense_feasible for r in records]
     return SolverSummary(
         algorithm=solver.name,
@@ -90,7 +90,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         claimed=None if unsaid else sum(r.success for r in records),
         feasible=len(costs),
         dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
-        guaranteed=sum(holds is True for holds in asked) if asked else None,
+        guaranteed=sum(each is True for each in proven) if proven else None,
         best_claim=sign * min(claims) if claims else None,
         best=comparison.value(costs[0]) if costs else None,
         median=comparison.value(median(costs)) if costs else None,

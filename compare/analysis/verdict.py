@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.proven import proven_of
 from compare.analysis.significance import compare_pairs
 from compare.analysis.solver_table import count, percent
 from compare.analysis.units import join_words, with_unit
+from nlp_gait.proofs.certificate import proven_bound
 
 # A run with at most this gap has found the best known value.
 FOUND = 1e-6
@@ -36,7 +37,7 @@ def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
 def _found(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
-    best, words = with_unit(comparison.reference, comparison.objective.unit), proven_of(comparison)
+    best, words = with_unit(comparison.reference, comparison.objective.unit), describe_proof(comparison)
     text = f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {join_words(finders) or 'one run'}"
     return text + (f", and {words}" if words else "")
 
@@ -63,3 +64,20 @@ def _cost(comparison: Comparison) -> str:
     ]
     text = f"on {comparison.problem} {join_words(parts) or 'no solver'}"
     return text + (f", never by {join_words(never)}" if never else "")
+
+
+def describe_proof(comparison: Comparison) -> str:
+    """Describe the proven bound of a comparison's problem, see ``describe_bound``."""
+    holder = comparison.reference_holder
+    if holder is None:
+        return ""
+    return describe_bound(holder.definition["problem"], comparison.reference, comparison.objective.unit)
+
+
+def describe_bound(problem: Mapping[str, Any], best: float, unit: str) -> str:
+    """Describe the shipped bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``; empty without one."""
+    bound = proven_bound(problem)
+    if bound is None:
+        return ""
+    gap = 100 * abs(bound - best) / abs(best)
+    return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"

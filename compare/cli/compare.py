@@ -178,8 +178,8 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Table of solvers for each problem, under its name unless another title is given."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.failures import find_failures
-    from compare.analysis.proven import proven_of
     from compare.analysis.solver_table import HEADER, format_cells, summarise
+    from compare.analysis.verdict import describe_proof
 
     for comparison in compare_problems(records):
         rows = [format_cells(summary, comparison) for summary in summarise(comparison)]
@@ -193,7 +193,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
-        if words := proven_of(comparison):
+        if words := describe_proof(comparison):
             stdout.print(f"{comparison.problem}: {words}", soft_wrap=True)
     stdout.print(HOW_TO_READ)
 

@@ -198,7 +198,7 @@ def _write(path: Path, judged: Sequence[Evaluation]) -> None:
             e.violation,
             e.feasible,
             "" if e.dense is None else not e.dense_violations,
-            "" if e.guaranteed is None or e.guaranteed.holds is None else e.guaranteed.holds,
+            "" if e.guaranteed is None or e.guaranteed.satisfied is None else e.guaranteed.satisfied,
             *(e.indexes[index] for index in indexes),
         ]
         for e in judged

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from compare.analysis.proven import proven_bound, proven_words
 from compare.analysis.units import with_unit
+from compare.analysis.verdict import describe_bound
 from compare.cli.command import command
 from compare.cli.common import (
     end_interrupted,
@@ -26,6 +26,7 @@ from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
 from nlp_gait.backends.identity import problem_part
 from nlp_gait.formulation.solution import Solution
+from nlp_gait.proofs.certificate import proven_bound
 
 
 @command
@@ -91,7 +92,7 @@ def solve(
             _print(solution)
             if proven is not None:
                 stdout.print(f"Guaranteed: {proven}", soft_wrap=True)
-                if words := proven_words(definition, solution.objective, solution.objective_unit):
+                if words := describe_bound(definition, solution.objective, solution.objective_unit):
                     stdout.print(f"Optimum: {words}", soft_wrap=True)
             if target is not None and target.exists():
                 print_written(target)

@@ -211,7 +211,7 @@ def _between(comparison: Comparison) -> Section | None:
 def _proven(record: RunRecord) -> str:
     """Return what is violated between the samples, or not proven to be satisfied."""
     found = record.verdict.guaranteed
-    return "-" if found is None or found.holds or found.reason else str(found)
+    return "-" if found is None or found.satisfied or found.reason else str(found)
 
 
 def _p(value: float) -> str:

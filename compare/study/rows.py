@@ -32,7 +32,7 @@ def row_of(record: RunRecord) -> list[object]:
 def judged(record: RunRecord) -> list[object]:
     """What the judge finds of a run, under ``JUDGED``."""
     verdict = record.verdict
-    proven = None if verdict.guaranteed is None else verdict.guaranteed.holds
+    proven = None if verdict.guaranteed is None else verdict.guaranteed.satisfied
     return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible, proven]
 
 

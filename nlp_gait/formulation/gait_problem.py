@@ -25,6 +25,7 @@ from nlp_gait.formulation.motion.grid import Grid
 from nlp_gait.formulation.motion.signals import Array, Signals
 from nlp_gait.formulation.numbers import is_number, real_numbers
 from nlp_gait.formulation.origin import Origin, pickled
+from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 P = ParamSpec("P")
@@ -94,6 +95,7 @@ class GaitProblem:
         refine: makes the same problem with a number of times as many samples; None if there is no finer grid.
         grid: samples, or None if the problem has none.
         rows_over_time: the motion's rows as functions of time, one entry per phase; empty if they are defined on samples only.
+        power_form: makes the problem's least-power form for proofs; None if it has none.
         display: what shows its gaits.
         hints: for solvers.
         loaded_as: argument of ``load``, if that is not the name: user code.
@@ -110,6 +112,7 @@ class GaitProblem:
     refine: Callable[[int], GaitProblem] | None = None
     grid: Grid | None = None
     rows_over_time: tuple[RowsOverTime, ...] = ()
+    power_form: Callable[[GaitProblem], PowerForm] | None = None
     display: Display = Display()
     hints: SolverHints = SolverHints()
     loaded_as: str = ""
@@ -268,6 +271,7 @@ class GaitProblem:
             assemble=assemble,
             refine=None if self.refine is None else refine,
             rows_over_time=self.rows_over_time if change is None and not variables else (),
+            power_form=self.power_form if change is None and not variables else None,
             display=replace(self.display, motion=None if motion is None else lambda at: motion(at.only(self.names))),
             hints=replace(self.hints, start=start if self.hints.start is not None or variables else None),
             loaded_as="" if name else self.loaded_as,

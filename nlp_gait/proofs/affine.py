@@ -1,19 +1,20 @@
-"""A function over boxes in affine arithmetic, outward rounded: a fixed library interprets its instructions, nothing is compiled.
+"""Functions over boxes in affine arithmetic, rounded outward, by a C++ interpreter of their instructions.
 
-A value over a box is an affine form, the sum of a middle, a slope along every edge and an error, and a range; both hold. What
-values have in common is kept by the slopes, so bounds are far narrower than those of intervals (``native/affine.hpp``).
+A value over a box is an affine form (the sum of a middle, a slope along every edge and an error) and a range; both enclose it.
+Slopes keep what values have in common, so that bounds are far narrower than those of intervals (``native/affine.hpp``).
 
 Source:
-    Stolfi, de Figueiredo (1997), Self-Validated Numerical Methods and Applications, chapter 3; rounding errors are added to the
+    Stolfi, de Figueiredo (1997), Self-Validated Numerical Methods and Applications, chapter 3. Rounding errors are added to the
     error explicitly, with the bounds of Rump (2010), Verification methods, section 2, and four units for functions of libm.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -26,24 +27,18 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.symbolic.tape import read_tape
 
-SYMBOLS = ("nlp_gait_affine", "nlp_gait_affine_doubles")
-_INTEGER, _LONG, _POINTER = ctypes.c_int, ctypes.c_longlong, ctypes.c_void_p
+INT, LONG, DOUBLE, POINTER = ctypes.c_int, ctypes.c_longlong, ctypes.c_double, ctypes.c_void_p
 
-# Operations that are enclosed; of the numbers that CasADi gives them, all are below 46.
-UNARY = tuple(
-    getattr(ca, f"OP_{name}")
-    for name in (
-        "ASSIGN NEG EXP LOG SQRT SQ TWICE SIN COS TAN ASIN ACOS ATAN NOT FLOOR CEIL FABS SIGN INV SINH COSH TANH".split()
-    )
-)
-BINARY = tuple(
-    getattr(ca, f"OP_{name}")
-    for name in "ADD SUB MUL DIV POW CONSTPOW LT LE EQ NE AND OR FMOD COPYSIGN IF_ELSE_ZERO FMIN FMAX ATAN2".split()
-)
+# Operations with an enclosure; their numbers are those of CasADi, all below 46.
+_UNARY = "ASSIGN NEG EXP LOG SQRT SQ TWICE SIN COS TAN ASIN ACOS ATAN NOT FLOOR CEIL FABS SIGN INV SINH COSH TANH"
+_BINARY = "ADD SUB MUL DIV POW CONSTPOW LT LE EQ NE AND OR FMOD COPYSIGN IF_ELSE_ZERO FMIN FMAX ATAN2"
+UNARY, BINARY = (tuple(getattr(ca, f"OP_{name}") for name in names.split()) for names in (_UNARY, _BINARY))
 HALF_OPEN_LE, HALF_OPEN_LT = 200, 201
+NATIVE = Path(str(files("nlp_gait.proofs") / "native"))
+AFFINE_SOURCES = ("intervals.hpp", "affine.hpp")
 
 
-class Forms(NamedTuple):
+class AffineForms(NamedTuple):
     """Affine forms of M outputs over P boxes, along n symbols in [-1, 1].
 
     Attributes:
@@ -62,20 +57,20 @@ class Forms(NamedTuple):
 
 
 class AffineFunction:
-    """A CasADi function over boxes; safe to call from several threads at once.
+    """CasADi function over boxes; calls are thread-safe.
 
     Attributes:
-        inputs: number of its scalar inputs, all arguments one after the other.
-        outputs: likewise.
+        inputs: number of scalar inputs, over all arguments.
+        outputs: number of scalar outputs, over all results.
     """
 
     def __init__(self, function: ca.Function, half_open: Collection[int] = ()) -> None:
         """Read the function's instructions.
 
         Args:
-            function: with dense arguments and results; of MX expressions it is expanded.
-            half_open: scalar inputs whose boxes lie below their upper ends. Where a formula changes at such an end (a
-                spline's knot), a box has one formula on either side.
+            function: with dense arguments and results; a function of MX expressions is expanded.
+            half_open: scalar inputs whose boxes exclude their upper ends. Where a formula changes at such an end (a spline's
+                knot), a box has one formula on either side.
 
         Raises:
             InputError: an operation that cannot be enclosed.
@@ -87,13 +82,13 @@ class AffineFunction:
         self._code, self._constants = _encode(scalar, half_open)
         self._slots = max(int(self._code[:, 1:].max(initial=0)), scalar.sz_w()) + 1
 
-    def __call__(self, boxes: Array, symbols: Array) -> Forms:
-        """Forms over boxes.
+    def __call__(self, boxes: Array, symbols: Array) -> AffineForms:
+        """Return the forms of all outputs over boxes.
 
         Args:
             boxes: (P, inputs, 2) lower and upper ends.
-            symbols: (inputs,) number of the symbol along which an input varies, -1 for one that varies along none: then its
-                width is an error. Two inputs with one symbol vary together, each from its lower to its upper end.
+            symbols: (inputs,) number of the symbol along which an input varies; -1 for none, which makes its width an error.
+                Two inputs with one symbol vary together, each from its lower to its upper end.
         """
         boxes = np.require(boxes, dtype=np.float64, requirements=("C", "A"))
         symbols = np.require(symbols, dtype=np.int32, requirements=("C", "A"))
@@ -104,35 +99,41 @@ class AffineFunction:
         n = int(symbols.max(initial=-1)) + 1
         result = np.empty((len(boxes), self.outputs, n + 4))
         memory = np.empty(self._library.nlp_gait_affine_doubles(self._slots, n))
-        pointers = [array.ctypes.data for array in (self._code, self._constants)]
-        self._library.nlp_gait_affine(
-            *pointers,
-            len(self._code),
-            n,
-            self.inputs,
-            symbols.ctypes.data,
-            len(boxes),
-            boxes.ctypes.data,
-            self.outputs,
-            result.ctypes.data,
-            memory.ctypes.data,
+        code, constants, given, used, out, work = (
+            array.ctypes.data for array in (self._code, self._constants, boxes, symbols, result, memory)
         )
-        return Forms(result[..., 0], result[..., 1 : 1 + n], result[..., 1 + n], result[..., 2 + n], result[..., 3 + n])
+        self._library.nlp_gait_affine(
+            *(code, constants, len(self._code), n, self.inputs, used, len(boxes), given, self.outputs, out, work)
+        )
+        return AffineForms(
+            result[..., 0], result[..., 1 : 1 + n], result[..., 1 + n], result[..., 2 + n], result[..., 3 + n]
+        )
+
+
+def load_native(sources: Sequence[str], functions: Mapping[str, tuple[Any, Sequence[Any]]], *flags: str) -> ctypes.CDLL:
+    """Compile files of ``native/`` to one library, or load it from the cache.
+
+    Args:
+        sources: names of the files, in their order.
+        functions: types of the result and the arguments of each function, by name without prefix.
+        flags: more flags of the compiler.
+
+    Raises:
+        CompilerError: there is no compiler, or it fails.
+    """
+    text = "\n".join((NATIVE / name).read_text(encoding="utf-8") for name in sources)
+    names = [f"nlp_gait_{name}" for name in functions]
+    library, _ = load_library(text, find_compiler(), (*BASE_FLAGS, *lane_flags(native_lanes()), *flags), names)
+    for name, (result, arguments) in zip(names, functions.values(), strict=True):
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
 
 
 @cache
 def _library() -> ctypes.CDLL:
-    native = files("nlp_gait.proofs") / "native"
-    source = "\n".join((native / name).read_text(encoding="utf-8") for name in ("intervals.hpp", "affine.hpp"))
-    flags = (*BASE_FLAGS, *lane_flags(native_lanes()))
-    library, _ = load_library(source, find_compiler(), flags, SYMBOLS)
-    library.nlp_gait_affine_doubles.argtypes = [_INTEGER, _INTEGER]
-    library.nlp_gait_affine_doubles.restype = _LONG
-    library.nlp_gait_affine.argtypes = [
-        *(_POINTER, _POINTER, _LONG, _INTEGER, _INTEGER, _POINTER, _LONG, _POINTER, _INTEGER, _POINTER, _POINTER)
-    ]
-    library.nlp_gait_affine.restype = None
-    return library
+    arguments = (POINTER, POINTER, LONG, INT, INT, POINTER, LONG, POINTER, INT, POINTER, POINTER)
+    return load_native(AFFINE_SOURCES, {"affine": (None, arguments), "affine_doubles": (LONG, (INT, INT))})
 
 
 def _encode(function: ca.Function, half_open: Collection[int]) -> tuple[Any, Array]:

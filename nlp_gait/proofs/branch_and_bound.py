@@ -1,9 +1,9 @@
-"""Branch and bound with rigorous bounds: how good any feasible x can be.
+"""Branch and bound with rigorous bounds: a limit on the objective of every feasible x.
 
-A box is dropped when bounds of its rows show that no point in it is feasible, or of its cost that none betters the
-incumbent by more than the tolerance; the slabs of it in which that is so are cut off. The rest is halved, the box with the best
-bound first. What happens to a box depends on the box alone, so that any path from the whole to a dropped box can be followed
-again (``certificate.py``).
+A box is dropped if bounds of its rows prove that it contains no feasible point, or bounds of its cost that no point in it is
+better than the incumbent by more than the tolerance; slabs of which this is true are cut off. The rest is halved, the box with
+the best bound first. The result of a box depends on that box alone, so that ``certificate.py`` can follow any path from the root
+to a dropped box.
 
 Source:
     Hansen, Walster (2004), Global Optimization Using Interval Analysis; Moore, Kearfott, Cloud (2009), chapter 6.
@@ -27,26 +27,26 @@ from nlp_gait.files import new_file
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.proofs.bounds import Bounds, bounds_of
-from nlp_gait.proofs.boxes import Numbers, halves
+from nlp_gait.proofs.bounds import Bounds, make_bounds
+from nlp_gait.proofs.boxes import Numbers, halve
 
-# Boxes that are halved together: so many, or this share of all that are open, so that keeping order costs little.
+# Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.
 BATCH, SHARE = 1024, 8
 CHECKPOINT_S = 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """What is proven about the best possible objective.
+    """Proven bound on the objective.
 
     Attributes:
         objective: exact value of the incumbent, in the problem's sense.
-        bound: no x within the variables' bounds that the judge calls feasible has a better objective than this; not finite
-            where the time limit came before any such bound.
-        tolerance: requested distance of bound and objective, relative.
-        closed: that distance was reached.
-        boxes: number that were enclosed.
-        left: number of boxes neither dropped nor split at the end.
+        bound: no x within the variables' bounds that the judge finds feasible has a better objective; not finite if the time
+            limit came before any bound.
+        tolerance: requested relative distance of bound and objective.
+        closed: whether that distance was reached.
+        boxes: number of boxes that were enclosed.
+        left: number of boxes neither dropped nor halved at the end.
         time_s: wall time [s].
         cpu_s: processor time [s].
         x: the incumbent.
@@ -64,23 +64,13 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """Distance of bound and objective, relative to the objective."""
+        """Relative distance of bound and objective."""
         return abs(self.bound - self.objective) / abs(self.objective)
 
 
 @dataclass(kw_only=True)
 class _Tree:
-    """Boxes that are still open, and what was done.
-
-    Attributes:
-        boxes: (P, n, 2).
-        lowest: (P,) bound of the cost in each.
-        cut: (P,) variable to cut next.
-        depth: (P,) number of cuts that led there.
-        enclosed: boxes so far.
-        time_s: wall time so far [s].
-        cpu_s: processor time so far [s].
-    """
+    """Open boxes (P, n, 2), each with a lower bound of its cost, the next cut and its depth; and the work so far."""
 
     boxes: Array
     lowest: Array
@@ -90,8 +80,8 @@ class _Tree:
     time_s: float = 0.0
     cpu_s: float = 0.0
 
-    def share_left(self) -> float:
-        """Share of the tree that is open, if every half of a box were as much work as the other."""
+    def estimate_share_left(self) -> float:
+        """Return the open share of the tree, as if both halves of a box were equal work."""
         return float(np.exp2(-self.depth.astype(float)).sum())
 
 
@@ -104,20 +94,19 @@ def certify(
     progress: Progress = ignore_progress,
     checkpoint: Path | None = None,
 ) -> Certificate:
-    """Bound on the optimum within the variables' bounds.
+    """Prove a bound on the optimum within the variables' bounds.
 
     Args:
-        problem: with few variables: the work grows exponentially with their number.
-        incumbent: (n,) feasible point, the best known.
+        problem: with few variables, because the work grows exponentially with their number.
+        incumbent: (n,) the best known feasible point.
         tolerance: relative distance of bound and objective at which to stop.
-        time_limit_s: wall time after which the bound reached so far is returned [s].
-        progress: told the boxes enclosed, the bound in the problem's sense and the share of the tree that is left.
-        checkpoint: file that keeps what is open, every half minute and at the end, so that a run goes on where it was killed;
-            one of another problem, incumbent or tolerance is refused.
+        time_limit_s: wall time after which the bound so far is returned [s].
+        progress: receives the number of boxes, the bound in the problem's sense, and the share of the tree that is left.
+        checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it.
 
     Raises:
-        InputError: the incumbent is not feasible, the tolerance or the time limit is not positive, or the checkpoint is of
-            another proof.
+        InputError: the incumbent is not feasible, the tolerance or the time limit is not positive, or the checkpoint belongs to
+            another problem, incumbent or tolerance.
         CompilerError: there is no compiler, or it fails.
     """
     if not (tolerance > 0.0 and time_limit_s > 0.0):
@@ -127,30 +116,32 @@ def certify(
     if not at.violation <= FEASIBILITY_TOLERANCE:
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
-    bounds, target = bounds_of(problem), target_of(at.cost, tolerance)
+    bounds, target = make_bounds(problem), target_cost(at.cost, tolerance)
     identity = sha256_of(
-        {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "whole": bounds.whole.tolist()}
+        {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()}
     )
-    tree = _read(checkpoint, identity) or _root(bounds, target)
-    before = tree.time_s, tree.cpu_s
-    saved = started
+    tree = _read_checkpoint(checkpoint, identity) or _plant(bounds, target)
+    saved, deadline = started, started + time_limit_s
+    started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
 
-    def bound() -> float:
+    def compute_bound() -> float:
         return problem.objective.sign * float(tree.lowest.min(initial=target))
 
-    while len(tree.lowest) and time.perf_counter() - started < time_limit_s:
-        _advance(tree, bounds, target)
-        progress(f"{tree.enclosed} boxes, bound {bound():.6g}, {100 * tree.share_left():.2g} % of the tree left")
+    while len(tree.lowest) and time.perf_counter() < deadline:
+        _halve_best(tree, bounds, target)
+        progress(
+            f"{tree.enclosed} boxes, bound {compute_bound():.6g}, {100 * tree.estimate_share_left():.2g} % of the tree left"
+        )
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
-            _spent(tree, before, started, used)
-            _write(checkpoint, identity, tree)
             saved = time.perf_counter()
-    _spent(tree, before, started, used)
+            tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
+            _write_checkpoint(checkpoint, identity, tree)
+    tree.time_s, tree.cpu_s = time.perf_counter() - started, time.process_time() - used
     if checkpoint is not None:
-        _write(checkpoint, identity, tree)
+        _write_checkpoint(checkpoint, identity, tree)
     return Certificate(
         objective=problem.objective.sign * at.cost,
-        bound=bound(),
+        bound=compute_bound(),
         tolerance=tolerance,
         closed=not len(tree.lowest),
         boxes=tree.enclosed,
@@ -161,56 +152,48 @@ def certify(
     )
 
 
-def target_of(cost: float, tolerance: float) -> float:
-    """Cost that no feasible point may undercut."""
+def target_cost(cost: float, tolerance: float) -> float:
+    """Return the cost to prove as a lower bound."""
     return cost - tolerance * abs(cost)
 
 
-def _root(bounds: Bounds, target: float) -> _Tree:
-    boxes, lowest, cut, origin = bounds.assess(bounds.whole, target)
+def _plant(bounds: Bounds, target: float) -> _Tree:
+    boxes, lowest, cut, origin = bounds.prune(bounds.root, target)
     return _Tree(boxes=boxes, lowest=lowest, cut=cut, depth=np.zeros(len(origin)))
 
 
-def _advance(tree: _Tree, bounds: Bounds, target: float) -> None:
-    """Halve the boxes with the best bounds."""
+def _halve_best(tree: _Tree, bounds: Bounds, target: float) -> None:
     order = np.argsort(tree.lowest, kind="stable")
     batch = max(BATCH, len(order) // SHARE)
     chosen, rest = order[:batch], order[batch:]
-    new = halves(tree.boxes[chosen], tree.cut[chosen])
+    new = halve(tree.boxes[chosen], tree.cut[chosen])
     tree.enclosed += len(new)
-    found = bounds.assess(new, target)
+    found = bounds.prune(new, target)
     depth = np.tile(tree.depth[chosen] + 1, 2)[found.origin]
-    inherited = np.tile(tree.lowest[chosen], 2)[found.origin]  # a half has no less than the whole
+    inherited = np.tile(tree.lowest[chosen], 2)[found.origin]  # also a bound of each half
     tree.boxes = np.concatenate([tree.boxes[rest], found.boxes])
     tree.lowest = np.concatenate([tree.lowest[rest], np.maximum(found.lowest, inherited)])
     tree.cut = np.concatenate([tree.cut[rest], found.cut])
     tree.depth = np.concatenate([tree.depth[rest], depth])
 
 
-def _spent(tree: _Tree, before: tuple[float, float], started: float, used: float) -> None:
-    tree.time_s = before[0] + time.perf_counter() - started
-    tree.cpu_s = before[1] + time.process_time() - used
-
-
-def _write(path: Path, identity: str, tree: _Tree) -> None:
-    """Under another name, then renamed: a killed run leaves the last whole one."""
+def _write_checkpoint(path: Path, identity: str, tree: _Tree) -> None:
     parts: Mapping[str, Any] = vars(tree)
     with new_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, identity=np.array(identity), **parts)
 
 
-def _read(path: Path | None, identity: str) -> _Tree | None:
-    """What a checkpoint holds, None without one."""
+def _read_checkpoint(path: Path | None, identity: str) -> _Tree | None:
     if path is None or not path.exists():
         return None
     try:
-        with np.load(path, allow_pickle=False) as kept:
-            parts = {name: kept[name] for name in kept.files}
+        with np.load(path, allow_pickle=False) as stored:
+            parts = dict(stored)
         found = str(parts.pop("identity"))
         numbers = {name: parts.pop(name).item() for name in ("enclosed", "time_s", "cpu_s")}
         tree = _Tree(**parts, **numbers)
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(f"checkpoint {str(path)!r} is damaged: {error}; delete it to begin again") from error
+        raise InputError(f"checkpoint {str(path)!r} is damaged: {error}; delete it to start again") from error
     if found != identity:
-        raise InputError(f"checkpoint {str(path)!r} is of another proof; delete it, or name another file")
+        raise InputError(f"checkpoint {str(path)!r} belongs to another proof; delete it, or name another file")
     return tree

@@ -1,4 +1,4 @@
-"""A CasADi function as operations that have quadratic forms: each quantity once, each place used again when it is free."""
+"""Tapes for quadratic forms: the operations of a CasADi function, without duplicates, on as few places in memory as possible."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Integers = np.ndarray[Any, np.dtype[np.int32]]
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A quantity: an operation on earlier ones, told apart by what they are."""
+    """Operation on earlier quantities; equal nodes are one quantity."""
 
     code: int
     first: int = -1
@@ -31,16 +31,16 @@ class _Node:
 
 
 class _Graph:
-    """Quantities of a function, each once; numbers and conditions are kept apart."""
+    """Quantities of a function, without duplicates."""
 
     def __init__(self, function: ca.Function) -> None:
         self._name = function.name()
         self.nodes: list[_Node] = []
-        self.symbols: list[int] = []  # each depends on so many first ones
+        self.symbols: list[int] = []  # a quantity depends on this many first inputs
         self._numbers: dict[_Node, int] = {}
 
     def add(self, code: int, first: int = -1, second: int = -1, value: float = 0.0) -> int:
-        """Number of a quantity, which may be there already."""
+        """Return the number of a quantity, a new one if it does not exist."""
         node = _Node(code, first, second, value)
         if node not in self._numbers:
             self._numbers[node] = len(self.nodes)
@@ -49,8 +49,7 @@ class _Graph:
             self.symbols.append(int(value) + 1 if code == INPUT else used)
         return self._numbers[node]
 
-    def unary(self, operation: int, x: int) -> int:
-        """Of a quantity alone."""
+    def add_unary(self, operation: int, x: int) -> int:
         codes = {ca.OP_SQRT: ROOT, ca.OP_INV: INVERSE, ca.OP_FABS: ABSOLUTE}
         factors = {ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0}
         if operation == ca.OP_SQ:
@@ -58,21 +57,19 @@ class _Graph:
         if operation in factors:
             return self.add(SCALE, x, value=factors[operation])
         if operation not in codes:
-            raise self._refusal(operation)
+            raise self._refuse(operation)
         return self.add(codes[operation], x)
 
-    def binary(self, operation: int, x: int, y: int) -> int:
-        """Of two quantities."""
+    def add_binary(self, operation: int, x: int, y: int) -> int:
         if operation == ca.OP_DIV:
             return self.add(PRODUCT, x, self.add(INVERSE, y))
         if operation in (ca.OP_ADD, ca.OP_MUL):
             return self.add(SUM if operation == ca.OP_ADD else PRODUCT, min(x, y), max(x, y))
         if operation != ca.OP_SUB:
-            raise self._refusal(operation)
+            raise self._refuse(operation)
         return self.add(DIFFERENCE, x, y)
 
-    def with_number(self, operation: int, x: int, number: float, number_first: bool) -> int:
-        """Of a quantity and a number."""
+    def add_with_number(self, operation: int, x: int, number: float, number_first: bool) -> int:
         if operation == ca.OP_ADD:
             return self.add(SHIFT, x, value=number)
         if operation == ca.OP_SUB:
@@ -87,10 +84,10 @@ class _Graph:
             return self.add(SCALE, x, value=1.0 / number)
         if operation in (ca.OP_FMIN, ca.OP_FMAX):
             return self.add(BELOW if operation == ca.OP_FMIN else LARGER, x, value=number)
-        raise self._refusal(operation)
+        raise self._refuse(operation)
 
-    def numbers(self, operation: int, a: float, b: float) -> float:
-        """Of two numbers, where that is a number too."""
+    def compute(self, operation: int, a: float, b: float) -> float:
+        """Return the result for two numbers if it is exact."""
         exact = {
             ca.OP_ADD: lambda: Fraction(a) + Fraction(b),
             ca.OP_SUB: lambda: Fraction(a) - Fraction(b),
@@ -99,22 +96,24 @@ class _Graph:
         }
         value = exact[operation]() if operation in exact else None
         if value is None or Fraction(float(value)) != value:
-            raise InputError(f"function {self._name!r} works with the numbers {a} and {b} alone; simplify it first")
+            raise InputError(
+                f"function {self._name!r} combines the numbers {a} and {b}, and the result is rounded; simplify it first"
+            )
         return float(value)
 
-    def _refusal(self, operation: int) -> InputError:
-        return InputError(f"function {self._name!r}: CasADi's operation number {operation} has no quadratic form here")
+    def _refuse(self, operation: int) -> InputError:
+        return InputError(f"function {self._name!r}: CasADi's operation number {operation} has no quadratic form")
 
 
 class _Condition(NamedTuple):
-    """Whether a quantity is below a number."""
+    """A quantity is below a number."""
 
     quantity: int
     number: float
 
 
-def tape_of(function: ca.Function) -> tuple[Integers, Array]:
-    """Steps (count, 5) of operation, result, arguments and symbols, and values (count,).
+def make_tape(function: ca.Function) -> tuple[Integers, Array]:
+    """Return the steps (count, 5), as operation, result, two arguments and symbols, and the values (count,) of a function.
 
     Raises:
         InputError: an operation that cannot be enclosed.
@@ -129,37 +128,36 @@ def tape_of(function: ca.Function) -> tuple[Integers, Array]:
             results.append(graph.add(INPUT, value=float(each.place)))
         elif each.operation == ca.OP_OUTPUT:
             results += given
-            assert not isinstance(given[0], _Condition)  # conditions are outputs of no problem; for the type checker
+            assert not isinstance(given[0], _Condition)  # no problem has such an output; for the type checker
             outputs[each.place] = graph.add(NUMBER, value=given[0]) if isinstance(given[0], float) else given[0]
         else:
-            results.append(_found(graph, each.operation, given))
-    return _laid_out(graph, [outputs[k] for k in range(len(outputs))])
+            results.append(_add(graph, each.operation, given))
+    return _arrange(graph, [outputs[k] for k in range(len(outputs))])
 
 
-def _found(graph: _Graph, operation: int, given: list[int | float | _Condition]) -> int | float | _Condition:
-    """What an operation gives."""
+def _add(graph: _Graph, operation: int, given: list[int | float | _Condition]) -> int | float | _Condition:
     x, y = given[0], given[-1]
     if isinstance(x, _Condition) and operation == ca.OP_IF_ELSE_ZERO and isinstance(y, int):
         return graph.add(WHERE_BELOW, x.quantity, y, x.number)
     if isinstance(x, _Condition) or isinstance(y, _Condition):
         raise InputError("a condition can only choose between a form and zero")
     if len(given) == 1 and isinstance(x, int):
-        return graph.unary(operation, x)
+        return graph.add_unary(operation, x)
     if isinstance(x, float) and isinstance(y, float):
-        return graph.numbers(operation, x, y)
+        return graph.compute(operation, x, y)
     if isinstance(x, int) and isinstance(y, int):
-        return graph.binary(operation, x, y)
+        return graph.add_binary(operation, x, y)
     if operation == ca.OP_LE:
-        return 1.0 if isinstance(x, int) else 0.0  # only such points are of interest: see the class
+        return 1.0 if isinstance(x, int) else 0.0  # the form is for such points only, see ``QuadraticFunction``
     if operation == ca.OP_LT and isinstance(x, int):
         return _Condition(x, float(y))
     if isinstance(x, int):
-        return graph.with_number(operation, x, float(y), False)
-    return graph.with_number(operation, int(y), float(x), True)
+        return graph.add_with_number(operation, x, float(y), False)
+    return graph.add_with_number(operation, int(y), float(x), True)
 
 
-def _laid_out(graph: _Graph, outputs: list[int]) -> tuple[Integers, Array]:
-    """The graph as a tape: in its order, outputs as soon as they are known, places free again after their last use."""
+def _arrange(graph: _Graph, outputs: list[int]) -> tuple[Integers, Array]:
+    """Return the graph as a tape: outputs as soon as they are known, places free after their last use."""
     nodes, wanted = graph.nodes, dict[int, list[int]]()
     for number, quantity in enumerate(outputs):
         wanted.setdefault(quantity, []).append(number)

@@ -1,4 +1,4 @@
-"""The rows of a phase of motion as enclosed functions of time."""
+"""Rows over time of a phase as enclosed functions."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from casadi import MX
 from nlp_gait.formulation import Array, Constraint, GaitProblem, RowsOverTime
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.proofs.affine import AffineFunction
+from nlp_gait.proofs.boxes import Numbers
 from nlp_gait.symbolic.nonsmooth import Exact
-
-Integers = np.ndarray[Any, np.dtype[np.intp]]
 
 
 class Enclosed:
-    """Values as an enclosed function, and groups of them alone where that is far less work.
+    """Enclosed function of several values, and of groups of them where that is far less work.
 
     Attributes:
-        whole: all values.
-        groups: numbers of the values that belong together, one array a group.
+        whole: function of all values.
+        groups: indices of the values of each group.
     """
 
     def __init__(self, function: ca.Function, half_open: Collection[int], groups: Sequence[Sequence[int]]) -> None:
@@ -35,34 +34,34 @@ class Enclosed:
         self.whole = AffineFunction(function, half_open)
         self.groups = [np.array(group) for group in groups]
         self._function, self._half_open = function, half_open
-        self._alone: dict[int, EnclosedPart] = {}
+        self._parts: dict[int, EnclosedPart] = {}
 
     @one_at_a_time
-    def alone(self, group: int) -> EnclosedPart:
-        """A group by its number, by itself if that takes less than half of the instructions of all; read when first asked for."""
-        if group not in self._alone:
+    def part(self, group: int) -> EnclosedPart:
+        """Return a group of values: a function of its own if that takes less than half of all instructions."""
+        if group not in self._parts:
             rows, arguments = self.groups[group], self._function.sx_in()
             (values,) = self._function.call(arguments)
             part = ca.Function("part", arguments, [values[rows.tolist()]])
             share = part.n_instructions() / self._function.n_instructions()
             if share < 0.5:
-                self._alone[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
+                self._parts[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
             else:
-                self._alone[group] = EnclosedPart(self.whole, rows, 1.0)
-        return self._alone[group]
+                self._parts[group] = EnclosedPart(self.whole, rows, 1.0)
+        return self._parts[group]
 
 
 class EnclosedPart(NamedTuple):
-    """Some values.
+    """Group of values.
 
     Attributes:
-        function: that gives them, and others perhaps.
-        columns: of its results, which they are.
-        work: of an evaluation, as a share of that of all values.
+        function: computes them, and possibly others.
+        columns: indices of the group in the function's results.
+        work: of an evaluation, relative to that of all values.
     """
 
     function: AffineFunction
-    columns: Integers
+    columns: Numbers
     work: float
 
 
@@ -71,8 +70,8 @@ class TimeRows(NamedTuple):
 
     Attributes:
         names: of the values.
-        units: likewise.
-        values: enclosed; rows of every time and of one name are a group.
+        units: of the values; empty for indexes, which have no bounds.
+        values: enclosed; rows of every time with one name are a group. None if there are none.
         bounds: p to lower and upper bounds.
     """
 
@@ -82,22 +81,22 @@ class TimeRows(NamedTuple):
     bounds: ca.Function
 
     @one_at_a_time
-    def limits(self, p: Array) -> tuple[Array, Array]:
-        """Lower and upper bounds (m,) for parameter values."""
+    def bound(self, p: Array) -> tuple[Array, Array]:
+        """Return lower and upper bounds (m,) for parameter values."""
         lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(p))
         return lower, upper
 
 
 class TimeFunctions(NamedTuple):
-    """The rows over time as enclosed functions.
+    """Rows over time of one phase as enclosed functions.
 
     Attributes:
         source: the rows over time.
-        instants: rows of each instant, then the means' rows and indexes, whose bounds are those of their means.
-        plain: how many of these are rows of instants.
-        squares: numbers of means of squares, which limit a root.
+        instants: rows of each instant, followed by those values whose time means are rows or indexes.
+        plain: number of the rows of instants.
+        squares: indices of squares whose mean limits a root mean square.
         changes: rows of each interval.
-        sampled: rows that are stated on samples alone.
+        sampled: rows that are defined on samples only.
     """
 
     source: RowsOverTime
@@ -109,8 +108,8 @@ class TimeFunctions(NamedTuple):
 
 
 @one_at_a_time
-def time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
-    """Functions of one phase, read from its rows with all samples at one phase and with one an interval later.
+def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
+    """Read the functions from the rows with all samples at one phase, and with the later samples an interval later.
 
     Raises:
         InputError: an operation that cannot be enclosed.
@@ -125,11 +124,11 @@ def time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
         by_kind.setdefault(constraint.over, []).append(constraint)
     wanted = {constraint.name for constraint in by_kind.get("interval", [])}
     instants = [row for constraint in by_kind.get("instant", []) for row in _at_one_sample(constraint)]
-    means = [(name, *rest) for c in by_kind.get("mean", []) for name, *rest in _each(c)]
+    means = [(name, *rest) for c in by_kind.get("mean", []) for name, *rest in _split(c)]
     squares = [
         (name, unit, value**2, lower, upper)
         for c in by_kind.get("root-mean-square", [])
-        for name, unit, value, lower, upper in _each(c)
+        for name, unit, value, lower, upper in _split(c)
     ]
     indexes = [
         (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in source.means if name in still.indexes
@@ -146,17 +145,17 @@ def time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
     )
 
 
-def _each(constraint: Constraint) -> list[tuple[Any, ...]]:
-    """Name, unit, value and bounds of every row."""
+def _split(constraint: Constraint) -> list[tuple[Any, ...]]:
+    """Return name, unit, value and bounds of every row."""
     columns = [ca.vertsplit(column) for column in constraint.columns]
     return [(name, constraint.unit, *parts) for name, *parts in zip(constraint.row_names, *columns, strict=True)]
 
 
 def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
-    """The same at the first sample alone, without its number."""
+    """Return the same for the first sample, named without its number."""
     found: dict[str, tuple[Any, ...]] = {}
     labels = constraint.labels or ("",)
-    for label, (_, *rest) in zip(labels, _each(constraint), strict=True):
+    for label, (_, *rest) in zip(labels, _split(constraint), strict=True):
         stem = label.rpartition(",")[0]
         found.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(rest))
     return [(name, *rest) for name, rest in found.items()]
@@ -165,7 +164,7 @@ def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
 def _rows(
     plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], source: RowsOverTime
 ) -> TimeRows:
-    """Rows of every time, and others, whose means have the bounds."""
+    """Return rows of every time, and others whose means are bounded."""
     rows = [*plain, *others]
     names, units, values, lower, upper = zip(*rows, strict=True) if rows else ((),) * 5
     bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])

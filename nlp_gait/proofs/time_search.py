@@ -1,39 +1,37 @@
-"""Pieces of time, halved until every row is shown to hold over each, or enough is known of how it fails."""
+"""Search over pieces of time, halved until every row is proven to be satisfied or its violation is known well enough."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.affine import AffineFunction, Forms
-from nlp_gait.proofs.time_functions import Enclosed, Integers
-
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
+from nlp_gait.proofs.affine import AffineForms, AffineFunction
+from nlp_gait.proofs.boxes import Flags, Numbers
+from nlp_gait.proofs.time_functions import Enclosed
 
 # Phases are multiples of this, so that they and their sums are exact; an interval of a phase is rounded to one.
 GRAIN = 2.0**-40
 FIRST_PIECES = 64
 LEAST_PIECE = 2.0**-16
 COARSE = 2.0**-10
-# Work on rows of one name, in pieces over which all rows are enclosed, after which what is open stays open.
+# Limit on the work for rows of one name, in pieces over which all rows are enclosed; the rest stays open.
 MOST_PIECES = 1000
-# A violated row's bounds are sharpened until they agree to this share.
+# Relative distance of the bounds of a violation at which they are sharp enough.
 SHARPNESS = 0.02
-# Share of a mean's value within which its bounds are wanted, and pieces after which they are left as they are.
+# The same for bounds of a mean, and the largest number of pieces for it.
 MEAN_SHARPNESS = 4e-3
 MOST_MEAN_PIECES = 800
-# Widens sums of pieces by far more than they can be rounded.
+# Widens sums over pieces: far more than their rounding errors.
 ROUNDING = 1e-12
-# Stands for an unbounded end where only the other one matters.
+# Replaces an infinite end where only the other one matters.
 LARGEST = 1e300
 
 
-def first_pieces(kinks: Sequence[float], shift: float | None) -> Array:
-    """(P, 2) pieces of the phase, none of which has a kink inside, at itself or an interval later."""
+def make_pieces(kinks: Sequence[float], shift: float | None) -> Array:
+    """Return (P, 2) pieces of the phase, none of which has a kink inside, also not an interval later."""
     last = 1.0 - (shift or 0.0)
     inner = [kink - later for kink in kinks for later in ((0.0, shift) if shift else (0.0,))]
     even = np.round(np.linspace(0.0, last, FIRST_PIECES + 1) / GRAIN) * GRAIN
@@ -41,14 +39,14 @@ def first_pieces(kinks: Sequence[float], shift: float | None) -> Array:
     return np.stack([cuts[:-1], cuts[1:]], axis=-1)
 
 
-def halves(pieces: Array) -> Array:
-    """(2 P, 2) pieces, each cut in the middle."""
+def halve_pieces(pieces: Array) -> Array:
+    """Return (2 P, 2) pieces, each cut in the middle."""
     middle = np.round(pieces.mean(axis=1) / GRAIN) * GRAIN
     return np.concatenate([np.stack([pieces[:, 0], middle], -1), np.stack([middle, pieces[:, 1]], -1)])
 
 
-def beyond(lower: Array, upper: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """By how much values between low and high are outside lower and upper at most, and at least; a missing bound holds."""
+def bound_violation(lower: Array, upper: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the largest and the least possible violation of the bounds lower and upper by values between low and high."""
     most = np.maximum(
         np.where(np.isneginf(lower), -np.inf, np.where(np.isneginf(low), np.inf, lower - np.maximum(low, -LARGEST))),
         np.where(np.isposinf(upper), -np.inf, np.where(np.isposinf(high), np.inf, np.minimum(high, LARGEST) - upper)),
@@ -60,14 +58,14 @@ def beyond(lower: Array, upper: Array, low: Array, high: Array) -> tuple[Array, 
     return most, least
 
 
-class Search:
-    """Halving of pieces until every row is shown to hold, or enough is known of its violation.
+class TimeSearch:
+    """Halving of pieces until every row is proven to be satisfied, or its violation is known well enough.
 
     Attributes:
-        count: pieces enclosed.
-        first: earliest piece in which a row is not shown to hold, by its number.
-        least: (m,) the largest violation is at least this.
-        most: (m,) and at most this.
+        count: number of pieces that were enclosed.
+        first: earliest piece in which a row is not proven to be satisfied, by the row's index.
+        least: (m,) lower bounds of the largest violations.
+        most: (m,) upper bounds of them.
     """
 
     def __init__(self, values: Enclosed, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
@@ -80,40 +78,40 @@ class Search:
         self._settled: tuple[Array, Array]
 
     def run(self, pieces: Array) -> None:
-        """Halve what is open, the rows of each name for themselves, until little is, or the pieces are too many or too small."""
-        forms = self._enclosed(self._values.whole, pieces)
-        self._settled = pieces, self._integrated(pieces, forms)
+        """Halve the open pieces, separately for the rows of each name, until few are open, or they are too many or too small."""
+        forms = self._enclose(self._values.whole, pieces)
+        self._settled = pieces, self._integrate(pieces, forms)
         for number, rows in enumerate(self._values.groups):
             self._halve(number, rows, pieces, forms.lower[:, rows], forms.upper[:, rows])
 
-    def _halve(self, number: int, rows: Integers, pieces: Array, low: Array, high: Array) -> None:
-        """Rows of one name, from their values between low and high over the first pieces."""
+    def _halve(self, number: int, rows: Numbers, pieces: Array, low: Array, high: Array) -> None:
         work = float(len(pieces))
         while True:
-            most, least = beyond(self._lower[rows], self._upper[rows], low, high)
+            most, least = bound_violation(self._lower[rows], self._upper[rows], low, high)
             self.least[rows] = np.fmax(self.least[rows], least.max(axis=0, initial=-np.inf))
-            holds = most <= FEASIBILITY_TOLERANCE
-            broken = least > FEASIBILITY_TOLERANCE
+            satisfied = most <= FEASIBILITY_TOLERANCE
+            violated = least > FEASIBILITY_TOLERANCE
             sharp = most <= self.least[rows] + np.maximum(SHARPNESS * self.least[rows], FEASIBILITY_TOLERANCE)
             width = pieces[:, 1] - pieces[:, 0]
-            coarse = width > COARSE  # where a row breaks, its beginning is wanted no finer
-            again = ((~holds & ~broken & ~(sharp & ~coarse[:, None])) | (~holds & ~sharp)).any(axis=1)
+            coarse = width > COARSE  # the start of a violation needs no finer piece
+            again = ((~satisfied & ~violated & ~(sharp & ~coarse[:, None])) | (~satisfied & ~sharp)).any(axis=1)
             again &= (width > 2 * LEAST_PIECE) & (work <= MOST_PIECES)
             stays = ~again
-            self._settle(rows, pieces[stays], most[stays], holds[stays])
+            self._settle(rows, pieces[stays], most[stays], satisfied[stays])
             if not again.any():
                 return
-            pieces, part = halves(pieces[again]), self._values.alone(number)
-            forms = self._enclosed(part.function, pieces)
+            pieces, part = halve_pieces(pieces[again]), self._values.part(number)
+            forms = self._enclose(part.function, pieces)
             low, high = forms.lower[:, part.columns], forms.upper[:, part.columns]
             work += part.work * len(pieces)
 
+    @property
     def open_rows(self) -> list[int]:
-        """Numbers of the rows that are not shown to hold."""
+        """Indices of the rows that are not proven to be satisfied."""
         return sorted(self.first)
 
     def integrals(self) -> tuple[Array, Array]:
-        """Bounds of the integrals over the phase of what follows the rows, (k,) each."""
+        """Return bounds (k,) and (k,) of the integrals over the phase of the values that follow the rows."""
         low, high = self._settled[1].sum(axis=0).T
         return low - ROUNDING * (1 + np.abs(low)), high + ROUNDING * (1 + np.abs(high))
 
@@ -121,11 +119,11 @@ class Search:
         """Halve the pieces that add most to the width of the integrals' bounds, until these are narrow.
 
         Args:
-            limits: (k, 2) of the integrals: while one may lie on either side of a limit, its bounds are not narrow.
+            limits: (k, 2) of the integrals; bounds on both sides of a limit are never narrow.
         """
         pieces, parts = self._settled
         while parts.shape[1]:
-            spread = parts[..., 1] - parts[..., 0]  # infinite where nothing is known
+            spread = parts[..., 1] - parts[..., 0]  # infinite where there is no bound
             low, high = parts.sum(axis=0).T
             astride = ((low[:, None] < limits) & (limits < high[:, None])).any(axis=1)
             known = np.isfinite(low) & np.isfinite(high) & ~astride
@@ -133,14 +131,14 @@ class Search:
             again: Flags = (spread > wanted / len(pieces)).any(axis=1) & (spread.sum(axis=0) > wanted).any()
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break
-            finer = halves(pieces[again])
-            forms = self._enclosed(self._values.whole, finer)
+            finer = halve_pieces(pieces[again])
+            forms = self._enclose(self._values.whole, finer)
             pieces = np.concatenate([pieces[~again], finer])
-            parts = np.concatenate([parts[~again], self._integrated(finer, forms)])
+            parts = np.concatenate([parts[~again], self._integrate(finer, forms)])
         self._settled = pieces, parts
 
-    def _integrated(self, pieces: Array, forms: Forms) -> Array:
-        """(P, k, 2) bounds of the integrals over pieces, to which a form's slope adds nothing."""
+    def _integrate(self, pieces: Array, forms: AffineForms) -> Array:
+        """Return (P, k, 2) bounds of the integrals over pieces; the slope of a form has no effect."""
         with np.errstate(invalid="ignore"):
             lower, upper = (
                 np.fmax(forms.lower, forms.middle - forms.error),
@@ -149,14 +147,14 @@ class Search:
         both = np.stack([lower, upper], axis=-1)[:, len(self._lower) :]
         return np.asarray(both * (pieces[:, 1] - pieces[:, 0])[:, None, None])
 
-    def _settle(self, rows: Integers, pieces: Array, most: Array, holds: Flags) -> None:
+    def _settle(self, rows: Numbers, pieces: Array, most: Array, satisfied: Flags) -> None:
         self.most[rows] = np.fmax(self.most[rows], most.max(axis=0, initial=-np.inf))
-        for piece, k in zip(*np.nonzero(~holds), strict=True):
+        for piece, k in zip(*np.nonzero(~satisfied), strict=True):
             (a, b), row = pieces[piece].tolist(), int(rows[k])
             if row not in self.first or a < self.first[row][0]:
                 self.first[row] = (a, b)
 
-    def _enclosed(self, function: AffineFunction, pieces: Array) -> Forms:
+    def _enclose(self, function: AffineFunction, pieces: Array) -> AffineForms:
         self.count += len(pieces)
         inputs = function.inputs
         boxes = np.empty((len(pieces), inputs, 2))

@@ -25,7 +25,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import without_nan
 from nlp_gait.formulation import load, load_result
-from nlp_gait.proofs.certificate import check, read_certificate
+from nlp_gait.proofs.certificate import check_certificate, read_certificate
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
@@ -156,7 +156,7 @@ def read_a_certificate(path: Path) -> None:
     """A certificate, read and followed: it says what stands there, and what passes has the incumbent's objective."""
     file, raw = read_certificate(path), _plain(path)
     same({"schema": 1, **raw}, without_nan(file.to_json()), "certificate")
-    check(file, paths=2)
+    check_certificate(file, paths=2)
 
 
 def read_a_motion(path: Path) -> None:
@@ -186,7 +186,7 @@ def read_archive(path: Path) -> None:
 
 
 NOTHING_MORE: dict[str, Any] = {
-    "breaches": [],
+    "violations": [],
     "sampled": [],
     "pieces": 0,
     "reason": "",

@@ -1,4 +1,4 @@
-"""Proofs keep what is feasible, go on where they were killed, and can be checked; a wrong one is never closed."""
+"""Proofs keep feasible points, continue after they were killed, and can be checked; a wrong proof is never closed."""
 
 from __future__ import annotations
 
@@ -6,64 +6,47 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import nlp_gait
-from benchmarks.gaitbench.facts import find_proven_gap
-from benchmarks.guarantees.between_samples import feasible_gaits
-from benchmarks.guarantees.boxes import lost
-from benchmarks.guarantees.nao import around as box_around
-from benchmarks.guarantees.nao import within
-from compare.analysis.proven import CERTIFICATES
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError, OwnCodeError
-from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.proofs import branch_and_bound, certificate, power_form
+from nlp_gait.proofs import branch_and_bound, certificate
+from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import certificate_file, check, read_certificate
+from nlp_gait.proofs.certificate import CERTIFICATES, check_certificate, make_certificate_file, read_certificate
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
+from tests.proofs.soundness import best_x, count_lost_boxes, feasible_gaits, load, narrow_around, narrow_bounds
 
 SEED = 2
 PROBLEM = toy(two_valleys, limit=-9.0)
 BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
-
-
-def walk() -> tuple[GaitProblem, np.ndarray]:
-    return nlp_gait.load("walk12"), np.array(load_facts()["walk12-w015"].best_x)
-
-
-GAITS = {"walk12": "walk12-w015", "nao-dsp": "dsp-v5", "nao-ssp": "ssp-v5"}
 PHASES = ("nao-dsp", "nao-ssp")
 
 
-def around(name: str, part: float) -> tuple[GaitProblem, np.ndarray]:
-    """A phase with bounds this part of the ranges around the best known gait, and that gait."""
-    problem, best = nlp_gait.load(name), np.array(load_facts()[GAITS[name]].best_x)
-    return box_around(problem, best, part), best
-
-
-@pytest.mark.parametrize("name", GAITS)
+@pytest.mark.parametrize("name", ["walk12", *PHASES])
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
-    best = np.array(load_facts()[GAITS[name]].best_x)
-    assert lost(nlp_gait.load(name), best, 200, np.random.default_rng(SEED)) == 0
+    assert count_lost_boxes(load(name), best_x(name), 200, np.random.default_rng(SEED)) == 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PHASES)
 def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: str) -> None:
-    problem, best = around(name, 0.07)
+    best = best_x(name)
+    problem = narrow_around(load(name), best, 0.07)
     proof = certify(problem, best, tolerance=0.01, time_limit_s=120.0)
     assert proof.closed and proof.gap == pytest.approx(0.01) and proof.boxes > 10
     if name == "nao-dsp":
-        assert check(certificate_file(problem, proof), paths=5).paths == 5
+        assert check_certificate(make_certificate_file(problem, proof), paths=5).paths == 5
 
 
 @pytest.mark.slow
 def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
-    problem, best = nlp_gait.load("nao-dsp"), np.array(load_facts()[GAITS["nao-dsp"]].best_x)
+    problem, best = load("nao-dsp"), best_x("nao-dsp")
     gaits = [best, *feasible_gaits(problem, best, 60, np.random.default_rng(SEED))]
     costs = [build_exact_model(problem).at(x, problem.p).cost for x in gaits]
     wrong = gaits[int(np.argmin(np.abs(np.array(costs) / costs[0] - 1.03)))]
@@ -74,14 +57,14 @@ def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
         np.maximum(problem.lower, np.minimum(best, wrong) - half),
         np.minimum(problem.upper, np.maximum(best, wrong) + half),
     )
-    narrow = within(problem, *ends)
+    narrow = narrow_bounds(problem, *ends)
     assert certify(narrow, best, tolerance=0.01, time_limit_s=120.0).closed
     proof = certify(narrow, wrong, tolerance=0.01, time_limit_s=0.5)
     assert not proof.closed and proof.bound <= costs[0]
 
 
 def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
-    problem, best = around("nao-dsp", 2.0**-4)
+    problem, best = load("nao-dsp"), best_x("nao-dsp")
     cheat = best.copy()
     cheat[5] *= 0.9  # less sway: too small a margin
     at = build_exact_model(problem).at(cheat, problem.p)
@@ -90,22 +73,30 @@ def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
         certify(problem, cheat)
 
 
-def test_formulas_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nlp_gait.proofs.power_instants.GRAVITY", 9.80001)
-    with pytest.raises(InputError, match="where the exact functions have"):
-        power_form.power_form(nlp_gait.load("nao-dsp", intervals=2))
-    with pytest.raises(InputError, match="has no form"):
-        power_form.power_form(nlp_gait.load("nao-dsp", trajectory="quintic"))
+def test_a_least_power_form_that_differs_from_the_exact_functions_is_refused() -> None:
+    problem = nlp_gait.load("nao-dsp", intervals=2)
+    form = problem.power_form(problem)
+    z = ca.SX.sym("z", len(problem.names))
+    wrong = [1.000001 * value for value in form.indexes.call([z])]
+    indexes = ca.Function("indexes", [z], wrong, ["z"], form.indexes.name_out())
+    with pytest.raises(InputError, match="least-power form and .* in the exact functions"):
+        make_bounds(replace(problem, power_form=lambda _: replace(form, indexes=indexes)))
+
+
+def test_other_mathematics_has_no_least_power_form() -> None:
+    assert nlp_gait.load("nao-dsp", trajectory="quintic").power_form is None
+    assert load("nao-dsp").with_values(reach_margin=0.02).power_form is not None
+    assert load("nao-dsp").derive(change=lambda assembly, point, ops: assembly).power_form is None
 
 
 @pytest.mark.slow
 def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
-    problem, best = walk()
+    problem, best = load("walk12"), best_x("walk12")
     proof = certify(problem, best, tolerance=0.02, time_limit_s=120.0)
     assert proof.closed and proof.gap == pytest.approx(0.02)
     path = tmp_path / "certificate.json"
-    path.write_text(json.dumps(certificate_file(problem, proof).to_json()))
-    found = check(read_certificate(path), paths=40)
+    path.write_text(json.dumps(make_certificate_file(problem, proof).to_json()))
+    found = check_certificate(read_certificate(path), paths=40)
     assert found.paths == 40 and found.same_code
     assert 0.2 * proof.boxes < found.boxes < 5 * proof.boxes  # an estimate
 
@@ -113,16 +104,17 @@ def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dsp-v5-1-percent", "ssp-v5-1-percent", "walk12-lambda-1-0.1-percent"])
 def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
-    assert check(read_certificate(CERTIFICATES / f"{name}.json"), paths=3).paths == 3
+    assert check_certificate(read_certificate(CERTIFICATES / f"{name}.json"), paths=3).paths == 3
 
 
 def test_evidence_is_what_certificates_prove() -> None:
-    for id, entry in load_facts().items():
-        gap = find_proven_gap(id, entry.best_known)
-        assert gap is None or gap == entry.evidence.proven_gap
+    for id, facts in load_facts().items():
+        bounds = [read_certificate(path).certificate.bound for path in CERTIFICATES.glob(f"{id}-[0-9]*-percent.json")]
+        if bounds:
+            assert facts.evidence.proven_gap == (facts.best_known - max(bounds)) / abs(facts.best_known)
 
 
-def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_proof_continues_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(branch_and_bound, "BATCH", 4)
     monkeypatch.setattr(branch_and_bound, "CHECKPOINT_S", 0.0)
     whole = certify(PROBLEM, BEST, tolerance=1e-4)
@@ -137,7 +129,7 @@ def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pyte
         certify(PROBLEM, BEST, tolerance=1e-4, progress=kill, checkpoint=file)
     resumed = certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=file)
     assert resumed.closed and (resumed.boxes, resumed.bound) == (whole.boxes, whole.bound)
-    with pytest.raises(InputError, match="of another proof"):
+    with pytest.raises(InputError, match="belongs to another proof"):
         certify(PROBLEM, BEST, tolerance=1e-3, checkpoint=file)
     file.write_bytes(b"torn")
     with pytest.raises(InputError, match="damaged"):
@@ -145,7 +137,7 @@ def test_a_killed_proof_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_wrong_incumbent_is_never_certified() -> None:
-    problem, best = walk()
+    problem, best = load("walk12"), best_x("walk12")
     wrong = best + 0.03 * (np.array([0.05, 0.05, 0.05, 0.05]) - best)
     costs = [build_exact_model(problem).at(x, problem.p).cost for x in (best, wrong)]
     assert costs[1] > costs[0] + 0.01 * abs(costs[0])  # worse than the tolerance allows
@@ -154,22 +146,22 @@ def test_a_wrong_incumbent_is_never_certified() -> None:
 
 
 def test_a_forged_certificate_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certificate, "_problem", lambda description: PROBLEM)
+    monkeypatch.setattr(certificate, "_load_problem", lambda description: PROBLEM)
     honest = certify(PROBLEM, BEST, tolerance=1e-3)
-    file = certificate_file(PROBLEM, honest)
-    assert check(file, paths=20).paths == 20
+    file = make_certificate_file(PROBLEM, honest)
+    assert check_certificate(file, paths=20).paths == 20
     valley = np.array([0.987, 0.0])  # the worse one
     at = build_exact_model(PROBLEM).at(valley, PROBLEM.p).cost
     forged = replace(honest, objective=at, bound=at * (1 - 1e-3), x=tuple(valley.tolist()))
     with pytest.raises(InputError, match="do not end"):
-        check(replace(file, certificate=forged), paths=20)
+        check_certificate(replace(file, certificate=forged), paths=20)
     for change, message in (
         ({"objective": at}, "but its incumbent has"),
-        ({"bound": honest.objective}, "says more than its tolerance"),
-        ({"closed": False}, "has not ended"),
+        ({"bound": honest.objective}, "tighter than its tolerance"),
+        ({"closed": False}, "not finished"),
     ):
         with pytest.raises(InputError, match=message):
-            check(replace(file, certificate=replace(honest, **change)))
+            check_certificate(replace(file, certificate=replace(honest, **change)))
 
 
 def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
@@ -178,7 +170,7 @@ def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     raw["problem"]["name"] = f"{tmp_path / 'own.py'}:problem"
     (tmp_path / "certificate.json").write_text(json.dumps(raw))
     with pytest.raises(OwnCodeError, match="certificate needs code of your own.*--code"):
-        check(read_certificate(tmp_path / "certificate.json"))
+        check_certificate(read_certificate(tmp_path / "certificate.json"))
 
 
 @pytest.mark.parametrize(
@@ -197,12 +189,12 @@ def test_a_damaged_certificate_is_refused(change: dict[str, dict[str, object]], 
         raw[part] |= values
     (tmp_path / "certificate.json").write_text(json.dumps(raw))
     with pytest.raises(InputError, match=message):
-        check(read_certificate(tmp_path / "certificate.json"))
+        check_certificate(read_certificate(tmp_path / "certificate.json"))
 
 
 def test_a_certificate_of_another_problem_is_refused() -> None:
-    problem, _ = walk()
+    problem = load("walk12")
     honest = certify(PROBLEM, BEST, tolerance=1e-3)
-    part = {**certificate_file(problem, honest).problem, "sha256": "0" * 64}
-    with pytest.raises(InputError, match="another one today"):
-        check(replace(certificate_file(problem, honest), problem=part))
+    part = {**make_certificate_file(problem, honest).problem, "sha256": "0" * 64}
+    with pytest.raises(InputError, match="has changed since the certificate"):
+        check_certificate(replace(make_certificate_file(problem, honest), problem=part))

@@ -11,17 +11,17 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from benchmarks.guarantees.between_samples import contradictions, feasible_gaits
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, RowsOverTime
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
-from nlp_gait.proofs.time_functions import time_functions
-from nlp_gait.proofs.time_search import beyond
+from nlp_gait.proofs.time_functions import make_time_functions
+from nlp_gait.proofs.time_search import bound_violation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
+from tests.proofs.soundness import feasible_gaits, find_contradictions
 
 SEED = 3
 PEAK = 0.8  # of the toy's row, at half the time
@@ -50,21 +50,21 @@ def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
 
 def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -> None:
     found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
-    assert found.holds is False
-    (breach,) = found.breaches
-    assert breach.row == "wave[wave]"
-    assert breach.least <= PEAK - 0.5 <= breach.most <= 1.05 * (PEAK - 0.5)
+    assert found.satisfied is False
+    (violation,) = found.violations
+    assert violation.row == "wave[wave]"
+    assert violation.least <= PEAK - 0.5 <= violation.most <= 1.05 * (PEAK - 0.5)
     begins = 1.0 + 2.0 * math.asin(0.5 / PEAK) / math.pi
-    assert breach.from_s <= begins <= breach.to_s <= begins + 0.01
+    assert violation.from_s <= begins <= violation.to_s <= begins + 0.01
     low, high = found.means["mean_m"]
     assert low <= 2 / math.pi * PEAK <= high <= 1.01 * low
     assert found.pieces > 4  # intervals
-    assert "wave[wave] fails by 0.299 to 0.3 m" in str(found) and found.word == "no"
+    assert "wave[wave] is violated by 0.299 to 0.3 m" in str(found) and found.word == "no"
 
 
 def test_a_row_that_touches_its_limit_holds() -> None:
     found = guarantee(waving(PEAK), np.array([PEAK, 0.0]))
-    assert found.holds and not found.breaches and str(found) == "all limits hold at all times"
+    assert found.satisfied and not found.violations and str(found) == "all limits are satisfied at all times"
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_row_that_touches_its_limit_holds() -> None:
 def test_values_are_outside_their_bounds_by_this_at_most_and_at_least(
     bounds: tuple[float, float], values: tuple[float, float], most: float, least: float
 ) -> None:
-    found = beyond(*(np.array([end]) for end in (*bounds, *values)))
+    found = bound_violation(*(np.array([end]) for end in (*bounds, *values)))
     assert [part.item() for part in found] == [most, least]
 
 
@@ -98,33 +98,33 @@ def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:
 
     rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
     kinked = replace(waving(0.5), rows_over_time=(rows,))
-    assert guarantee(kinked, np.array([PEAK, 0.0])).holds
-    assert not guarantee(replace(kinked, rows_over_time=(replace(rows, kinks=()),)), np.array([PEAK, 0.0])).holds
+    assert guarantee(kinked, np.array([PEAK, 0.0])).satisfied
+    assert not guarantee(replace(kinked, rows_over_time=(replace(rows, kinks=()),)), np.array([PEAK, 0.0])).satisfied
 
 
 def test_changes_over_an_interval_hold_for_every_beginning_of_it() -> None:
     largest = PEAK * math.sin(math.pi / 4)  # from zero to a quarter
-    assert guarantee(waving(largest + 1e-5, "interval"), np.array([PEAK, 0.0])).holds
+    assert guarantee(waving(largest + 1e-5, "interval"), np.array([PEAK, 0.0])).satisfied
     found = guarantee(waving(largest - 1e-2, "interval"), np.array([PEAK, 0.0]))
-    assert found.breaches[0].least <= 1e-2 <= found.breaches[0].most and found.breaches[0].from_s == 1.0
+    assert found.violations[0].least <= 1e-2 <= found.violations[0].most and found.violations[0].from_s == 1.0
 
 
 def test_a_mean_is_that_over_time() -> None:
     mean = 2 / math.pi * PEAK
-    assert guarantee(waving(mean + 1e-3, "mean"), np.array([PEAK, 0.0])).holds
+    assert guarantee(waving(mean + 1e-3, "mean"), np.array([PEAK, 0.0])).satisfied
     found = guarantee(waving(mean - 1e-3, "mean"), np.array([PEAK, 0.0]))
-    (breach,) = found.breaches
-    assert found.holds is False and (breach.from_s, breach.to_s) == (1.0, 3.0)
-    assert 0.0 < breach.least <= 1e-3 <= breach.most
+    (violation,) = found.violations
+    assert found.satisfied is False and (violation.from_s, violation.to_s) == (1.0, 3.0)
+    assert 0.0 < violation.least <= 1e-3 <= violation.most
 
 
 def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
     problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
-    rows = time_functions(problem, problem.rows_over_time[0]).instants
+    rows = make_time_functions(problem, problem.rows_over_time[0]).instants
     assert rows.values is not None
     groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.values.groups)}
     assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
-    part = rows.values.alone(groups["reach"])
+    part = rows.values.part(groups["reach"])
     assert part.work < 0.1
     given = np.concatenate([x, problem.p, [0.0]])
     boxes = np.stack([given, given], axis=-1)[None]
@@ -138,7 +138,7 @@ def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
 
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
     found = guarantee(waving(0.5, None), np.array([PEAK, 0.0]))
-    assert found.holds and found.sampled == ("wave",) and "on samples alone" in str(found)
+    assert found.satisfied and found.sampled == ("wave",) and "checked on samples only: wave" in str(found)
 
 
 @pytest.mark.parametrize(
@@ -146,10 +146,10 @@ def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
 )
 def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str, instance: str) -> None:
     problem, x = nlp_gait.load(name), best(instance)
-    assert guarantee(problem, x).holds
+    assert guarantee(problem, x).satisfied
     gaits = [x, *feasible_gaits(problem, x, 2, np.random.default_rng(SEED))]
-    against, _, holding = contradictions(problem, gaits, 1001)
-    assert not against and holding > 0
+    against, _, satisfied = find_contradictions(problem, gaits, 1001)
+    assert not against and satisfied > 0
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_
     for broken in judged.dense_violations:
         name = broken.name.rpartition(",")[0] + "]"
         worst[name] = max(worst.get(name, 0.0), broken.violation)
-    most = {breach.row: breach.most for breach in proven.breaches}
+    most = {violation.row: violation.most for violation in proven.violations}
     for name, violation in worst.items():
         assert violation <= most[name] <= violation + 1e-3
     low, high = proven.means["energy_J"]
@@ -174,7 +174,7 @@ def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() ->
     problem = nlp_gait.load("nao-dsp", trajectory="spline-4")
     x = np.concatenate([best("dsp-v5"), np.zeros(len(problem.names) - len(best("dsp-v5")))])
     found = guarantee(problem, x)
-    assert found.holds
+    assert found.satisfied
     cubic = guarantee(nlp_gait.load("nao-dsp"), best("dsp-v5"))
     for name, (low, high) in found.means.items():
         assert low <= cubic.means[name][1] and cubic.means[name][0] <= high
@@ -193,14 +193,14 @@ def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> Non
 
     rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
     found = guarantee(replace(waving(PEAK), rows_over_time=(rows,)), np.array([PEAK, 0.0]))
-    assert found.holds is not True
-    assert {b.row: b.most for b in found.breaches}["wild[pole]"] is None
+    assert found.satisfied is not True
+    assert {b.row: b.most for b in found.violations}["wild[pole]"] is None
     assert "mean_m" not in found.means and "any amount" in str(found)
 
 
 def test_finite_differences_are_sampled_by_definition() -> None:
     found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best("ssp-v5"))
-    assert found.holds is None and found.reason.startswith("sampled by definition") and found.word == "?"
+    assert found.satisfied is None and "on samples only" in found.reason and found.word == "?"
 
 
 def test_a_change_of_the_mathematics_takes_the_guarantee_away_and_new_values_do_not() -> None:
@@ -216,7 +216,7 @@ def test_without_a_compiler_the_verdict_says_so(monkeypatch: pytest.MonkeyPatch)
     affine._library.cache_clear()
     monkeypatch.setattr(affine, "find_compiler", missing)
     found = guarantee(waving(0.5), np.array([PEAK, 0.0]))
-    assert found.holds is None and "no C++ compiler" in str(found)
+    assert found.satisfied is None and "no C++ compiler" in str(found)
 
 
 def test_an_infeasible_point_has_no_guarantee() -> None:

@@ -1,4 +1,4 @@
-"""Forms of degree two hold every value of gaits at sampled points; of single operations see ``test_affine``."""
+"""Forms of degree two enclose gaits at sampled points, and bounds from them keep feasible points (see also ``test_affine``)."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from casadi import SX
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.proofs import power_form as power_form_module
-from nlp_gait.proofs.power_form import power_form, to_z
-from nlp_gait.proofs.quadratic import PowerRows, QuadraticForms, QuadraticFunction
+from nlp_gait.formulation.power_form import PowerForm, PowerRows
+from nlp_gait.proofs.bounds import make_bounds
+from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
+from tests.proofs.soundness import best_x, load
 
 SEED = 7
 POINTS = 200
-# Of values as computed in double precision, relative: they err themselves.
+# Relative rounding error of values in double precision.
 ROUNDING = 1e-9
 
 
 def at(forms: QuadraticForms, e: np.ndarray) -> np.ndarray:
-    """(K, M) what the forms of one box give at symbols (K, n), without their errors."""
+    """Return (K, M) values of the forms of one box at symbols (K, n), without their errors."""
     pairs = np.stack([e[:, i] * e[:, j] for j in range(e.shape[1]) for i in range(j + 1)])
     return np.asarray(forms.middle[0] + e @ forms.slopes[0].T + pairs.T @ forms.bends[0].T)
 
 
-@pytest.mark.parametrize(("name", "instance"), [("nao-dsp", "dsp-v5"), ("nao-ssp", "ssp-v5")])
-def test_gaits_are_held_at_sampled_points_of_boxes_around_the_best(
-    name: str, instance: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    read: list[ca.Function] = []
+def evaluate(function: ca.Function, Z: np.ndarray) -> np.ndarray:
+    """Return (K, M) values at points."""
+    return np.array(function.map(len(Z))(Z.T).full().T)
 
-    def reading(function: ca.Function) -> QuadraticFunction:
-        read.append(function)
-        return QuadraticFunction(function)
 
-    monkeypatch.setattr(power_form_module, "QuadraticFunction", reading)
+def power_form(name: str) -> PowerForm:
     problem = nlp_gait.load(name, intervals=2)
-    form, rng = power_form(problem), np.random.default_rng(SEED)
-    poses, everything = sorted(read, key=lambda function: function.numel_out(0))
-    z = to_z(np.array(load_facts()[instance].best_x))
-    low, high = form.root.T
+    assert problem.power_form is not None
+    return problem.power_form(problem)
+
+
+@pytest.mark.parametrize("name", ["nao-dsp", "nao-ssp"])
+def test_gaits_are_enclosed_at_sampled_points_of_boxes_around_the_best(name: str) -> None:
+    form, rng = power_form(name), np.random.default_rng(SEED)
+    function, z, (low, high) = QuadraticFunction(form.function), form.to_z(best_x(name)), form.box.T
+    pose_lower, pose_upper = (bound[form.pose_rows] for bound in (form.rows.lower, form.rows.upper))
     for width in (0.3, 0.03, 1e-4):
         half = width * (high - low) / 2
         box = np.stack([np.maximum(low, z - half), np.minimum(high, z + half)], -1)
-        forms = form.function(box[None])
+        forms = function(box[None])
         Z = rng.uniform(box[:, 0], box[:, 1], (POINTS, len(z)))
-        values, posed = (evaluated(function, Z) for function in (everything, poses))
-        reached = np.all((form.early_lower <= posed) & (posed <= form.early_upper), axis=1)
+        values, poses = (evaluate(f, Z) for f in (form.function, form.poses))
+        reached = np.all((pose_lower <= poses) & (poses <= pose_upper), axis=1)
         e = (Z - box.mean(axis=-1)) / (np.ptp(box, axis=-1) / 2)
         slack = ROUNDING * (1 + np.abs(values))
         inside = (forms.lower <= values + slack) & (values - slack <= forms.upper)
@@ -57,11 +57,6 @@ def test_gaits_are_held_at_sampled_points_of_boxes_around_the_best(
         assert reached.sum() > POINTS / 10
         assert inside[reached].all() and off[reached].all()
         assert width > 0.1 or np.isfinite(forms.error).all()
-
-
-def evaluated(function: ca.Function, Z: np.ndarray) -> np.ndarray:
-    """(K, M) values at points."""
-    return np.array(function.map(len(Z))(Z.T).full().T)
 
 
 def test_mixed_products_are_kept_and_cancel() -> None:
@@ -127,28 +122,29 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
         box = np.stack([centre - half, centre + half], axis=-1)
         corners = rng.choice([-1.0, 1.0], (100, 4))
         Z = centre + half * np.concatenate([corners, rng.uniform(-1.0, 1.0, (400, 4))])
-        values = evaluated(function, Z)
+        values = evaluate(function, Z)
         cost = np.abs(values[:, rows.power]) @ rows.weight / Z[:, 3] + values[:, rows.heat] @ rows.loss
         feasible = np.abs(values[:, 14]) <= 2.0
         if not feasible.any():
             continue
-        least = cost[feasible].min()
+        least, enclosed = cost[feasible].min(), QuadraticFunction(function)
         for target in (100.0, np.quantile(cost[feasible], 0.3)):
-            found = QuadraticFunction(function).assess(box[None], target, rows)
+            found = enclosed.prune(box[None], target, rows)
             kept = Z[feasible & (cost < target * (1.0 - ROUNDING))]
             if len(kept):
-                assert found.left[0] and found.lowest[0] <= least * (1.0 + ROUNDING)
+                assert found.lowest.item() <= least * (1.0 + ROUNDING)
                 assert ((found.boxes[0, :, 0] <= kept) & (kept <= found.boxes[0, :, 1])).all()
-        tight += bool(found.lowest[0] > 0.7 * least)
+        tight += not len(found.origin) or found.lowest.item() > 0.7 * least
     assert tight > 20  # bounds that are far off would hide an error
 
 
-def test_boxes_that_hold_the_best_gait_keep_it_and_have_bounds_that_end_in_its_cost() -> None:
-    problem, x = nlp_gait.load("nao-ssp"), np.array(load_facts()["ssp-v5"].best_x)
-    cost, form, z = build_exact_model(problem).at(x, problem.p).cost, power_form(problem), to_z(x)
-    half = np.diff(form.root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
-    boxes = np.stack([np.maximum(form.root[:, 0], z - half), np.minimum(form.root[:, 1], z + half)], -1)
-    found = form.assess(boxes, cost * (1 + 1e-6))
-    assert found.left.all()
+def test_boxes_that_contain_the_best_gait_keep_it_and_have_bounds_that_converge_to_its_cost() -> None:
+    problem, x = load("nao-ssp"), best_x("nao-ssp")
+    bounds, cost = make_bounds(problem), build_exact_model(problem).at(x, problem.p).cost
+    z, root = bounds.to_z(x), bounds.root[0]
+    half = np.diff(root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
+    boxes = np.stack([np.maximum(root[:, 0], z - half), np.minimum(root[:, 1], z + half)], -1)
+    found = bounds.prune(boxes, cost * (1 + 1e-6))
+    assert len(found.origin) == len(boxes)
     assert np.all(np.diff(found.lowest[2:]) > 0.0) and cost * (1 - 1e-5) < found.lowest[-1] <= cost
     assert np.all((found.boxes[..., 0] <= z) & (z <= found.boxes[..., 1]))

@@ -69,10 +69,10 @@ def certainty(
 
 
 def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
-    from nlp_gait.proofs.certificate import check, read_certificate
+    from nlp_gait.proofs.certificate import check_certificate, read_certificate
 
     file = read_certificate(path)
-    found = check(file, paths=paths, seed=seed)
+    found = check_certificate(file, paths=paths, seed=seed)
     proof = file.certificate
     if as_json:
         print_json({"schema": 1, **asdict(found)})

@@ -24,10 +24,9 @@ from nlp_gait.files import without_nan
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.proofs import bounds
+from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import Certificate, certify
-from nlp_gait.proofs.certificate import CODE, certificate_file
-from nlp_gait.proofs.power_form import has_power_form
+from nlp_gait.proofs.certificate import hash_code, make_certificate_file
 
 # Branch and bound is for this many variables at most, for its work grows exponentially with them; NAO's phases have bounds of
 # their own, narrow enough for nine.
@@ -92,7 +91,7 @@ class Certainty:
     def certificate_json(self) -> dict[str, Any] | None:
         """The certificate as a file that can be checked, where the proof is closed."""
         c = self.certificate
-        return certificate_file(self.problem, c).to_json() if c is not None and c.closed else None
+        return make_certificate_file(self.problem, c).to_json() if c is not None and c.closed else None
 
     @property
     def supported(self) -> str:
@@ -165,7 +164,7 @@ def certainty(
     if not optima:
         raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
     best = optima[0]
-    compute = partial(store.compute, code=[bounds, *CODE], progress=progress)
+    compute = partial(store.compute, progress=progress)
     identity = {**fingerprint(problem), "best": list(best.x)}
 
     def searched() -> dict[str, Any]:
@@ -189,7 +188,8 @@ def certainty(
         inputs = {**identity, "evaluations": evaluations, "seed": seed}
         search = decoded(LongSearch, compute("cma", inputs, searched))
     if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or has_power_form(problem)):
-        inputs = {**identity, "tolerance": tolerance, "time_limit_s": time_limit_s}
+        limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
+        inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
         certificate = decoded(Certificate, compute("certificate", inputs, proven))
     return Certainty(
         problem=problem,

@@ -13,8 +13,7 @@ from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, resting_point
-from nlp_gait.symbolic.world_frame import Frame, chain_frames, leg_frames, upright
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
@@ -84,25 +83,6 @@ def upright_plan(
         ankles={side: ankle.position for side, ankle in ankles.items()},
         reach=vertcat(*reach),
     )
-
-
-def upright_frames(
-    robot: Robot,
-    hip: Motion,
-    ankles: Mapping[str, Motion],
-    arms: Mapping[str, Motion],
-    largest_cosine: float = 1.0,
-) -> dict[str, Frame]:
-    """Frames of all links in the motion of ``upright_plan``, for dynamics in the world frame; see ``leg_frames``."""
-    frames = {robot.root: upright(hip)}
-    for side, ankle in ankles.items():
-        geometry, pelvis = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
-        at_hip, at_pelvis = (add_motions(hip, resting_point(place)) for place in (geometry.hip_m, pelvis.origin_m))
-        leg = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, largest_cosine)
-        *turning, foot = (robot.joint(f"{side}{name}").child for name in LEG_JOINTS)
-        frames |= {pelvis.child: upright(at_pelvis), **dict(zip(turning, leg, strict=True)), foot: upright(ankle)}
-        frames |= chain_frames([robot.joint(f"{side}{name}") for name in ARM_JOINTS], arms, hip)
-    return frames
 
 
 def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:

@@ -7,6 +7,8 @@ torso, which depends on where the hip is between the feet.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
+from functools import partial
 
 from casadi import DM, SX, fmax
 
@@ -28,6 +30,8 @@ from nlp_gait.gaits.biped.problem import Criterion, goal_of
 from nlp_gait.gaits.biped.samples import LEAST_DURATION
 from nlp_gait.gaits.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.gaits.nao.curves import arm_limits, arm_motions, hip_and_arm_units
+from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, power_form_maker
+from nlp_gait.gaits.nao.least_power.power_instants import double_support_phase
 from nlp_gait.gaits.nao.legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.gaits.nao.motors import nao_motors
 from nlp_gait.gaits.nao.problem import paper_parts, phase_problem
@@ -95,13 +99,19 @@ def nao_dsp(
         goal=goal_of(objective, real),
         kinks=splines.kinks,
     )
-    return phase_problem(
+    power_form = None
+    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2
+    if paper and torso_share != "free":
+        instants = partial(double_support_phase, model, soles, hip_ends(soles), ARM_SWING, torso_share)
+        power_form = power_form_maker(model, instants)
+    problem = phase_problem(
         "nao-dsp",
         "NAO, double support: least mean power",
         phase,
         robot,
         start=sharing.start_of(phase.names, splines.start_of(phase.names)),
     )
+    return replace(problem, power_form=power_form)
 
 
 def soles_of(robot: Robot, step: float) -> dict[str, Point2]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from casadi import MX, SX, fmax
@@ -17,6 +19,8 @@ from nlp_gait.gaits.biped.samples import LEAST_DURATION
 from nlp_gait.gaits.biped.single_support import loads_on_left, single_support_mean_margins, swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, JOINTS, PLANNED_JOINTS, nao, upright_links, upright_plan
 from nlp_gait.gaits.nao.curves import arm_limits, arm_motions, hip_and_arm_units
+from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, power_form_maker
+from nlp_gait.gaits.nao.least_power.power_instants import single_support_phase
 from nlp_gait.gaits.nao.legs import check_step_length, hip_variables, leg_geometry
 from nlp_gait.gaits.nao.motors import nao_motors
 from nlp_gait.gaits.nao.problem import paper_parts, phase_problem
@@ -90,13 +94,17 @@ def nao_ssp(
         goal=goal_of(objective, real),
         kinks=splines.kinks,
     )
-    return phase_problem(
+    power_form = None
+    if (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2:
+        power_form = power_form_maker(model, partial(single_support_phase, model, *stance, ARM_SWING))
+    problem = phase_problem(
         "nao-ssp",
         "NAO, single support: least mean power",
         phase,
         robot,
         start=splines.start_of(phase.names),
     )
+    return replace(problem, power_form=power_form)
 
 
 class Stance(NamedTuple):

@@ -30,9 +30,9 @@ extern "C" EXPORT void nlp_gait_quadratic_contract(const Tape* tape, int n, int 
   Runner runner(*tape, n, memory);
   std::vector<int> row(outputs);
   for (int o = 0; o < outputs; ++o) row[o] = o;
-  Gait gait = {};
-  gait.n = n, gait.outputs = gait.rows = outputs, gait.row = row.data(), gait.lower = lower, gait.upper = upper;
-  Relaxation relaxation(gait, runner.at);
+  PowerRows rows = {};
+  rows.n = n, rows.outputs = rows.rows = outputs, rows.row = row.data(), rows.lower = lower, rows.upper = upper;
+  Relaxation relaxation(rows, runner.at);
   const long long each = (long long)outputs * runner.at.size;
   for (long long first = 0; first < many; first += LANES) {
     const int count = first + LANES < many ? LANES : (int)(many - first);
@@ -56,15 +56,15 @@ extern "C" EXPORT void nlp_gait_quadratic_contract(const Tape* tape, int n, int 
 }
 
 // What is left of boxes (many, n, 2), in place: left (many) 0 or 1, lowest (many), cut (many).
-extern "C" EXPORT void nlp_gait_quadratic_assess(const Tape* tape, const Gait* gait, double target, long long many, double* boxes,
+extern "C" EXPORT void nlp_gait_quadratic_prune(const Tape* tape, const PowerRows* rows, double target, long long many, double* boxes,
                                                  int* left, double* lowest, int* cut, double* memory) {
-  Runner runner(*tape, gait->n, memory);
-  Relaxation relaxation(*gait, runner.at);
-  const long long each = (long long)gait->outputs * runner.at.size;
+  Runner runner(*tape, rows->n, memory);
+  Relaxation relaxation(*rows, runner.at);
+  const long long each = (long long)rows->outputs * runner.at.size;
   for (long long first = 0; first < many; first += LANES) {
-    runner.run(gait->n, gait->outputs, boxes, first, many);
+    runner.run(rows->n, rows->outputs, boxes, first, many);
     for (int l = 0; l < LANES && first + l < many; ++l) {
-      const Result found = relaxation.assess(runner.forms + l * each, boxes + (first + l) * gait->n * 2, target);
+      const Result found = relaxation.prune(runner.forms + l * each, boxes + (first + l) * rows->n * 2, target);
       left[first + l] = found.left, lowest[first + l] = found.lowest, cut[first + l] = found.cut;
     }
   }

@@ -12,10 +12,10 @@ static const double VAGUE = 0.25;
 // Where to cut: weights of errors of known products, and of an edge's width, beside what is lost to the rest.
 static const double ERROR_SHARE = 0.7, WIDTH_SHARE = 0.125;
 
-struct Gait {
-  int n, outputs, rows, terms, heats, time;
+struct PowerRows {
+  int n, outputs, rows, terms, heats, duration;
   const int *row, *power, *torque, *rate, *heat;
-  const double *lower, *upper, *weight, *loss, *range;
+  const double *lower, *upper, *weight, *loss, *ranges;
 };
 
 // What is known of one box.
@@ -56,10 +56,10 @@ struct Sums {
 
 class Relaxation {
  public:
-  Relaxation(const Gait& gait, const Layout& layout) : G(gait), at(layout), n(gait.n) {}
+  Relaxation(const PowerRows& rows, const Layout& layout) : G(rows), at(layout), n(rows.n) {}
 
   // `box` (n, 2) is replaced by what is left of it.
-  Result assess(const double* forms, double* box, double target) {
+  Result prune(const double* forms, double* box, double target) {
     Box e;
     double score[MOST] = {};
     if (!begin(forms, box, e) || !bounded(e, box, target, score) || !inner(e, box)) return Result{false, INFINITY, 0};
@@ -76,7 +76,7 @@ class Relaxation {
   }
 
  private:
-  const Gait& G;
+  const PowerRows& G;
   const Layout& at;
   const int n;
   const double* F = nullptr;
@@ -206,7 +206,7 @@ class Relaxation {
   // The cost's form, and columns.
   Quadratic cost(const Box& e, const double* box, double* score) {
     columns.clear();
-    const int T = G.time;
+    const int T = G.duration;
     const double latest = least(box[2 * T + 1], up(centre[T] + half[T] * e.high[T] + SLACK * half[T]));
     const double first = most(box[2 * T], down(centre[T] + half[T] * e.low[T] - SLACK * half[T]));
     const double slowest = (1.0 / latest) * (1.0 - SLACK), mid = 0.5 * (latest + first);
@@ -308,7 +308,7 @@ class Relaxation {
     for (int i = 0; i < n; ++i) {
       score[i] += convexity[i];
       gap += score[i];
-      wide[i] = half[i] * (e.high[i] - e.low[i]) / G.range[i];
+      wide[i] = half[i] * (e.high[i] - e.low[i]) / G.ranges[i];
       width = most(width, wide[i]);
     }
     for (int i = 0; i < n; ++i) score[i] = (gap > 0.0 && gap < INFINITY ? score[i] / gap : 0.0) + WIDTH_SHARE * wide[i] / width;

@@ -15,15 +15,8 @@ from casadi import DM, SX
 
 from nlp_gait.gaits.biped.double_support import Division, Point2, support_box, torso_shares
 from nlp_gait.gaits.biped.single_support import swing_foot
-from nlp_gait.gaits.nao import double_support, single_support
 from nlp_gait.gaits.nao.body import ARM_JOINTS, GRAVITY, arm_joints
-from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
-from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import ground_load
-from nlp_gait.symbolic.dynamics import Wrench
-from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
-from nlp_gait.symbolic.world_frame import (
+from nlp_gait.gaits.nao.least_power.world_frame import (
     PartedWrench,
     chain_frames,
     leg_frames,
@@ -32,6 +25,12 @@ from nlp_gait.symbolic.world_frame import (
     upright,
     world_frame_dynamics,
 )
+from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.balance import ground_load
+from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
 # First of each pair of velocities at both ends: z, x, y.
 PAIRS = (1, 3, 5)
@@ -94,17 +93,32 @@ def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
     return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
 
 
-def double_support_phase(robot: Robot, step: float, rule: Division, cosine: float) -> PowerPhase:
-    """Each leg on its own foot."""
-    soles = double_support.soles_of(robot, step)
-    ankles = double_support.standing_ankles(robot, soles)
-    along, across = double_support.hip_ends(soles)
+def double_support_phase(
+    robot: Robot,
+    soles: Mapping[str, Point2],
+    hip_ends: tuple[Point2, Point2],
+    arm_swing: Mapping[str, Point2],
+    rule: Division,
+    cosine: float,
+) -> PowerPhase:
+    """Each leg on its own foot.
+
+    Args:
+        robot: of the phase.
+        soles: where the ankles stand, by side [m].
+        hip_ends: of the torso's origin in x and in y [m].
+        arm_swing: arm joints that move, from where to where [rad].
+        rule: how the torso's mass is divided.
+        cosine: largest one of the knee's angle, see ``leg_frames``.
+    """
+    ankles = {side: SX(DM([*xy, leg_geometry(robot, side).ankle_height_m])) for side, xy in soles.items()}
+    along, across = hip_ends
     feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
     weight = robot.mass_kg * GRAVITY
 
     def instant(z: SX, phase: float) -> PowerInstant:
         hip = _hip(z, along, across, phase)
-        arms = arm_joints(double_support.ARM_SWING, ONE, SX(phase))
+        arms = arm_joints(arm_swing, ONE, SX(phase))
         found = PowerInstant(rate_squared=1 / z[-1] ** 2)
         shares = torso_shares(hip.position[1], rule, feet_y)
         torso = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
@@ -124,28 +138,47 @@ def double_support_phase(robot: Robot, step: float, rule: Division, cosine: floa
     return PowerPhase(instant, sides, {axis: _to_nearer(*pair) for axis, pair in zip("xy", sides, strict=True)})
 
 
-def single_support_phase(robot: Robot, step: float, cosine: float) -> PowerPhase:
-    """The left leg carries everything."""
-    stance, foot = single_support.stance_of(robot, step), robot.feet["left"]
-    weight = robot.mass_kg * GRAVITY
-    support = SX(DM([*stance.support_xy, foot.ankle_height_m]))
+def single_support_phase(
+    robot: Robot,
+    support_xy: Point2,
+    swing_x: Point2,
+    swing_y: float,
+    hip_x: Point2,
+    hip_y: Point2,
+    arm_swing: Mapping[str, Point2],
+    cosine: float,
+) -> PowerPhase:
+    """The left leg carries everything.
+
+    Args:
+        robot: of the phase.
+        support_xy: where the left ankle stands [m].
+        swing_x: where the right ankle begins and ends [m].
+        swing_y: of its path [m].
+        hip_x: where the torso's origin begins and ends [m].
+        hip_y: likewise.
+        arm_swing: arm joints that move, from where to where [rad].
+        cosine: largest one of the knee's angle, see ``leg_frames``.
+    """
+    foot, weight = robot.feet["left"], robot.mass_kg * GRAVITY
+    support = SX(DM([*support_xy, foot.ankle_height_m]))
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip = _hip(z, stance.hip_x, stance.hip_y, phase)
-        arms = arm_joints(single_support.ARM_SWING, ONE, SX(phase))
+        hip = _hip(z, hip_x, hip_y, phase)
+        arms = arm_joints(arm_swing, ONE, SX(phase))
         found = PowerInstant(rate_squared=1 / z[-1] ** 2)
-        begin, end = (SX(x) for x in stance.swing_x)
-        swing = swing_foot(begin, end, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
+        begin, end = (SX(x) for x in swing_x)
+        path = swing_foot(begin, end, swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
         upper = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
         for side in "LR":
             upper = upper.plus(_arms(robot, side, arms, hip.acceleration, found))
-        upper = upper.plus(_swing(robot, "R", hip, swing, cosine, found))
+        upper = upper.plus(_swing(robot, "R", hip, path, cosine, found))
         ankle = Motion(support, SX(3, 1), SX(3, 1))
         ground = _stance(robot, "L", hip, ankle, upper, cosine, found).in_time(found.rate_squared)
         found.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
         return found
 
-    x, y = stance.support_xy
+    x, y = support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))
     return PowerPhase(instant, sides, {"x": _to_side_of_ankle(x, *sides[0]), "y": _to_nearer(*sides[1])})
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from benchmarks.guarantees.bounds import errors
-from nlp_gait.gaits.nao.body import ARM_JOINTS, nao, upright_frames, upright_plan
+from nlp_gait.gaits.nao.body import ARM_JOINTS, nao, upright_plan
+from nlp_gait.gaits.nao.least_power.world_frame import leg_rates, world_frame_dynamics
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion
-from nlp_gait.symbolic.world_frame import leg_rates, world_frame_dynamics
+from tests.gaits.nao.torque_bounds import enclose_sample, upright_frames
 
 SEED = 11
 GRAVITY = 9.8
@@ -69,6 +69,6 @@ def test_rates_of_a_leg_are_those_of_its_angles() -> None:
 
 
 def test_over_a_box_bounds_of_torques_are_a_tenth_as_wide() -> None:
-    recursion, world = errors(2.0**-5)
+    recursion, world = enclose_sample(2.0**-5)
     assert world.torque_Nm < 0.1 * recursion.torque_Nm
     assert world.zmp_m < 0.01 * recursion.zmp_m

@@ -1,0 +1,76 @@
+"""A least-power problem in other variables, for proofs: its formulas have narrower bounds over boxes than the exact functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from nlp_gait.formulation.motion.signals import Array
+
+Integers = np.ndarray[Any, np.dtype[np.int32]]
+
+# Largest relative difference of the form and the exact functions, both in double precision; every bound is widened by the second
+# number to make up for it.
+AGREEMENT, WIDENING = 1e-11, 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PowerRows:
+    """Roles of the outputs of a function: rows with bounds, and the terms of the cost.
+
+    The cost is the sum of weight |torque rate| over K terms, divided by the duration, plus the sum of loss times heat.
+
+    Attributes:
+        row: (R,) outputs that are limited.
+        lower: (R,) their bounds.
+        upper: (R,).
+        power: (K,) outputs torque times rate.
+        torque: (K,) outputs.
+        rate: (K,) outputs, in unit time.
+        weight: (K,) positive.
+        heat: (L,) outputs that are never negative.
+        loss: (L,) positive.
+        duration: input.
+        ranges: (n,) widths of the inputs, in which boxes are measured.
+    """
+
+    row: Integers
+    lower: Array
+    upper: Array
+    power: Integers
+    torque: Integers
+    rate: Integers
+    weight: Array
+    heat: Integers
+    loss: Array
+    duration: int
+    ranges: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PowerForm:
+    """A least-power problem as a function of z, into which every x is mapped.
+
+    Attributes:
+        to_z: maps points (..., n) to their z (..., n).
+        box: (n, 2) box that contains the z of every x within its bounds.
+        function: maps z to all outputs.
+        rows: roles of these outputs. Their bounds contain every point that the judge accepts.
+        poses: maps z to the outputs of the rows that cost little, which are bounded first.
+        pose_rows: (E,) numbers of these rows in ``rows``.
+        indexes: maps z to indexes of the problem, under the same names; they are compared with the exact functions.
+        domain: prefix of the names of the rows that must be satisfied where the two are compared.
+    """
+
+    to_z: Callable[[Array], Array]
+    box: Array
+    function: ca.Function
+    rows: PowerRows
+    poses: ca.Function
+    pose_rows: Integers
+    indexes: ca.Function
+    domain: str
