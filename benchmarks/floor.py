@@ -13,9 +13,8 @@ from pathlib import Path
 
 import casadi as ca
 
-from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags
 from nlp_gait.backends.kernel.library_cache import load_library
-from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 
 MEASURED = ("multiply", "divide", "sqrt", "sin", "cos", "acos", "atan2")
 KINDS = {

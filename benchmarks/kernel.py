@@ -15,8 +15,8 @@ from benchmarks.casadi_code import compiled_functions
 from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
+from nlp_gait.backends.kernel.evaluators import NativeKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
-from nlp_gait.backends.kernel.native_kernel import NativeKernel
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
 from nlp_gait.robots import Robot

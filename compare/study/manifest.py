@@ -15,8 +15,7 @@ from typing import Any, Literal
 
 from compare.study.settings import StudySettings, settings_from
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import read_json, refusing, write_json

@@ -6,9 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from nlp_gait.backends.kernel.compiler import read_native_source
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source
 from nlp_gait.backends.kernel.kernel_source import build_kernel, write_kernel_source
-from nlp_gait.backends.kernel.native_kernel import BASE_FLAGS
 from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance, OneSidedRows

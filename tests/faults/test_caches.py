@@ -36,7 +36,7 @@ def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
     )
     done = in_own_mounts('PYTHON="$1"; ' + script, str(cache), str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("\n") == 1 and "compiled code is kept for this process only" in done.stderr
+    assert done.stderr.count("\n") == 1 and "compiled code is stored for this process only" in done.stderr
     assert "Read-only file system" in done.stderr and not list(cache.iterdir())
     assert len(runs(tmp_path / "out")) == 6
 
@@ -51,12 +51,12 @@ def test_two_processes_share_a_cache_and_an_output_folder(tmp_path: Path) -> Non
     assert runs(tmp_path / "both") == runs(tmp_path / "alone") and len(runs(tmp_path / "both")) == 6
     assert all(read_record(path) for path in tmp_path.glob("both/records/*/*.json"))
     assert not list(tmp_path.rglob("*.tmp*"))
-    assert all(library_cache._load(file, ()) for file in (tmp_path / "cache").iterdir())
+    assert all(library_cache.load_checked(file, ()) for file in (tmp_path / "cache").iterdir())
 
 
 def test_a_load_makes_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(tmp_path))
-    monkeypatch.setattr(library_cache, "_private_folder", library_cache.cache(lambda: pytest.fail("made")))
+    monkeypatch.setattr(library_cache, "private_folder", library_cache.cache(lambda: pytest.fail("made")))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         source = 'extern "C" int one(void) { return 1; }\n'

@@ -59,7 +59,7 @@ def test_the_objective_is_interpreted_and_that_is_said(
     objective = nlp_gait.compile_objective(problem)
     assert objective.backend == "interpreted"
     assert len(caplog.messages) == 1
-    assert "interpreted, many times slower" in caplog.messages[0] and words in caplog.messages[0]
+    assert "interpreted, which is many times slower" in caplog.messages[0] and words in caplog.messages[0]
     X = np.array([[1.0, 1.0], [2.0, 0.25], [-2.5, 1.0]])
     f, violation = objective(X)
     expected = [[found.cost, found.violation] for found in (evaluated(problem, x) for x in X)]

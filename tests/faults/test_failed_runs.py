@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from metaheuristics import ParticleSwarm
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, _private_folder, _warn_once, find_cache_folder
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_folder, private_folder, warn_once
 from tests.faults.processes import ROOT
 
 RUN = CliRunner()
@@ -90,9 +90,9 @@ def test_a_user_without_a_home_compiles_in_a_temporary_folder(
 
     monkeypatch.setattr(Path, "home", no_home)
     monkeypatch.chdir(tmp_path)
-    _warn_once.cache_clear()
+    warn_once.cache_clear()
     folder = find_cache_folder()
-    assert folder == _private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
+    assert folder == private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
     assert "Could not determine home directory." in caplog.text
 
 
@@ -114,4 +114,4 @@ def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "Failed runs" not in done.stdout and "Traceback" not in done.stderr
-    assert "compiled code is kept for this process only" in done.stderr
+    assert "compiled code is stored for this process only" in done.stderr

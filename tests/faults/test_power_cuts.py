@@ -86,7 +86,7 @@ def a_compiled_library(folder: Path, finished: Finished) -> None:
         patch.setenv(library_cache.FOLDER_VARIABLE, str(folder / "cache"))
         built = folder.parent / "library.so"
         built.write_bytes(b"code" * 20)
-        finished(library_cache._stored(built, "key"))
+        finished(library_cache.store_library(built, "key"))
 
 
 SCENARIOS = (
@@ -172,7 +172,7 @@ ALLOWED = {
     "compare/bench/baseline.py",
     "compare/drawing/animation.py",
     "compare/drawing/figures.py",
-    "compare/drawing/shown_figure.py",  # into memory
+    "compare/drawing/notebook_figure.py",  # into memory
     "compare/study/store.py",
     "nlp_gait/proofs/branch_and_bound.py",
     "nlp_gait/processes.py",  # /dev/null

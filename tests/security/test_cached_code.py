@@ -21,8 +21,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder, private = tmp_path / "cache", tmp_path / "private"
     private.mkdir(mode=0o700)
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "_private_folder", functools.cache(lambda: private))
-    library_cache._warn_once.cache_clear()
+    monkeypatch.setattr(library_cache, "private_folder", functools.cache(lambda: private))
+    library_cache.warn_once.cache_clear()
     return folder
 
 

@@ -1,1 +1,1 @@
-"""The exact functions as native code for whole populations: emitted C++, compiled, cached, called."""
+"""The exact functions as native code for whole populations: C++ is written, compiled, cached and called."""

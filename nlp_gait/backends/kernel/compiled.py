@@ -1,4 +1,4 @@
-"""A problem's exact functions as a batch objective for search algorithms: compiled if there is a compiler, else interpreted."""
+"""A problem's exact functions as an objective for searches, for many candidates at once: compiled, or interpreted."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
-from nlp_gait.backends.kernel.interpreted import InterpretedKernel
-from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
-from nlp_gait.backends.kernel.native_kernel import NativeKernel
+from nlp_gait.backends.kernel.evaluators import InterpretedKernel, NativeKernel
+from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import CompilerError, InputError, checked_count, shown
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.numbers import real_numbers
@@ -27,18 +26,18 @@ CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
 MOST_THREADS = 1024
-# A second thread takes part once it has this much to do; handing over the work costs about 0.05 ms.
+# Least work of a thread; handing over work costs about 0.05 ms.
 LEAST_THREAD_TIME_S = 3e-4
 
 
 class CompiledObjective:
     """Objective and total violation of many candidates at once.
 
-    Several threads and forked processes may call it, and it can be pickled if its problem can: it is compiled, or found in the
-    cache folder, where it arrives.
+    Several threads and forked processes may call it. It can be pickled if its problem can be: it is compiled, or loaded from the
+    cache folder, where it is unpickled.
 
     Attributes:
-        problem: with the parameter values that are used.
+        problem: with the parameter values to use.
         names: (n,) variables.
         lower: (n,) current lower bounds.
         upper: (n,) current upper bounds.
@@ -53,9 +52,9 @@ class CompiledObjective:
         problem: GaitProblem,
         evaluator: NativeKernel | InterpretedKernel,
         threads: int,
-        again: Callable[..., CompiledObjective],
+        rebuild: Callable[..., CompiledObjective],
     ) -> None:
-        """Use ``compile_objective`` instead; ``again`` makes this objective from its problem."""
+        """Use ``compile_objective`` instead; ``rebuild`` makes this objective from its problem."""
         kernel = build_kernel(problem)
         self.problem = problem
         self.names = problem.names
@@ -73,14 +72,14 @@ class CompiledObjective:
         self._p = np.array(problem.p)
         self._threads = threads
         self._time_per_row_s = 0.0
-        self._again = again
+        self._rebuild = rebuild
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
         """Evaluate candidates.
 
         Args:
-            X: (P, n) candidates, one a row; or one candidate by name, as in ``solution.x``, which counts as one row.
+            X: (P, n) candidates, one per row; or one candidate by name, as in ``solution.x``, which counts as one row.
 
         Returns:
             (P,) cost, which is to be minimised: the objective, negated if the problem maximises it; and (P,) violation
@@ -88,16 +87,16 @@ class CompiledObjective:
             where a row of X is not finite.
 
         Raises:
-            InputError: X has another shape, or is not made of numbers.
+            InputError: X has another shape, or does not consist of numbers.
         """
-        X = self._checked(X)
+        X = self._check(X)
         f, violation = np.empty(len(X)), np.empty(len(X))
         self._evaluate(X, f, violation, None)
         return f, violation
 
     def constraints(self, X: Array | Mapping[str, float]) -> Array:
-        """(P, m) values of all constraint rows, named by ``row_names``; bounds of the variables are the last n."""
-        X = self._checked(X)
+        """Return (P, m) values of all constraint rows, named by ``row_names``; the last n are the variables."""
+        X = self._check(X)
         f, violation, g = np.empty(len(X)), np.empty(len(X)), np.empty((len(X), len(self.row_names)))
         self._evaluate(X, f, violation, g)
         return g
@@ -112,46 +111,44 @@ class CompiledObjective:
         return signed[:, : len(self.groups)]
 
     def __reduce__(self) -> tuple[Callable[..., CompiledObjective], tuple[Any, ...]]:
-        """For pickle: the call that made it."""
-        return self._again, (self.problem,)
+        return self._rebuild, (self.problem,)
 
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
         rows = len(X)
         parts = min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S))
         started = time.perf_counter()
         if parts <= 1:
-            self._part(X, f, violation, g)
+            self._evaluate_part(X, f, violation, g)
         else:
             cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
             pieces = [(X[cut], f[cut], violation[cut], None if g is None else g[cut]) for cut in cuts]
-            pool = self._threads_of_this_process()
-            jobs = [pool.submit(self._part, *piece) for piece in pieces[1:]]
-            self._part(*pieces[0])
+            pool = self._get_pool()
+            jobs = [pool.submit(self._evaluate_part, *piece) for piece in pieces[1:]]
+            self._evaluate_part(*pieces[0])
             wait(jobs)
             for job in jobs:
                 job.result()
         if rows:
             self._time_per_row_s = (time.perf_counter() - started) * max(parts, 1) / rows
 
-    def _part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
+    def _evaluate_part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
         self._evaluator(X, self._p, self._lower, self._upper, f, violation, g)
 
-    def _threads_of_this_process(self) -> ThreadPoolExecutor:
-        """Helping threads; a forked process has none of its parent's, and starts its own."""
-        own = os.getpid()
-        if self._pool is None or self._pool[0] != own:
-            # Two threads at once may start two; the one that is not kept ends with its work.
-            self._pool = own, ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
+    def _get_pool(self) -> ThreadPoolExecutor:
+        process = os.getpid()  # a forked process has no threads of its parent, and starts its own
+        if self._pool is None or self._pool[0] != process:
+            # Two threads at once may start two pools; the one that is overwritten ends with its work.
+            self._pool = process, ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
         return self._pool[1]
 
-    def _checked(self, X: Array | Mapping[str, float]) -> Array:
-        """X as contiguous, aligned doubles, copied only if it is not that already."""
+    def _check(self, X: Array | Mapping[str, float]) -> Array:
+        """Return X as contiguous, aligned doubles, copied only if necessary."""
         if isinstance(X, Mapping):
             return self.problem.check_x(X)[None]
         array = np.require(real_numbers(f"X of {self.problem.name}", X), requirements=("C", "A"))
         if array.ndim != 2 or array.shape[1] != len(self.names):
             raise InputError(
-                f"X of {self.problem.name} must have one candidate a row and {len(self.names)} columns "
+                f"X of {self.problem.name} must have one candidate per row and {len(self.names)} columns "
                 f"({', '.join(self.names)}), got shape {array.shape}"
             )
         return array
@@ -160,15 +157,15 @@ class CompiledObjective:
 def compile_objective(
     problem: GaitProblem, *, require_compiler: bool = False, threads: int | None = None, lanes: int | None = None
 ) -> CompiledObjective:
-    """Exact objective and violation of a problem for batches of candidates.
+    """Return the exact objective and violation of a problem for batches of candidates.
 
-    The library is built once and kept in the user's cache folder; other parameter values, bounds or fixed variables need
-    no other library.
+    The library is built once and stored in the user's cache folder; other parameter values, bounds or fixed variables need no
+    other library.
 
     Args:
         problem: with the parameter values to use.
         require_compiler: raise rather than fall back to the interpreter.
-        threads: at most so many take part in a large batch; None for all cores. Results do not depend on it.
+        threads: largest number of threads for a large batch; None for all cores. Results do not depend on it.
         lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
     Raises:
@@ -181,7 +178,7 @@ def compile_objective(
         raise InputError(f"require_compiler must be True or False, got {shown(require_compiler)}")
     if not problem.searchable:
         raise InputError(
-            f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can meet; use solve"
+            f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can satisfy; use solve"
         )
     if threads is not None:
         threads = checked_count("threads", threads, at_most=MOST_THREADS)
@@ -192,35 +189,31 @@ def compile_objective(
     used = threads or available_cores()
     try:
         compiler = find_compiler()
-        evaluator = problem.build_once(_native_kernel, compiler, count)
+        evaluator = problem.build_once(_build_native, compiler, count)
     except CompilerError as error:
         if require_compiler:
             raise
-        LOG.warning("the objective is interpreted, many times slower: %s", error)
-        evaluator = problem.build_once(_interpreted_kernel)
-        used = 1  # the virtual machine does not let go of Python's lock
-    again = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
-    return CompiledObjective(problem, evaluator, used, again)
+        LOG.warning("the objective is interpreted, which is many times slower: %s", error)
+        evaluator = problem.build_once(_build_interpreted)
+        used = 1  # the virtual machine does not release Python's lock
+    rebuild = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
+    return CompiledObjective(problem, evaluator, used, rebuild)
 
 
-def _native_kernel(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:
-    kernel = build_kernel(problem)
-    native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
-    return _verified(native, problem, kernel)
-
-
-def _interpreted_kernel(problem: GaitProblem) -> InterpretedKernel:
+def _build_interpreted(problem: GaitProblem) -> InterpretedKernel:
     return InterpretedKernel(build_kernel(problem))
 
 
-def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> NativeKernel:
-    """The native kernel, if it computes what the virtual machine does at more than half of some random points.
+def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:
+    """Build the native kernel, and check that it agrees with the virtual machine at most of some random points.
 
     Not at all of them: where rounding decides a jump, both may be right.
 
     Raises:
-        CompilerError: it does not: the compiler is broken, or is not for this machine.
+        CompilerError: they differ: the compiler is broken, or is not for this machine.
     """
+    kernel = build_kernel(problem)
+    native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
     draw = Random(0).random  # NumPy's generators would take a tenth of a process's start to import
     shares = np.array([[draw() for _ in problem.names] for _ in range(CHECK_POINTS)])
     X = problem.lower + shares * (problem.upper - problem.lower)
@@ -238,7 +231,7 @@ def _verified(native: NativeKernel, problem: GaitProblem, kernel: Kernel) -> Nat
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

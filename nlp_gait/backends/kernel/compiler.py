@@ -1,4 +1,4 @@
-"""The C++ compiler of this machine: found, asked for its version, run with a time limit."""
+"""The C++ compiler of this machine, its version and flags; it runs with a time limit."""
 
 from __future__ import annotations
 
@@ -25,10 +25,12 @@ HOW_TO_GET_ONE = (
     "to get a compiler: pip install 'nlp-gait[compiler]', or your system's g++ or clang++, or name one in the environment "
     "variable CXX"
 )
+# No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing here: so results
+# are the virtual machine's bit for bit, except where vector functions of libm round differently. Hidden symbols let the compiler
+# inline CasADi's helpers.
+BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 
-
-# Runs a program that ends with this process, however that ends: the end of the pipe on standard input, which nobody writes to,
-# is the end of whoever holds its other side.
+# Runs a program that ends with this process, however this process ends: then the pipe on its standard input is closed.
 WATCHED = (
     "/bin/sh",
     "-c",
@@ -44,7 +46,7 @@ class Compiler:
 
     Attributes:
         command: program and leading arguments.
-        version: what ``--version`` says, for cache keys.
+        version: output of ``--version``, for cache keys.
     """
 
     command: tuple[str, ...]
@@ -52,14 +54,14 @@ class Compiler:
 
     @property
     def summary(self) -> str:
-        """Program and first line of the version."""
+        """Program, and first line of the version."""
         return f"{' '.join(self.command)} ({self.version.splitlines()[0] if self.version else 'version unknown'})"
 
     def build(self, source: Path, library: Path, flags: Sequence[str]) -> None:
         """Compile one C++ file into a shared library.
 
         Raises:
-            CompilerError: the compiler fails, does not end in time, or leaves no library.
+            CompilerError: the compiler fails, exceeds its time limit, or writes no library.
         """
         command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
         _run(command, TIME_LIMIT_S)
@@ -68,16 +70,16 @@ class Compiler:
 
 
 def read_native_source(package: str, *names: str) -> str:
-    """C++ of the files in a package's folder ``native``, one after the other."""
+    """Return the C++ of files in a package's folder ``native``, one after the other."""
     native = files(package) / "native"
     return "\n".join((native / name).read_text(encoding="utf-8") for name in names)
 
 
 def find_compiler() -> Compiler:
-    """The first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
+    """Return the first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
 
     Raises:
-        CompilerError: there is none; the message says what was tried.
+        CompilerError: there is no compiler; the message says what was tried.
     """
     return _find(os.environ.get("CXX", ""), os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
@@ -86,9 +88,12 @@ def find_compiler() -> Compiler:
 def _find(cxx: str, cc: str, path: str) -> Compiler:
     tried: list[str] = []
     for name, text in (("CXX", cxx), ("CC", cc)):
-        if _words(text) == ():
+        if _split(text) == ():
             tried.append(f"{name}={text!r}: not a command line")
-    for command in _candidates(cxx, cc):
+    commands = [command for text in (cxx, cc) if (command := _split(text))] + [(name,) for name in COMMON_NAMES]
+    if find_spec("ziglang") is not None:
+        commands.append((sys.executable, "-m", "ziglang", "cc"))
+    for command in commands:
         if shutil.which(command[0], path=path) is None:
             tried.append(f"{command[0]}: not found")
             continue
@@ -99,16 +104,8 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
     raise CompilerError(f"no C++ compiler ({'; '.join(tried)}); {HOW_TO_GET_ONE}")
 
 
-def _candidates(cxx: str, cc: str) -> list[tuple[str, ...]]:
-    named = [words for variable in (cxx, cc) if (words := _words(variable))]
-    found: list[tuple[str, ...]] = [(name,) for name in COMMON_NAMES]
-    if find_spec("ziglang") is not None:
-        found.append((sys.executable, "-m", "ziglang", "cc"))
-    return named + found
-
-
-def _words(text: str) -> tuple[str, ...] | None:
-    """Words of a command line; none where its quotes are not closed or it names no program, None if there is no text."""
+def _split(text: str) -> tuple[str, ...] | None:
+    """Split a command line: () if a quote is not closed or there is no program, None if there is no text."""
     if not text.strip():
         return None
     try:
@@ -119,13 +116,13 @@ def _words(text: str) -> tuple[str, ...] | None:
 
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:
-    """Standard output of a program that ends with status 0 in time."""
+    """Run a program, and return its standard output."""
     program = Path(command[0]).name
-    watched, held = os.pipe()
+    read_end, write_end = os.pipe()
     try:
         process = subprocess.Popen(
             [*WATCHED, *command] if os.name == "posix" else command,
-            stdin=watched,
+            stdin=read_end,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -133,10 +130,10 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
             start_new_session=True,  # so that the compiler's own children can be killed with it
         )
     except OSError as error:
-        os.close(held)
+        os.close(write_end)
         raise CompilerError(f"{program} cannot be run: {error}") from error
     finally:
-        os.close(watched)
+        os.close(read_end)
     try:
         output, messages = process.communicate(timeout=time_limit_s)
     except subprocess.TimeoutExpired as error:
@@ -145,20 +142,20 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-        os.close(held)
+        os.close(write_end)
     if process.returncode != 0:
         lines = [line.strip() for line in messages.splitlines() if line.strip()]
         reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
         status = (
             process.returncode if process.returncode <= 128 else 128 - process.returncode
-        )  # a signal, as sh says it
+        )  # sh adds 128 to a signal
         raise CompilerError(f"{program} failed with exit status {status}: {reason}")
     return output
 
 
 @functools.cache
 def cpu_features() -> frozenset[str]:
-    """Names of the instruction sets that this CPU has, as the operating system spells them; empty if it does not say."""
+    """Return the names of this CPU's instruction sets as the operating system spells them; empty where they are unknown."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="ignore").splitlines()
     except OSError:
@@ -170,24 +167,20 @@ def cpu_features() -> frozenset[str]:
     return frozenset()
 
 
-# Flags that let the compiler use what the CPU has, by lane count; each needs the features named.
-X86_SETS = (
-    (8, ("avx512f", "avx512dq", "avx512vl", "avx512bw", "avx2", "fma")),
-    (4, ("avx2", "fma")),
-)
+# Instruction sets that a lane count needs; the compiler may use them.
+X86_SETS = {8: ("avx512f", "avx512dq", "avx512vl", "avx512bw", "avx2", "fma"), 4: ("avx2", "fma")}
 
 
 def native_lanes() -> int:
-    """Doubles that one instruction of this CPU works on: 8 (AVX-512), 4 (AVX2), 2 (SSE2, NEON), else 1."""
+    """Return how many doubles one instruction of this CPU works on: 8 (AVX-512), 4 (AVX2), 2 (SSE2, NEON), else 1."""
     machine = platform.machine().lower()
     if machine in ("x86_64", "amd64"):
-        return next((lanes for lanes, needed in X86_SETS if cpu_features().issuperset(needed)), 2)
+        return next((lanes for lanes, needed in X86_SETS.items() if cpu_features().issuperset(needed)), 2)
     return 2 if machine in ("aarch64", "arm64") else 1
 
 
 def lane_flags(lanes: int) -> tuple[str, ...]:
-    """Compiler flags for a lane count."""
+    """Return the compiler flags for a lane count."""
     if platform.machine().lower() in ("x86_64", "amd64"):
-        needed = dict(X86_SETS).get(lanes, ())
-        return tuple(f"-m{feature}" for feature in needed)
+        return tuple(f"-m{feature}" for feature in X86_SETS.get(lanes, ()))
     return ()

@@ -27,8 +27,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     private = tmp_path / "private"
     private.mkdir()
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "_private_folder", functools.cache(lambda: private))
-    library_cache._warn_once.cache_clear()
+    monkeypatch.setattr(library_cache, "private_folder", functools.cache(lambda: private))
+    library_cache.warn_once.cache_clear()
     return folder
 
 
@@ -67,7 +67,7 @@ def test_a_broken_library_is_built_again(cache: Path, compiler: Compiler, damage
     path.unlink()
     path.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
     assert answer(compiler)[0] == 42
-    assert [library_cache._load(file, ("answer",)) is not None for file in cache.iterdir()] == [True]
+    assert [library_cache.load_checked(file, ("answer",)) is not None for file in cache.iterdir()] == [True]
 
 
 def test_a_library_without_the_function_is_not_trusted(cache: Path, compiler: Compiler) -> None:
@@ -101,7 +101,7 @@ def test_a_cache_that_cannot_be_made_or_trusted(
     for make in (lambda: cache.write_text("a file"), lambda: cache.symlink_to(target), lambda: _open_to_all(cache)):
         make()
         caplog.clear()
-        library_cache._warn_once.cache_clear()
+        library_cache.warn_once.cache_clear()
         assert answer(compiler)[0] == 42
         assert find_cache_folder() != cache
         assert len(caplog.messages) == 1 and "cannot be used" in caplog.messages[0]
@@ -143,7 +143,7 @@ def test_two_processes_at_once_end_with_good_libraries(cache: Path) -> None:
         subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=root) for _ in range(2)
     ]
     assert [process.communicate()[0].strip() for process in processes] == ["42", "42"]
-    assert all(library_cache._load(file, ("answer",)) is not None for file in cache.iterdir())
+    assert all(library_cache.load_checked(file, ("answer",)) is not None for file in cache.iterdir())
 
 
 def test_a_compiler_that_fails_says_why(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
