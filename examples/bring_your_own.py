@@ -35,7 +35,7 @@ HIP_HEIGHT = 0.77  # [m]
 JOINTS = ("hip", "knee")
 
 
-@maker()
+@maker
 def two_link(*, intervals: int = 20, lift_m: float = 0.05) -> GaitProblem:
     """A leg of two links swings from behind to ahead of the hip at least mean power, its foot above the ground."""
     s = DM(np.linspace(0.0, 1.0, intervals + 1)).T

@@ -50,7 +50,7 @@ def assemble(at, ops):
     return Assembly(objective=power, constraints=rows, indexes={"speed_m_s": speed})
 
 
-@maker()
+@maker
 def walker() -> GaitProblem:
     """A step of two legs at least power, at a speed."""
     variables = tuple(Variable(name=name, unit=name.split("_")[-1], lower=low, upper=high, description="of the step")

@@ -6,6 +6,8 @@ exact functions to search algorithms.
 
 from __future__ import annotations
 
+from nlp_gait.providers import FUNCTIONS, PROBLEMS, import_object
+
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,19 +21,38 @@ if TYPE_CHECKING:
     from nlp_gait.formulation import GaitProblem, load, problem_names
     from nlp_gait.formulation.solution import Solution
 
-# Imported when first used: a search needs no NLP solver, a solve no kernel, and the command line begins at once.
-_LATER = {
-    "GaitError": "nlp_gait.errors",
-    "GaitProblem": "nlp_gait.formulation",
-    "load": "nlp_gait.formulation",
-    "problem_names": "nlp_gait.formulation",
-    "CompiledObjective": "nlp_gait.backends.kernel.compiled",
-    "compile_objective": "nlp_gait.backends.kernel.compiled",
-    "IpoptSettings": "nlp_gait.backends.solvers.ipopt",
-    "Solution": "nlp_gait.formulation.solution",
-    "solve": "nlp_gait.backends.solve",
-    "make_solver": "nlp_gait.backends.solvers.registry",
+# Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
+_LAZY = {
+    "GaitError": "nlp_gait.errors:GaitError",
+    "GaitProblem": "nlp_gait.formulation:GaitProblem",
+    "load": "nlp_gait.formulation:load",
+    "problem_names": "nlp_gait.formulation:problem_names",
+    "CompiledObjective": "nlp_gait.backends.kernel.compiled:CompiledObjective",
+    "compile_objective": "nlp_gait.backends.kernel.compiled:compile_objective",
+    "IpoptSettings": "nlp_gait.backends.solvers.ipopt:IpoptSettings",
+    "Solution": "nlp_gait.formulation.solution:Solution",
+    "solve": "nlp_gait.backends.solve:solve",
+    "make_solver": "nlp_gait.backends.solvers.registry:make_solver",
 }
+# What lower packages use of higher ones, by name.
+PROBLEMS.update(
+    {
+        "nao-ssp": "nlp_gait.gaits.nao.single_support:nao_ssp",
+        "nao-dsp": "nlp_gait.gaits.nao.double_support:nao_dsp",
+        "nao-ssp-free": "nlp_gait.gaits.nao.single_support_free:nao_ssp_free",
+        "nao-dsp-free": "nlp_gait.gaits.nao.double_support_free:nao_dsp_free",
+        "nao-cycle": "nlp_gait.gaits.nao.cycle.problem:nao_cycle",
+        "humanoid-ssp": "nlp_gait.gaits.humanoid.single_support:humanoid_ssp",
+        "humanoid-dsp": "nlp_gait.gaits.humanoid.double_support:humanoid_dsp",
+        "humanoid-cycle": "nlp_gait.gaits.humanoid.cycle:humanoid_cycle",
+        "walk12": "nlp_gait.gaits.walk12.problem:walk12",
+        "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
+        "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
+        "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
+        "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
+    }
+)
+FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 
 __all__ = [
     "CompiledObjective",
@@ -49,12 +70,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import or read a public name when it is first used."""
-    from importlib import import_module
-
     if name == "__version__":
         from importlib.metadata import version
 
         return version("nlp-gait")
-    if name not in _LATER:
+    if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LATER[name]), name)
+    return import_object(_LAZY[name])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
@@ -18,6 +19,7 @@ from nlp_gait.files import read_json, refusing
 
 T = TypeVar("T")
 
+MISSPELLED = 0.8  # similarity, see ``difflib``
 WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 
@@ -28,6 +30,7 @@ def decoded(
     *,
     given: Mapping[str, Any] | None = None,
     unread: Collection[str] = (),
+    ignore_unknown: bool = False,
 ) -> T:
     """Instance of a dataclass.
 
@@ -37,6 +40,7 @@ def decoded(
         where: place in the file, for messages.
         given: fields that do not stand in the file.
         unread: keys that may stand beside the fields.
+        ignore_unknown: allow all other keys, except those that look like a misspelled field.
 
     Raises:
         ValueError: with the place: a key is missing or unknown, or a value has another type.
@@ -52,7 +56,8 @@ def decoded(
         elif needed:
             raise ValueError(f"{place} is missing")
     for key in raw:
-        if key not in known and key not in unread:
+        ignored = key in unread or (ignore_unknown and not get_close_matches(key, known, cutoff=MISSPELLED))
+        if key not in known and not ignored:
             raise ValueError(str(unknown(f"key of {where}" if where else "key", key, known)))
     return cls(**values)
 

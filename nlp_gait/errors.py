@@ -33,8 +33,8 @@ class InputError(GaitError):
     """A value that is not allowed: wrong length, not finite, outside its bounds, bounds inverted."""
 
 
-class OwnCodeError(InputError):
-    """Code of one's own that cannot be found, was not named, or fails."""
+class UserCodeError(InputError):
+    """User code that cannot be found, was not named, or fails."""
 
 
 class CompilerError(GaitError):

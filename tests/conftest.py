@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
@@ -59,13 +60,13 @@ def built_once() -> Iterator[None]:
             robot = options.get("robot", "")
             if isinstance(robot, str) and is_robot_file(robot):
                 return make(**options)
-            registry.check(make, options)  # first, for what is not hashable
+            registry.check_maker_options(make, options)  # first, for what is not hashable
             return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))
 
         return shared
 
     def maker_of(name: str) -> Callable[..., GaitProblem]:
-        return shared_maker(name) if name in registry.PROBLEMS else find(name)
+        return shared_maker(name) if name in PROBLEMS else find(name)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(registry, "problem_maker", maker_of)

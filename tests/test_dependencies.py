@@ -1,20 +1,23 @@
-"""The dependency rule: imports go only from the later layers to the earlier ones, and importing stays cheap."""
+"""The dependency rule: later layers import earlier ones only, by statement or by name; no cycles; importing stays cheap."""
 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
-# A room imports from itself and from rooms before it only.
-ROOMS = (
+# A layer imports from itself and from earlier layers only.
+LAYERS = (
     "nlp_gait.interrupts",
     "nlp_gait.errors",
+    "nlp_gait.providers",
     "nlp_gait.processes",
     "nlp_gait.disk",
     "nlp_gait.files",
@@ -22,7 +25,7 @@ ROOMS = (
     "nlp_gait.notebook",
     "nlp_gait.decoding",
     "nlp_gait.progress",
-    "nlp_gait.references",
+    "nlp_gait.user_code",
     "nlp_gait.robots",
     "nlp_gait.symbolic",
     "nlp_gait.formulation",
@@ -44,8 +47,10 @@ ROOMS = (
     "compare.papers",
     "compare.cli",
 )
-# The front doors of packages: what stands in them is for users, and the command line stands above all.
-DOORS = ("nlp_gait", "nlp_gait.__main__", "compare", "compare.__main__")
+# Entry points of packages, which may import every layer; no layer up to ``export`` imports them.
+ENTRIES = ("nlp_gait", "nlp_gait.__main__", "compare", "compare.__main__")
+PACKAGES = ("nlp_gait", "metaheuristics", "compare")
+PLACE = re.compile(rf"({'|'.join(PACKAGES)})(\.\w+)+(:\w+)?")
 FAMILIES = ("humanoid", "nao", "stairs", "walk12")
 
 
@@ -55,12 +60,16 @@ def modules(package: str) -> list[str]:
     return [".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in paths]
 
 
+def parse(module: str) -> ast.Module:
+    path = ROOT.joinpath(*module.split("."))
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(module: str) -> Iterator[str]:
     """Dotted names that a module imports anywhere in its text, relative ones resolved."""
-    path = ROOT.joinpath(*module.split("."))
-    is_package = path.is_dir()
-    text = (path / "__init__.py" if is_package else path.with_suffix(".py")).read_text(encoding="utf-8")
-    for node in ast.walk(ast.parse(text)):
+    is_package = ROOT.joinpath(*module.split(".")).is_dir()
+    for node in ast.walk(parse(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -69,66 +78,94 @@ def imports(module: str) -> Iterator[str]:
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
+def named_modules(module: str) -> Iterator[str]:
+    """What a module names in texts as ``"package.module"`` or ``"package.module:object"``."""
+    for node in ast.walk(parse(module)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and PLACE.fullmatch(node.value):
+            yield node.value.replace(":", ".")
+
+
 def within(name: str, *packages: str) -> bool:
     return any(name == package or name.startswith(f"{package}.") for package in packages)
 
 
-def room(name: str) -> int | None:
-    """Place of a dotted name among the rooms; None for a name that stands in a front door."""
-    found = [place for place, package in enumerate(ROOMS) if within(name, package)]
-    return found[0] if found else None
+def layer(name: str) -> int | None:
+    """Position of a dotted name among the layers; None for a name of an entry."""
+    return next((position for position, package in enumerate(LAYERS) if within(name, package)), None)
 
 
-ALL = [m for package in ("nlp_gait", "metaheuristics", "compare") for m in modules(package)]
+ALL = [m for package in PACKAGES for m in modules(package)]
 
 
 def wrong_imports(module: str) -> Iterator[str]:
-    """What a module imports from where it may not."""
-    own = room(module)
+    own = layer(module)
     if own is None:
-        if module not in DOORS:
-            yield "stands in no room"
+        if module not in ENTRIES:
+            yield "is in no layer"
         return
-    for name in imports(module):
-        if within(name, "nlp_gait", "metaheuristics", "compare"):
-            imported = room(name)
-            if imported is None:  # a front door, of packages that come before this one
-                if own <= ROOMS.index("nlp_gait.export"):
-                    yield f"imports {name} from a front door"
+    named = (name for name in named_modules(module) if {name, name.rpartition(".")[0]} & set(ALL) - set(ENTRIES))
+    for name in (*imports(module), *named):
+        if within(name, *PACKAGES):
+            imported = layer(name)
+            if imported is None:  # an entry of packages that come before this one
+                if own <= LAYERS.index("nlp_gait.export"):
+                    yield f"imports {name} from an entry"
                 if within(name, "compare"):
-                    yield f"imports {name} from its own front door"
+                    yield f"imports {name} from its own entry"
             elif imported > own:
-                yield f"imports {name} from a later room"
+                yield f"imports {name} from a later layer"
 
 
-def test_a_room_imports_earlier_rooms_only() -> None:
+def test_a_layer_imports_and_names_earlier_layers_only() -> None:
     assert not {module: wrong for module in ALL if (wrong := list(wrong_imports(module)))}
 
 
+def test_no_file_is_imported_by_its_own_name_as_a_text() -> None:
+    """``import_module`` with a constant is for optional packages of others."""
+    calls = [
+        f"{module}: import_module({node.args[0].value!r})"
+        for module in ALL
+        for node in ast.walk(parse(module))
+        if isinstance(node, ast.Call)
+        and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module"
+        and isinstance(node.args[0], ast.Constant)
+        and within(node.args[0].value, *PACKAGES)
+    ]
+    assert not calls
+
+
+def test_files_do_not_import_each_other_in_a_circle() -> None:
+    known = set(ALL)
+    graph = {m: {next((n for n in (i, i.rpartition(".")[0]) if n in known), m) for i in imports(m)} - {m} for m in ALL}
+    packages = {m for m in ALL if ROOT.joinpath(*m.split(".")).is_dir()}  # an ``__init__`` collects names of its files
+    TopologicalSorter({m: targets - packages for m, targets in graph.items() if m not in packages}).prepare()  # raises
+
+
 @pytest.mark.parametrize("family", FAMILIES)
-def test_families_of_problems_know_nothing_of_each_other(family: str) -> None:
+def test_families_of_problems_do_not_import_each_other(family: str) -> None:
     others = tuple(f"nlp_gait.gaits.{other}" for other in FAMILIES if other != family)
     for module in modules(f"nlp_gait/gaits/{family}"):
-        bad = [name for name in imports(module) if within(name, *others)]
+        bad = [name for name in (*imports(module), *named_modules(module)) if within(name, *others)]
         assert not bad, f"{module} imports {bad}"
 
 
 @pytest.mark.parametrize("module", modules("metaheuristics"))
-def test_search_algorithms_know_neither_casadi_nor_gaits(module: str) -> None:
+def test_searches_import_neither_casadi_nor_gaits(module: str) -> None:
     bad = [name for name in imports(module) if within(name, "casadi", "nlp_gait", "compare")]
     assert not bad, f"{module} imports {bad}"
 
 
 def test_the_import_parser_sees_every_kind_of_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The tests above stand on it."""
     package = tmp_path / "box" / "inner"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("from . import a\nfrom .. import b\n")
-    (package / "leaf.py").write_text("import os.path\nfrom .a import c\nfrom ..d import e\ndef f():\n    import json\n")
+    leaf = "import os.path\nfrom .a import c\nfrom ..d import e\nx = 'compare.cli:app', 'compare'\ndef f():\n    import json\n"
+    (package / "leaf.py").write_text(leaf)
     monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
     assert modules("box") == ["box.inner", "box.inner.leaf"]
     assert list(imports("box.inner")) == ["box.inner.a", "box.b"]
     assert sorted(imports("box.inner.leaf")) == ["box.d.e", "box.inner.a.c", "json", "os.path"]
+    assert list(named_modules("box.inner.leaf")) == ["compare.cli.app"]
 
 
 @pytest.mark.parametrize(

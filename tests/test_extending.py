@@ -38,9 +38,9 @@ from nlp_gait.formulation import (
     Variable,
     maker,
 )
-from nlp_gait.formulation.registry import PROBLEMS
 from nlp_gait.gaits.biped.parts import Contribution, Part
 from nlp_gait.gaits.biped.samples import Samples
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.robots.custom import humanoid
 
@@ -48,7 +48,7 @@ X = "0.33,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
 LIFT, TIME = "lift_m", "step_time_s"
 
 
-@maker()
+@maker
 def hopping_foot(*, intervals: int = 20) -> GaitProblem:
     """A mass of 1 kg that is moved 0.2 m along and lifted by a chosen height on the way: least mean |force times speed|."""
     phases = DM(np.linspace(0.0, 1.0, intervals + 1)).T

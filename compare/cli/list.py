@@ -106,24 +106,29 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
 def _overview(as_json: bool) -> None:
     from compare.study.task import solver_names
     from metaheuristics.multi_objective import FRONT_ALGORITHMS
-    from nlp_gait.references import installed
     from nlp_gait.robots import robot_names
+    from nlp_gait.user_code import find_entry_points
 
     problems = {name: load(name) for name in problem_names()}
     if as_json:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
-        algorithms = [*solver_names(), *installed("algorithm")]
+        algorithms = [*solver_names(), *find_entry_points("algorithm")]
         data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names())}
-        print_json({**data, "installed": {"problems": installed("problem"), "algorithms": installed("algorithm")}})
+        print_json(
+            {
+                **data,
+                "installed": {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")},
+            }
+        )
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(solver_names())}")
     stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
-    for kind, listed in (("problems", installed("problem")), ("algorithms", installed("algorithm"))):
+    for kind, listed in (("problems", find_entry_points("problem")), ("algorithms", find_entry_points("algorithm"))):
         if listed:
             packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
             stdout.print(f"{kind} of other installed packages: {packages}")

@@ -15,7 +15,7 @@ from nlp_gait.errors import InputError, kind_name, unknown
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.registry import problem_maker
 from nlp_gait.formulation.result import load_result
-from nlp_gait.references import is_reference, name_code
+from nlp_gait.user_code import allow_code, is_reference
 
 ResultFile = Annotated[
     Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
@@ -161,8 +161,8 @@ def name_all(code: Sequence[str] | None) -> None:
     for text in code or ():
         if not is_reference(text):
             raise InputError(f"--code takes FILE.py:NAME or MODULE:NAME, got {text!r}")
-        name_code(text, "problem")
-        name_code(text, "algorithm")
+        allow_code(text, "problem")
+        allow_code(text, "algorithm")
 
 
 def parse_names(text: str) -> list[str]:

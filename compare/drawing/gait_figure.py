@@ -11,7 +11,7 @@ import numpy as np
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
 from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, new_figure, style
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, sampled
+from nlp_gait.formulation import Array, GaitProblem, Result, sampled
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.formulation.motion.signals import JOINT_UNITS
 from nlp_gait.formulation.motion.skeleton import TRUNK, Skeleton
@@ -65,6 +65,11 @@ def prepare_gait(result: Result) -> GaitCurves:
         power=np.abs(arrays["tau"] * arrays["qd"]).sum(axis=1) if has_power else None,
         margin=None if margin is None or np.isnan(margin).all() else 1000.0 * margin,
     )
+
+
+def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -> Figure:
+    """Plot one gait, a point x of a problem, under the name of its solver; raises as ``prepare_gait``."""
+    return plot_gaits({name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))})
 
 
 def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait.backends.identity import FORMULAS, HASH, SOURCE, sha256_of
-from nlp_gait.files import read_bytes
-from nlp_gait.references import short_name, source_digest
 from nlp_gait.robots.loading import is_robot_file
+from nlp_gait.user_code import hash_file, shorten_name
 
 SHOWN_DIGITS = 8  # of a hash
 MATHEMATICS = "the problem's mathematics or limits"
@@ -42,7 +41,7 @@ def source_of(algorithm: object) -> str | None:
         return None
     if path is None or not Path(path).is_file():
         return None
-    return source_digest(Path(path), read_bytes(Path(path), "source"), kind.__qualname__.partition(".")[0])
+    return hash_file(Path(path))
 
 
 def key_of(definition: Mapping[str, Any]) -> str:
@@ -67,13 +66,13 @@ def without_hashes(definition: Mapping[str, Any]) -> dict[str, Any]:
 def _content(definition: Mapping[str, Any]) -> dict[str, Any]:
     problem = dict(definition["problem"])
     if HASH in problem:
-        problem["name"] = short_name(problem["name"]) if SOURCE in problem else problem["name"]
+        problem["name"] = shorten_name(problem["name"]) if SOURCE in problem else problem["name"]
         robot = problem["options"].get("robot")
         if isinstance(robot, str) and is_robot_file(robot):
             problem["options"] = {**problem["options"], "robot": ""}  # it is in the hash
     algorithm = definition["algorithm"]
     if isinstance(algorithm, Mapping) and "name" in algorithm:
-        algorithm = {**algorithm, "name": short_name(algorithm["name"])}
+        algorithm = {**algorithm, "name": shorten_name(algorithm["name"])}
     return {**definition, "problem": problem, "algorithm": algorithm}
 
 

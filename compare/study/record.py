@@ -19,7 +19,7 @@ from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import html_table
 from nlp_gait.proofs.guarantee import Guarantee
-from nlp_gait.references import named_as
+from nlp_gait.user_code import resolve_code
 
 SCHEMA = 2
 REMEDY = "delete it to have it made anew"
@@ -234,7 +234,7 @@ def gait_of(record: RunRecord) -> Result:
             has other variables than the record.
     """
     stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
-    name = named_as(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
+    name = resolve_code(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
     problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
     return Result(problem=problem, x=problem.check_x(record.x))
 

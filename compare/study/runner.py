@@ -32,7 +32,7 @@ def attempt(task: Task, start: RunRecord | None = None, run: Run = run_task) -> 
 
     Code of one's own by name runs in a process of its own, which is ended when it does not return.
     """
-    if task.is_own_code:
+    if task.is_user_code:
         return run_apart(task, lambda: _attempt(task, start, run))
     return _attempt(task, start, run)
 

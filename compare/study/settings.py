@@ -12,8 +12,8 @@ from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, S
 from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, read_text, refusing
-from nlp_gait.formulation.registry import PROBLEMS
-from nlp_gait.references import named_as
+from nlp_gait.providers import PROBLEMS
+from nlp_gait.user_code import resolve_code
 
 SCHEMA = 1  # of study files; they may leave it out
 LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
@@ -118,13 +118,13 @@ def as_named(settings: StudySettings, owner: str) -> StudySettings:
     """Settings that were read from a folder, with code of one's own as it was named in this process.
 
     Raises:
-        OwnCodeError: it was not named.
+        UserCodeError: it was not named.
     """
     return replace(
         settings,
-        problems=tuple(replace(p, name=named_as(p.called, "problem", owner)) for p in settings.problems),
+        problems=tuple(replace(p, name=resolve_code(p.called, "problem", owner)) for p in settings.problems),
         solvers=tuple(
-            s if s.algorithm in solver_names() else replace(s, algorithm=named_as(s.algorithm, "algorithm", owner))
+            s if s.algorithm in solver_names() else replace(s, algorithm=resolve_code(s.algorithm, "algorithm", owner))
             for s in settings.solvers
         ),
     )

@@ -159,7 +159,7 @@ def _build_solvers(tasks: Sequence[Task]) -> None:
 
     The runs find it in the cache folder, in whatever process they are.
     """
-    named = [t for t in tasks if not t.is_search and not t.is_own_code and isinstance(t.problem.name, str)]
+    named = [t for t in tasks if not t.is_search and not t.is_user_code and isinstance(t.problem.name, str)]
     for _, group in groupby(sorted(named, key=_solver_of), key=_solver_of):
         runs = list(group)
         with suppress(GaitError):  # each run says it, in its record

@@ -22,9 +22,10 @@ from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solv
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import PROBLEMS, check_options, load
-from nlp_gait.references import check_reference, installed, is_own, load_object, short_name, source_sha256
+from nlp_gait.formulation.registry import check_options, load
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import hash_robot, is_robot_file
+from nlp_gait.user_code import check_reference, find_entry_points, hash_source, is_user_code, load_object, shorten_name
 
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
@@ -65,7 +66,7 @@ class ProblemSpec:
     @property
     def title(self) -> str:
         """Label, or name without one."""
-        return self.label or (self.called if self.called in PROBLEMS else short_name(self.called))
+        return self.label or (self.called if self.called in PROBLEMS else shorten_name(self.called))
 
     def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
         """The same with other options beside those that it has."""
@@ -83,7 +84,7 @@ class ProblemSpec:
         robot = self.options.get("robot")
         contents = (
             hash_robot(robot) if isinstance(robot, str) and is_robot_file(robot) else "",
-            source_sha256(self.name, "problem") if self.name not in PROBLEMS else "",
+            hash_source(self.name, "problem") if self.name not in PROBLEMS else "",
         )
         return _load(self.name, tuple(sorted(self.options.items())), contents).with_values(**self.values)
 
@@ -158,17 +159,17 @@ class Task:
     def title(self) -> str:
         """Label, or the algorithm's name without one."""
         if isinstance(self.algorithm, str):
-            return self.label or (short_name(self.algorithm) if self.is_own_code else self.algorithm)
+            return self.label or (shorten_name(self.algorithm) if self.is_user_code else self.algorithm)
         kind = type(self.algorithm).__name__
         return self.label or str(getattr(self.algorithm, "name", getattr(self.algorithm, "__name__", kind)))
 
     @property
-    def is_own_code(self) -> bool:
+    def is_user_code(self) -> bool:
         """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
         name = self.algorithm
         if not isinstance(name, str) or name in solver_names() or name.startswith(PYMOO):
             return False
-        return is_own(name, "algorithm")
+        return is_user_code(name, "algorithm")
 
     @property
     def is_search(self) -> bool:
@@ -207,8 +208,8 @@ class Task:
         if not isinstance(self.algorithm, str):
             source = source_of(self.algorithm)
             return {**plain_settings(self.algorithm), **({} if source is None else {SOURCE: source})}
-        if self.is_own_code:
-            return {"name": self.algorithm, SOURCE: source_sha256(self.algorithm, "algorithm")}
+        if self.is_user_code:
+            return {"name": self.algorithm, SOURCE: hash_source(self.algorithm, "algorithm")}
         return self.algorithm
 
     def search(self) -> Algorithm:
@@ -216,11 +217,11 @@ class Task:
 
         Raises:
             SearchError: it is no algorithm, or does not take its settings.
-            OwnCodeError: its code cannot be found or fails.
+            UserCodeError: its code cannot be found or fails.
         """
         if not isinstance(self.algorithm, str):
             return as_algorithm(self.algorithm, self.title, self.settings)
-        if self.is_own_code:
+        if self.is_user_code:
             own = load_object(self.algorithm, "algorithm")
             return as_algorithm(own, self.title, self.settings)
         return algorithm(self.algorithm, **self.settings)
@@ -248,17 +249,17 @@ def check_task(task: Task) -> None:
             raise InputError(
                 f"a label has 1 to 64 letters, digits, spaces and . _ + : ( ) -, and begins with a letter or digit; got {title!r}"
             )
-    if task.is_own_code:
+    if task.is_user_code:
         check_reference(str(task.algorithm), "algorithm")  # without running it
     elif isinstance(task.algorithm, str) and task.algorithm not in solver_names():
-        raise unknown("algorithm", task.algorithm, [*solver_names(), *installed("algorithm")])
+        raise unknown("algorithm", task.algorithm, [*solver_names(), *find_entry_points("algorithm")])
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
     if not task.is_search:
         task.solver().check(problem)
     else:
         handling(task.handling.name, **task.handling.settings)
-        search = UNREAD if task.is_own_code else task.search()
+        search = UNREAD if task.is_user_code else task.search()
         check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
     if task.start:
         if task.is_search:

@@ -13,14 +13,15 @@ from typing import get_args, get_origin, get_type_hints
 from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
 from compare.analysis.published import load_published
 from compare.analysis.units import with_unit
-from compare.drawing.gait_figure import plot_gaits, prepare_gait
+from compare.drawing.gait_figure import plot_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.formulation import GaitProblem, Result, load, problem_names
-from nlp_gait.formulation.registry import PROBLEMS, problem_maker
+from nlp_gait.formulation import GaitProblem, load, problem_names
+from nlp_gait.formulation.registry import problem_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact
 
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
@@ -110,9 +111,7 @@ def _words(problem: GaitProblem) -> str:
 def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     if best is None or problem.display.motion is None:
         return ""
-    gait = prepare_gait(Result(problem=problem, x=problem.check_x(best.x)))
-    drawing = plot_gaits({problem.name: gait})
-    drawing.savefig(folder / f"{problem.name}.png", dpi=150)
+    plot_gait(problem, best.x, problem.name).savefig(folder / f"{problem.name}.png", dpi=150)
     return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.references import source_sha256
+from nlp_gait.user_code import hash_source
 
 HASH, SOURCE, FORMULAS = "sha256", "source_sha256", "mathematics_sha256"
 
@@ -43,5 +43,5 @@ def problem_part(problem: GaitProblem) -> dict[str, Any]:
         HASH: sha256_of(content),
     }
     if problem.loaded_as:
-        part[SOURCE] = source_sha256(problem.loaded_as, "problem")
+        part[SOURCE] = hash_source(problem.loaded_as, "problem")
     return part

@@ -11,8 +11,8 @@ import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
+from functools import cached_property, lru_cache
+from typing import Any, Concatenate, Literal, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from casadi import DM, MX
@@ -24,7 +24,6 @@ from nlp_gait.formulation.locking import CASADI, one_at_a_time
 from nlp_gait.formulation.motion.grid import Grid
 from nlp_gait.formulation.motion.signals import Array, Signals
 from nlp_gait.formulation.numbers import is_number, real_numbers
-from nlp_gait.formulation.origin import Origin, pickled
 from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -37,6 +36,13 @@ Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
 Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point lies on a bound that it misses by this share of the variable's default range.
 ROUNDING = 1e-6
+
+
+class Origin(NamedTuple):
+    """Maker of a problem, and all its options."""
+
+    make: Callable[..., GaitProblem]
+    options: Mapping[str, Any]
 
 
 class Cache:
@@ -375,8 +381,13 @@ class GaitProblem:
         return self
 
     def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
-        """For pickle; InputError if no maker makes exactly this problem."""
-        return pickled(self, self._origin)
+        origin = self._origin
+        if origin is None or "<locals>" in getattr(origin.make, "__qualname__", ""):
+            raise InputError(
+                f"problem {self.name!r} cannot be pickled: only unchanged problems of a module-level @maker function can; "
+                "make it in the other process, or write a maker"
+            )
+        return _unpickle, (origin.make, origin.options, dict(self.values), repr(self.display.robot))
 
     def build_once(self, build: Callable[Concatenate[GaitProblem, P], T], *arguments: P.args, **named: P.kwargs) -> T:
         """Return ``build(self, ...)``, computed once for all copies that differ in parameter values only.
@@ -410,6 +421,21 @@ class GaitProblem:
                     f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
                     f"set {name} and {stem}.upper so that lower <= upper"
                 )
+
+
+def _unpickle(
+    make: Callable[..., GaitProblem], options: Mapping[str, Any], values: Mapping[str, float], robot: str
+) -> GaitProblem:
+    return _make_again(make, tuple(sorted(options.items())), robot).with_values(**values)
+
+
+@one_at_a_time
+@lru_cache(maxsize=16)  # so that copies of one problem share what is built
+def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any], ...], robot: str) -> GaitProblem:
+    problem = make(**dict(options))
+    if repr(problem.display.robot) != robot:
+        raise InputError(f"problem {problem.name!r}: the file of its robot has changed since the problem was pickled")
+    return problem
 
 
 def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

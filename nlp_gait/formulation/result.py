@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,21 +13,9 @@ from nlp_gait.files import read_json
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.motion.signals import Array
 from nlp_gait.formulation.registry import load
-from nlp_gait.formulation.solution import Solution
-from nlp_gait.references import named_as
+from nlp_gait.user_code import resolve_code
 
-SCHEMA = 1  # of a result; one that does not say so is taken as the first
-# What `solve`, `evaluate` and `export --format json` write beside what is read here.
-BESIDE_RESULT = (
-    *(part.name for part in fields(Solution)),
-    *("indexes", "constraints", "feasible", "dense", "dense_violations", "dense_intervals", "guaranteed"),
-    *("proven_bound", "signals"),
-)
-# The same for the fields of a study's record; tests compare them with ``compare.study.record.RunRecord``.
-BESIDE_RECORD = (
-    *("problem", "algorithm", "run", "seed", "settings", "status", "success", "objective", "violation", "verdict"),
-    *("evaluations", "failed_evaluations", "iterations", "active_constraints", "history", "time_s"),
-)
+SCHEMA = 1  # of a result, and the default
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,13 +89,13 @@ def load_result(path: Path) -> Result:
 
 
 def _of_record(raw: Mapping[str, Any]) -> Result:
-    record = decoded(_RecordFile, raw, unread=BESIDE_RECORD)
+    record = decoded(_RecordFile, raw, ignore_unknown=True)
     problem = decoded(StoredProblem, record.definition.get("problem"), "definition.problem")
     return _result(problem.name, problem.options, problem.parameters, record.x)
 
 
 def _of_result(raw: Any) -> Result:
-    file = decoded(_ResultFile, raw, unread=BESIDE_RESULT)
+    file = decoded(_ResultFile, raw, ignore_unknown=True)
     result = _result(file.problem, file.options, file.parameters, file.x)
     if file.robot not in (None, result.problem.options.get("robot")):
         raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
@@ -117,5 +105,5 @@ def _of_result(raw: Any) -> Result:
 def _result(
     name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
 ) -> Result:
-    problem = load(named_as(name, "problem", "it"), **options).with_values(**parameters)
+    problem = load(resolve_code(name, "problem", "it"), **options).with_values(**parameters)
     return Result(problem=problem, x=problem.check_x(x))

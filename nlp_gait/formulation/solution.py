@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlp_gait.formulation.motion.signals import Array, Signals
 from nlp_gait.notebook import html_table
+from nlp_gait.providers import FUNCTIONS, import_object
 
 if TYPE_CHECKING:
     from nlp_gait.formulation.gait_problem import GaitProblem
@@ -255,12 +255,8 @@ class Solution:
             UnknownNameError: no problem has that name.
             InputError: the problem has no time histories.
         """
-        from nlp_gait.formulation.result import Result
-
-        drawing = import_module("compare.drawing.gait_figure")  # by name: it stands above, and few results are drawn
-        found = self._of(problem)
-        gait = drawing.prepare_gait(Result(problem=found, x=found.check_x(self.x)))
-        return drawing.plot_gaits({self.solver: gait})
+        plot_gait: Any = import_object(FUNCTIONS["plot_gait"])
+        return plot_gait(self._of(problem), self.x, self.solver)
 
     def _of(self, problem: GaitProblem | None) -> GaitProblem:
         """The problem that was solved, with the values that it had."""

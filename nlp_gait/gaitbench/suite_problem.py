@@ -28,7 +28,7 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 BAND = 1e-2
 
 
-@maker()
+@maker
 def gaitbench(*, instance: str = "ssp-v5") -> GaitProblem:
     """Make a problem of the suite by the id of its instance; raises UnknownNameError."""
     return _make(instance)

@@ -25,7 +25,7 @@ from nlp_gait.proofs import affine, bounds, boxes, branch_and_bound, quadratic, 
 from nlp_gait.proofs.bounds import has_power_form, make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.branch_and_bound import Certificate, target_cost
-from nlp_gait.references import named_as
+from nlp_gait.user_code import resolve_code
 
 CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
 PATHS = 200
@@ -173,7 +173,7 @@ def _check_incumbent(problem: GaitProblem, proof: Certificate) -> float:
 def _load_problem(description: Mapping[str, Any]) -> GaitProblem:
     with refusing("the certificate's problem cannot be made", InputError):
         stored = decoded(StoredProblem, description, "problem")
-        name = named_as(stored.name, "problem", "the certificate")
+        name = resolve_code(stored.name, "problem", "the certificate")
         problem = load(name, **stored.options).with_values(**stored.parameters)
     if problem_part(problem) != dict(description):
         raise InputError(

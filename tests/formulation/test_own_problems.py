@@ -11,15 +11,14 @@ import casadi as ca
 import pytest
 from casadi import MX
 
-import nlp_gait.references as references
 from compare.study.definition import key_of
 from compare.study.task import ProblemSpec, Task
-from nlp_gait import load, solve
-from nlp_gait.errors import GaitError, InputError, OwnCodeError, UnknownNameError
+from nlp_gait import load, solve, user_code
+from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable
 from nlp_gait.formulation.checks import check_mathematics
 from nlp_gait.formulation.result import load_result
-from nlp_gait.references import is_reference, source_sha256
+from nlp_gait.user_code import hash_source, is_reference
 from tests.backends.toys import corner, toy
 from tests.robots.custom import humanoid
 
@@ -64,9 +63,9 @@ def test_a_robot_file_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    point = EntryPoint(name="leg", value=f"{EXAMPLE}:two_link", group=references.GROUPS["problem"])
-    monkeypatch.setattr(references, "entry_points", lambda group: EntryPoints([point]).select(group=group))
-    monkeypatch.setattr(references, "_entry_points", references._entry_points.__wrapped__)
+    point = EntryPoint(name="leg", value=f"{EXAMPLE}:two_link", group=user_code.GROUPS["problem"])
+    monkeypatch.setattr(user_code, "entry_points", lambda group: EntryPoints([point]).select(group=group))
+    monkeypatch.setattr(user_code, "_entry_points", user_code._entry_points.__wrapped__)
     assert load("leg").name == "two-link" and ProblemSpec(name="leg").title == "leg"
     with pytest.raises(UnknownNameError, match="did you mean 'leg'"):
         load("lag")
@@ -89,9 +88,7 @@ def test_a_result_file_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     walk = load("walk12")
     x = walk.by_name((walk.lower + walk.upper) / 2)
     (tmp_path / "best.json").write_text(json.dumps({"problem": "elsewhere/other.py:leg", "x": x}))
-    with pytest.raises(
-        InputError, match="needs code of your own, 'elsewhere/other.py:leg', which runs only if you name it"
-    ):
+    with pytest.raises(InputError, match="needs your code 'elsewhere/other.py:leg', which runs only if you name it"):
         load_result(tmp_path / "best.json")
     load(f"{file}:leg")
     assert load_result(tmp_path / "best.json").problem.address == f"{file}:leg"
@@ -116,7 +113,7 @@ def test_what_is_wrong_with_the_file_is_said(text: str, message: str, tmp_path: 
     with pytest.raises(GaitError, match=message) as said:
         load(f"{tmp_path / 'own.py'}:leg")
     assert "\n" not in str(said.value)
-    with pytest.raises(OwnCodeError, match="cannot be read: No such file"):
+    with pytest.raises(UserCodeError, match="cannot be read: No such file"):
         load(f"{tmp_path / 'none.py'}:leg")
 
 
@@ -181,31 +178,21 @@ def row(value: MX, lower: MX | None = None) -> Constraint:
     return Constraint(name="knee", unit="m", scale=1.0, value=value, lower=MX(0.0) if lower is None else lower)
 
 
-def test_a_source_is_what_an_object_is_made_of(tmp_path: Path) -> None:
-    """Of one file, an edit changes the objects that use what was edited, and no others."""
-    text = (
-        '"""Own."""\nimport helper\nC, D = 1, 2\ndef used(): return C\ndef leg(): return used()\ndef arm(): return D\n'
-    )
-    (tmp_path / "helper.py").write_text("X = 1\n")
+def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path: Path) -> None:
+    text = "import helper\nfrom package import part\ndef leg(): return 1\n"
+    files = {"own.py": text, "helper.py": "import other\n", "other.py": "X = 1\n", "package/part.py": "Y = 1\n"}
+    (tmp_path / "package").mkdir()
 
-    def hashes(changed: str) -> tuple[str, str]:
-        (tmp_path / "own.py").write_text(changed)
-        leg, arm = (source_sha256(f"{tmp_path / 'own.py'}:{name}", "problem") for name in ("leg", "arm"))
-        return leg, arm
+    def hash_with(**changes: str) -> str:
+        for name, content in {**files, **changes}.items():
+            (tmp_path / name).write_text(content)
+        return hash_source(f"{tmp_path / 'own.py'}:leg", "problem")
 
-    leg, arm = hashes(text)
-    assert hashes(text.replace("def used(): return C", "def used():\n    # better\n    return C")) == (leg, arm)
-    assert hashes(text.replace('"""Own."""', '"""Mine."""')) == (leg, arm)
-    assert hashes(text.replace("return C", "return 3")) == (hashes(text.replace("return C", "return 3"))[0], arm)
-    assert hashes(text.replace("return C", "return 3"))[0] != leg
-    assert hashes(text.replace("def arm(): return D", "def arm(): return 4"))[0] == leg
-    patched = hashes(text + "helper.X = 2\n")  # binds no name, so it may change anything
-    assert patched[0] != leg and patched[1] != arm
-    uses = text.replace("return C", "return helper.X")
-    before = hashes(uses)
-    (tmp_path / "helper.py").write_text("X = 2\n")
-    after = hashes(uses)
-    assert after[0] != before[0] and after[1] == before[1] == arm
+    before = hash_with()
+    assert hash_with(**{"unused.py": "Z = 1\n"}) == before == hash_with()
+    changed = {hash_with(**{name: f"{content}# edited\n"}) for name, content in files.items()}
+    assert len(changed) == 4 and before not in changed
+    assert hash_with(**{"own.py": f"{text}def"}) not in changed  # also where it cannot be parsed
 
 
 @pytest.mark.parametrize(
@@ -227,21 +214,12 @@ def test_a_files_path_is_made_absolute_and_a_modules_name_is_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert references.reference("own.py:leg", "problem") == (str(tmp_path / "own.py"), "leg")
-    assert references.reference("some.module:leg", "problem") == ("some.module", "leg")
+    assert user_code.parse_reference("own.py:leg", "problem") == (str(tmp_path / "own.py"), "leg")
+    assert user_code.parse_reference("some.module:leg", "problem") == ("some.module", "leg")
 
 
 def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "own.py"
     path.write_bytes(b"#" * 5 * 2**20)
-    with pytest.raises(OwnCodeError, match="it has more than 4194304 bytes"):
-        source_sha256(f"{path}:leg", "problem")
-
-
-def test_what_is_imported_with_a_star_may_be_any_name(tmp_path: Path) -> None:
-    """Then every statement of the file belongs to the source."""
-    path, hashes = tmp_path / "own.py", set()
-    for other in (1, 2):
-        path.write_text(f"from math import *\nleg = pi\nother = {other}\n")
-        hashes.add(source_sha256(f"{path}:leg", "problem"))
-    assert len(hashes) == 2
+    with pytest.raises(UserCodeError, match="it has more than 4194304 bytes"):
+        hash_source(f"{path}:leg", "problem")

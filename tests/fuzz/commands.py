@@ -21,7 +21,7 @@ from unittest import mock
 import typer
 
 from compare.cli import app, main
-from nlp_gait.formulation.registry import PROBLEMS
+from nlp_gait.providers import PROBLEMS
 from tests.fuzz.mutation import TEXTS
 from tests.fuzz.readers import SEEDS
 from tests.fuzz.trial import Hung, limited

@@ -12,7 +12,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError, OwnCodeError
+from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import branch_and_bound, certificate
 from nlp_gait.proofs.bounds import make_bounds
@@ -169,7 +169,7 @@ def test_a_certificate_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     raw = json.loads((CERTIFICATES / "walk12-lambda-1-1-percent.json").read_text())
     raw["problem"]["name"] = f"{tmp_path / 'own.py'}:problem"
     (tmp_path / "certificate.json").write_text(json.dumps(raw))
-    with pytest.raises(OwnCodeError, match="certificate needs code of your own.*--code"):
+    with pytest.raises(UserCodeError, match="certificate needs your code.*--code"):
         check_certificate(read_certificate(tmp_path / "certificate.json"))
 
 

@@ -14,8 +14,8 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.formulation.registry import PROBLEMS
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
+from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
 
 # Left out of all but the first test, with the reason.

@@ -190,7 +190,7 @@ def _searched(tasks: Sequence[Task], store: Store, progress: Progress) -> list[R
 
 def _run(task: Task) -> dict[str, Any]:
     with remember_interrupts() as check:
-        record = attempt(task) if task.is_own_code else run_task(task)
+        record = attempt(task) if task.is_user_code else run_task(task)
         check()
     return record.to_json()
 

@@ -45,7 +45,7 @@ LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 SPEED_M_S = 0.03  # NAO's
 
 
-@maker()
+@maker
 def humanoid_cycle(
     *,
     robot: str = "nao-v5",

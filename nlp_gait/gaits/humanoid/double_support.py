@@ -34,7 +34,7 @@ UNITS = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(LEAN, "rad")
 Share = Literal["lever", "free"]
 
 
-@maker()
+@maker
 def humanoid_dsp(
     *,
     robot: str = "nao-v5",

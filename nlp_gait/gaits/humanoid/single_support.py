@@ -25,7 +25,7 @@ DURATION, LIFT = "single_support_time_s", "swing_height_m"
 UNITS = dict.fromkeys((*HIP_CURVES, "foot_x", "foot_z"), "m") | dict.fromkeys(LEAN, "rad")
 
 
-@maker()
+@maker
 def humanoid_ssp(
     *,
     robot: str = "nao-v5",

@@ -48,11 +48,7 @@ ARM_SWING = {  # Table 5, rows 4 to 7 [rad]
 DURATION = Variable(name="double_support_time_s", unit="s", lower=0.2, upper=2.0, description="x8")
 
 
-@maker(
-    {"trajectory": "cubic", "objective": "power", "samples_per_interval": 1},
-    {"motors": ""},
-    {"load_degree": LOAD_DEGREE},
-)
+@maker
 def nao_dsp(
     *,
     robot: str = "nao-v5",

@@ -43,7 +43,7 @@ LEAN = ("torso_roll", "torso_pitch")
 FLAT = 1e-6
 
 
-@maker({"load_degree": LOAD_DEGREE})
+@maker
 def nao_dsp_free(
     *,
     robot: str = "nao-v5",

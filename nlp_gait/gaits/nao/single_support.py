@@ -45,7 +45,7 @@ OWN_VARIABLES = (
 )
 
 
-@maker({"trajectory": "cubic", "objective": "power", "samples_per_interval": 1}, {"motors": ""})
+@maker
 def nao_ssp(
     *,
     robot: str = "nao-v5",

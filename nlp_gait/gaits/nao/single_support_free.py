@@ -30,7 +30,7 @@ from nlp_gait.gaits.nao.single_support import (
 FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
 
 
-@maker()
+@maker
 def nao_ssp_free(
     *,
     robot: str = "nao-v5",

@@ -81,7 +81,7 @@ PARAMETERS = (
 )
 
 
-@maker()
+@maker
 def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
     """Trajectory optimisation of one step.
 

@@ -103,7 +103,7 @@ PARAMETERS = (
 )
 
 
-@maker()
+@maker
 def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitProblem:
     """Planner of one step.
 

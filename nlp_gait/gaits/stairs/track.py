@@ -79,7 +79,7 @@ PARAMETERS = (
 )
 
 
-@maker()
+@maker
 def stairs_track(
     *,
     gains: Gains = "scalar",

@@ -63,7 +63,7 @@ PARAMETERS = parameters(
 )
 
 
-@maker()
+@maker
 def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
     """Gait of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 

@@ -32,7 +32,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import partner
 
 
-@maker({"samples_per_interval": 1}, {"motors": ""}, {"load_degree": LOAD_DEGREE})
+@maker
 def nao_cycle(
     *,
     robot: str = "nao-v5",

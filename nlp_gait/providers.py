@@ -1,0 +1,18 @@
+"""Objects that higher packages provide to lower ones by name, as ``"module:object"``, imported on first use.
+
+``nlp_gait/__init__.py``, which may know every package, fills the tables; no other module names a higher one. The command line
+imports this module before everything else, so it imports nothing that takes time.
+"""
+
+from __future__ import annotations
+
+PROBLEMS: dict[str, str] = {}  # makers of problems, by the problem's name
+FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``
+
+
+def import_object(place: str) -> object:
+    """Return the object at ``"module:object"``."""
+    from importlib import import_module
+
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

@@ -1,0 +1,285 @@
+"""User code by name: ``file.py:name``, ``module:name``, or an entry point of an installed package.
+
+Code runs because the user named it in a call, or because it is installed. A name in a data file runs nothing: it must match code
+that was named in this process (``resolve_code``). A file runs once per content: after an edit it is another module.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib
+import importlib.util
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import redirect_stdout
+from functools import cache
+from importlib.abc import SourceLoader
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Literal, NamedTuple, TypeVar
+
+from nlp_gait.errors import GaitError, UserCodeError, unknown
+from nlp_gait.files import check_path, read_bytes
+
+T = TypeVar("T")
+Kind = Literal["problem", "algorithm"]
+
+# Groups of entry points, for ``[project.entry-points."nlp_gait.problems"]`` of another package.
+GROUPS: Mapping[Kind, str] = {"problem": "nlp_gait.problems", "algorithm": "nlp_gait.algorithms"}
+ENDING = ".py"
+LARGEST_SOURCE = 4 * 2**20  # bytes
+
+_allowed: dict[str, str] = {}
+
+
+class Reference(NamedTuple):
+    """Place of an object in user code.
+
+    Attributes:
+        home: absolute path of a file, or dotted name of a module.
+        name: of the object in it.
+    """
+
+    home: str
+    name: str
+
+    @property
+    def is_file(self) -> bool:
+        """Whether the home is a file."""
+        return self.home.endswith(ENDING)
+
+    @property
+    def short(self) -> str:
+        """Without folders: unchanged when the file is moved."""
+        return f"{Path(self.home).name if self.is_file else self.home}:{self.name}"
+
+
+def is_reference(text: str) -> bool:
+    """Return whether a text has the form ``file.py:name`` or ``module:name``."""
+    home, colon, name = text.rpartition(":")
+    is_module = all(part.isidentifier() for part in home.split("."))
+    return bool(colon) and name.isidentifier() and (home.endswith(ENDING) or is_module)
+
+
+def is_user_code(text: str, kind: Kind) -> bool:
+    """Return whether a text names user code: a reference, or an entry point."""
+    return is_reference(text) or text in find_entry_points(kind)
+
+
+def find_entry_points(kind: Kind) -> dict[str, str]:
+    """Return the references of installed packages' entry points by name."""
+    return dict(_entry_points(kind))
+
+
+@cache
+def _entry_points(kind: Kind) -> tuple[tuple[str, str], ...]:  # searching all packages is slow
+    return tuple((point.name, point.value) for point in entry_points(group=GROUPS[kind]))
+
+
+def shorten_name(text: str) -> str:
+    """Return the name of the object alone, for tables and file names; an entry point's name is returned unchanged."""
+    return text.rpartition(":")[2] if is_reference(text) else text
+
+
+def parse_reference(text: str, kind: Kind) -> Reference:
+    """Return the place of an object from a reference or the name of an entry point."""
+    home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
+    return Reference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
+
+
+def allow_code(text: str, kind: Kind) -> None:
+    """Allow data files to refer to code, because the user named it."""
+    _allowed[parse_reference(text, kind).short] = text if is_reference(text) else ""
+
+
+def resolve_code(text: str, kind: Kind, owner: str) -> str:
+    """Return the reference of code in a data file as the user gave it in this process; entry points are always allowed.
+
+    Args:
+        text: reference in the file.
+        kind: of code.
+        owner: the file, for messages.
+
+    Raises:
+        UserCodeError: the user did not name this code.
+    """
+    if not is_reference(text) or text in find_entry_points(kind):
+        return text
+    short = parse_reference(text, kind).short
+    if short not in _allowed:
+        raise UserCodeError(
+            f"{owner} needs your code {text!r}, which runs only if you name it: add --code {text} (in Python, "
+            f"call nlp_gait.load({text!r}) first)"
+        )
+    return _allowed[short] or text
+
+
+def hash_source(text: str, kind: Kind) -> str:
+    """Return the hash of the source of an object, see ``hash_file``; nothing is run."""
+    return hash_file(Path(_read_source(parse_reference(text, kind), text)[0]))
+
+
+def hash_file(path: Path) -> str:
+    """Return the hash of a source file and of the files in its folder that it imports, directly or not."""
+    files, waiting = {path: _read(path)}, [path]
+    while waiting:
+        for file in _find_imports(files[waiting.pop()], path.parent):
+            if file not in files:
+                files[file] = _read(file)
+                waiting.append(file)
+    return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in files.values())).hexdigest()
+
+
+def _find_imports(content: bytes, folder: Path) -> Iterator[Path]:
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):
+        return  # running it reports the error
+    for node in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            module = [node.module] if node.module else []
+            names = [".".join([*module, *more]) for more in ([], *([alias.name] for alias in node.names))]
+        for name in names:
+            stem = folder.joinpath(*name.split("."))
+            yield from (file for file in (stem.with_suffix(ENDING), stem / "__init__.py") if name and file.is_file())
+
+
+def check_reference(text: str, kind: Kind) -> None:
+    """Check that an object can exist, without running anything.
+
+    Raises:
+        UserCodeError: no such file or module.
+        UnknownNameError: no such name at its top level.
+    """
+    place = parse_reference(text, kind)
+    try:
+        tree = ast.parse(_read_source(place, text)[1])
+    except (SyntaxError, ValueError):
+        return  # running it reports the error
+    names = set(_find_names(tree.body))
+    if place.name not in names and "*" not in names:
+        raise unknown(f"name in {Path(place.home).name}", place.name, names)
+
+
+def _find_names(body: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield the names that statements bind at the top level."""
+    for node in body:
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            yield node.name
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from (alias.asname or alias.name.partition(".")[0] for alias in node.names)
+        else:
+            yield from _find_names(ast.iter_child_nodes(node))
+
+
+def load_object(text: str, kind: Kind) -> object:
+    """Return an object; runs its file or imports its module on the first call.
+
+    Raises:
+        UserCodeError: no such file or module, or it fails.
+        UnknownNameError: no such name in it.
+    """
+    place = parse_reference(text, kind)
+    path, content = _read_source(place, text)
+    if place.is_file:
+        module = call_user_code(text, path, lambda: _run_file(path, content))
+    else:
+        module = call_user_code(text, path, lambda: importlib.import_module(place.home))
+    if not hasattr(module, place.name):
+        raise unknown(f"name in {place.home}", place.name, [n for n in vars(module) if not n.startswith("_")])
+    return getattr(module, place.name)
+
+
+def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
+    """Return the result of a call of user code; what it prints goes to standard error.
+
+    Raises:
+        UserCodeError: it fails in any way, with the line of the file.
+    """
+    try:
+        with redirect_stdout(sys.stderr):
+            return call()
+    except (KeyboardInterrupt, GaitError):
+        raise
+    except BaseException as error:  # SystemExit too: it must not end the command
+        raise UserCodeError(f"{text!r} fails{_locate(error, path)}: {_describe(error)}") from error
+
+
+def _locate(error: BaseException, path: str) -> str:
+    """Return the last line of a file in a traceback, as `` at line 3, `x = 1 / 0` ``; empty if there is none."""
+    lines = [frame for frame in traceback.extract_tb(error.__traceback__) if os.path.abspath(frame.filename) == path]
+    return f" at line {lines[-1].lineno}, `{lines[-1].line}`" if lines else ""
+
+
+def _describe(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    if "Wrong number or type of arguments" in text:  # of CasADi's wrapper, which then lists all overloads
+        text = "a function of CasADi does not take these arguments"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class _ContentLoader(SourceLoader):
+    """Loader of the bytes that were hashed; a compiled file in the cache may belong to an older text."""
+
+    def __init__(self, path: str, content: bytes) -> None:
+        self._path, self._content = path, content
+
+    def get_filename(self, fullname: str) -> str:
+        return self._path
+
+    def get_data(self, path: str | bytes) -> bytes:
+        if path != self._path:
+            raise OSError(path)
+        return self._content
+
+
+def _run_file(path: str, content: bytes) -> ModuleType:
+    digest = hashlib.sha256(path.encode() + b"\0" + content).hexdigest()[:16]
+    name = f"nlp_gait_own_{digest}_{Path(path).stem}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_loader(name, _ContentLoader(path, content), origin=path)
+    assert spec is not None and spec.loader is not None  # for the type checker
+    module = importlib.util.module_from_spec(spec)
+    folder = str(Path(path).parent)
+    if folder not in sys.path:
+        sys.path.append(folder)  # last, so that no file in it hides a package
+    sys.modules[name] = module  # before it runs: its data classes look there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _read_source(place: Reference, text: str) -> tuple[str, bytes]:
+    """Return the path and the content of a file or module."""
+    if place.is_file:
+        path = place.home
+        check_path(path, f"code of {text!r}, {path!r}", UserCodeError)
+    else:
+        try:
+            spec = importlib.util.find_spec(place.home)
+        except (ImportError, ValueError):
+            spec = None
+        if spec is None or not spec.origin or not spec.origin.endswith(ENDING):
+            raise UserCodeError(
+                f"{text!r}: no module {place.home!r} is installed; name a file as "
+                f"{place.home.replace('.', '/')}.py:{place.name}"
+            )
+        path = spec.origin
+    return path, _read(Path(path), f"code of {text!r},")
+
+
+def _read(path: Path, what: str = "code") -> bytes:
+    return read_bytes(path, what, error=UserCodeError, at_most=LARGEST_SOURCE)
