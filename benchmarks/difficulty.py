@@ -120,7 +120,7 @@ def measured(name: str, folder: Path, starts: int, runs: int, jobs: int) -> Diff
     spec = ProblemSpec(name=name)
     problem = spec.load()
     counts = {IPOPT: starts, **(dict.fromkeys(SEARCHES, runs) if problem.searchable else {})}
-    tasks = [Task(problem=spec, algorithm=solver, run=run) for solver, n in counts.items() for run in range(n)]
+    tasks = [Task(problem=spec, solver=solver, run=run) for solver, n in counts.items() for run in range(n)]
     records = run_study(Study(tasks=tuple(tasks), folder=folder, jobs=jobs))
     points, feasible, us = random_points(problem) if problem.searchable else (0, 0, None)
     return Difficulty(
@@ -151,15 +151,15 @@ def best_of(records: Sequence[RunRecord]) -> Best | None:
         return None
     priced = [r for r in records if r.active_constraints and gap(cost_of(r), cost_of(best)) < 1e-6]
     prices = min(priced, key=cost_of).active_constraints if priced else ()
-    return Best(solver=best.algorithm, objective=best.verdict.objective, x=best.x, active_constraints=prices)
+    return Best(solver=best.solver, objective=best.verdict.objective, x=best.x, active_constraints=prices)
 
 
 def reached(records: Sequence[RunRecord]) -> dict[str, Reached]:
     """By solver, how its runs end."""
     best = min(map(cost_of, records))
     found = {}
-    for solver in dict.fromkeys(record.algorithm for record in records):
-        costs = [cost_of(record) for record in records if record.algorithm == solver]
+    for solver in dict.fromkeys(record.solver for record in records):
+        costs = [cost_of(record) for record in records if record.solver == solver]
         gaps = [gap(cost, best) for cost in costs if math.isfinite(cost)]
         found[solver] = Reached(
             runs=len(costs),

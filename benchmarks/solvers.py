@@ -87,7 +87,7 @@ def expected_times(runs: int) -> list[Row]:
     names = ("ipopt", "aco")
     settings = StudySettings(
         problems=(ProblemSpec(name="nao-ssp"),),
-        solvers=tuple(SolverSpec(algorithm=name) for name in names),
+        solvers=tuple(SolverSpec(name=name) for name in names),
         runs=runs,
         starts=20,
     )

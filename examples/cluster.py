@@ -21,7 +21,7 @@ from compare.study.task import ProblemSpec, Task
 if __name__ == "__main__":  # workers import this file
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "study")
     tasks = [
-        Task(problem=ProblemSpec(name="nao-dsp"), algorithm=algorithm, run=run)
+        Task(problem=ProblemSpec(name="nao-dsp"), solver=algorithm, run=run)
         for algorithm in ("ipopt", "pso", "ga")
         for run in range(4)
     ]
@@ -30,5 +30,5 @@ if __name__ == "__main__":  # workers import this file
         records = run_study(study, progress=lambda task, record: print(record))
     (comparison,) = compare_problems(records)
     for row in summarise(comparison):
-        print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
+        print(f"{row.solver}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
     figure = plot_final_gaps(comparison)

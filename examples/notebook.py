@@ -35,9 +35,7 @@ figure = solution.plot()
 
 algorithms = {"ipopt": Stop(), "pso": Stop(evaluations=2000)}
 tasks = [
-    Task(problem=ProblemSpec(name="nao-dsp"), algorithm=a, run=k, stop=s)
-    for a, s in algorithms.items()
-    for k in range(3)
+    Task(problem=ProblemSpec(name="nao-dsp"), solver=a, run=k, stop=s) for a, s in algorithms.items() for k in range(3)
 ]
 study = Study(tasks=tuple(tasks))
 study

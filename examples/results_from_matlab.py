@@ -35,9 +35,9 @@ with (folder / "finals.csv").open("w", newline="") as file:
 # The records stand beside those of solvers that run here.
 
 records = imported(spec, folder / "finals.csv", "paper (MATLAB)")
-tasks = [Task(problem=spec, algorithm=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
+tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
 (comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
 for row in summarise(comparison):
     claim = "no claim" if row.best_claim is None else f"claims {row.best_claim:.4f} W"
-    print(f"{row.algorithm}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
+    print(f"{row.solver}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
 figure = plot_final_gaps(comparison)

@@ -53,7 +53,7 @@ class ShrinkingBoxSearch:
 
 
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
-tasks = [Task(problem=problem, algorithm=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
+tasks = [Task(problem=problem, solver=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
 (comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
 table = text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
 print(markdown_page(Document(title="A shrinking box", parts=[table])))

@@ -106,7 +106,7 @@ def test_a_problem_is_one_function_and_one_line(monkeypatch: pytest.MonkeyPatch)
     assert verdict.feasible and verdict.dense_intervals == 1000
     assert problem.signals(solution.x).arrays["q"].max() == pytest.approx(0.03, abs=1e-6)
     spec = ProblemSpec(name="hopping-foot", options={"intervals": 10})
-    records = run_study(Study(tasks=(Task(problem=spec, algorithm="pso", stop=Stop(evaluations=2000)),)))
+    records = run_study(Study(tasks=(Task(problem=spec, solver="pso", stop=Stop(evaluations=2000)),)))
     assert records[0].verdict.objective == pytest.approx(solution.objective, rel=1e-3)
     done = CliRunner().invoke(app, ["solve", "hopping-foot", "--starts", "1"])
     assert done.exit_code == 0 and "power" in done.output

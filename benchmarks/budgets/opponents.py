@@ -66,7 +66,7 @@ OPPONENTS = (
 
 def reference_tasks(problem: ProblemSpec) -> tuple[Task, ...]:
     """Starts of IPOPT, which give the best known objective."""
-    return tuple(Task(problem=problem, algorithm=IPOPT, run=run) for run in range(REFERENCE_STARTS))
+    return tuple(Task(problem=problem, solver=IPOPT, run=run) for run in range(REFERENCE_STARTS))
 
 
 def tasks_of(problem: ProblemSpec, opponent: Opponent, runs: int, reference: float) -> tuple[Task, ...]:
@@ -76,7 +76,7 @@ def tasks_of(problem: ProblemSpec, opponent: Opponent, runs: int, reference: flo
     return tuple(
         Task(
             problem=problem,
-            algorithm=opponent.algorithm,
+            solver=opponent.algorithm,
             label=opponent.label,
             handling=Handling(name=opponent.handling),
             stop=Stop(evaluations=opponent.evaluations, target=target),

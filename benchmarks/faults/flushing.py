@@ -23,7 +23,7 @@ from nlp_gait.files import write_json
 
 SETTINGS = StudySettings(
     problems=(ProblemSpec(name="nao-ssp"),),
-    solvers=(SolverSpec(algorithm="ipopt"), SolverSpec(algorithm="pso"), SolverSpec(algorithm="ga")),
+    solvers=(SolverSpec(name="ipopt"), SolverSpec(name="pso"), SolverSpec(name="ga")),
     runs=8,
     starts=8,
     stop=Stop(evaluations=10_000),

@@ -137,11 +137,11 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
     objective = read_objective(records[0])
     for record in records:
         if read_objective(record) != objective:
-            raise InputError(f"records of {problem!r} disagree on the objective: {record.algorithm}, run {record.run}")
+            raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
     reference = find_best_known(records, objective) if known is None else known
     solvers = []
-    for name in dict.fromkeys(record.algorithm for record in records):
-        runs = tuple(sorted((r for r in records if r.algorithm == name), key=lambda r: r.run))
+    for name in dict.fromkeys(record.solver for record in records):
+        runs = tuple(sorted((r for r in records if r.solver == name), key=lambda r: r.run))
         solvers.append(
             SolverRuns(
                 name=name,
@@ -162,5 +162,5 @@ def read_objective(record: RunRecord) -> Objective:
     Raises:
         InputError: the record has none, or an invalid one.
     """
-    with refusing(f"record of {record.algorithm}, run {record.run}", InputError):
+    with refusing(f"record of {record.solver}, run {record.run}", InputError):
         return decoded(Objective, record.definition.get("objective"), "objective")

@@ -26,9 +26,9 @@ def label_editions(records: Sequence[RunRecord]) -> list[RunRecord]:
     found = []
     for record in records:
         whole = group_of(record.definition)
-        problem = _name(record.problem, {"problem": whole["problem"], "algorithm": ""}, first, named)
-        solver = _name(f"{problem}\0{record.algorithm}", whole, first, named).partition("\0")[2]
-        found.append(replace(record, problem=problem, algorithm=solver))
+        problem = _name(record.problem, {"problem": whole["problem"], "solver": ""}, first, named)
+        solver = _name(f"{problem}\0{record.solver}", whole, first, named).partition("\0")[2]
+        found.append(replace(record, problem=problem, solver=solver))
     return found
 
 

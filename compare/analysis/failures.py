@@ -37,8 +37,8 @@ class Failure:
 def find_failures(records: Sequence[RunRecord]) -> list[Failure]:
     """Return the solvers with failed runs, in the order of their records."""
     found = []
-    for problem, solver in dict.fromkeys((record.problem, record.algorithm) for record in records):
-        own = [record for record in records if (record.problem, record.algorithm) == (problem, solver)]
+    for problem, solver in dict.fromkeys((record.problem, record.solver) for record in records):
+        own = [record for record in records if (record.problem, record.solver) == (problem, solver)]
         failed = [record for record in own if not record.x]
         if failed:
             found.append(

@@ -105,12 +105,12 @@ def group_by_problem(plays: Sequence[Played]) -> dict[str, list[Played]]:
 
 def make_engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
     """Return rows of text under ``HEADER`` for gaits of one problem, the model's best first."""
-    ordered = sorted(plays, key=lambda played: (played.model, played.algorithm))
+    ordered = sorted(plays, key=lambda played: (played.model, played.solver))
     model = [round_as_printed(played.model) for played in ordered]
     engine = [math.inf if played.engine is None else round_as_printed(played.engine) for played in ordered]
     return [
         (
-            played.algorithm,
+            played.solver,
             with_unit(played.model, played.unit, DIGITS),
             with_unit(played.engine, played.unit, DIGITS),
             "-" if played.engine is None else f"{100.0 * (played.engine / played.model - 1.0):+z.2f} %",

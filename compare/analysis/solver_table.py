@@ -34,7 +34,7 @@ class SolverSummary:
     """All runs of one solver on one problem; objectives in the problem's sense, None without a feasible run.
 
     Attributes:
-        algorithm: name of the solver.
+        solver: its name.
         runs: their number.
         claimed: number whose solver claims a feasible result; None for imported results without claims.
         feasible: number that the judge finds feasible at the problem's samples.
@@ -52,7 +52,7 @@ class SolverSummary:
         expected_s: the same in seconds.
     """
 
-    algorithm: str
+    solver: str
     runs: int
     claimed: int | None
     feasible: int
@@ -79,15 +79,15 @@ def summarise(comparison: Comparison) -> list[SolverSummary]:
 
 def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     costs, records, sign = solver.feasible, solver.records, comparison.objective.sign
-    claims = [sign * r.objective for r in records if r.success and r.objective is not None]
+    claims = [sign * r.claimed_objective for r in records if r.claimed and r.claimed_objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
-    unsaid = all("imported" in r.definition and r.objective is None for r in records)
+    unsaid = all("imported" in r.definition and r.claimed_objective is None for r in records)
     proven = [g.satisfied for r in records if (g := r.verdict.guaranteed) is not None and not g.reason]
     dense = [r.verdict.dense_feasible for r in records]
     return SolverSummary(
-        algorithm=solver.name,
+        solver=solver.name,
         runs=len(records),
-        claimed=None if unsaid else sum(r.success for r in records),
+        claimed=None if unsaid else sum(r.claimed for r in records),
         feasible=len(costs),
         dense_feasible=None if all(found is None for found in dense) else sum(found is True for found in dense),
         guaranteed=sum(each is True for each in proven) if proven else None,
@@ -110,7 +110,7 @@ def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, .
     """Return one row of text under ``HEADER``."""
     values = (summary.best_claim, summary.best, summary.median, summary.worst)
     return (
-        summary.algorithm,
+        summary.solver,
         str(summary.runs),
         "-" if summary.claimed is None else f"{summary.claimed}/{summary.runs}",
         f"{summary.feasible}/{summary.runs}",

@@ -14,8 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from compare.study.definition import without_hashes
 from compare.study.record import History, RunRecord, Times, Verdict
+from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import new_file, without_nan
@@ -30,11 +30,12 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
     for record in records:
         if record.problem != instance:
             raise InputError(f"a record of {record.problem!r} does not belong to {instance!r}")
-        # Which mathematics an id stands for is held by its probe values, not by a hash that a version of CasADi may change.
-        shared = {key: value for key, value in without_hashes(record.definition).items() if key != "seed"}
-        entry = solvers.setdefault(record.algorithm, {"definition": shared, "settings": record.settings, "runs": []})
+        shared = {key: value for key, value in record.definition.items() if key != "seed"}
+        # An instance is identified by its probe values: the hash of its mathematics depends on the version of CasADi.
+        shared["problem"] = {key: value for key, value in shared["problem"].items() if key != HASH}
+        entry = solvers.setdefault(record.solver, {"definition": shared, "settings": record.settings, "runs": []})
         if entry["definition"] != shared:
-            raise InputError(f"runs of {record.algorithm!r} on {instance!r} differ in their settings")
+            raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
         entry["runs"].append(_packed(record))
     text = json.dumps(without_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
     path = folder / f"{instance}.json.gz"
@@ -79,9 +80,9 @@ def _packed(record: RunRecord) -> dict[str, Any]:
         "run": record.run,
         "seed": record.seed,
         "status": record.status,
-        "success": record.success,
+        "claimed": record.claimed,
         "x": [float(f"{value:.{DIGITS}g}") for value in record.x.values()],
-        "claim": [record.objective, record.violation],
+        "claim": [record.claimed_objective, record.claimed_violation],
         "judged": [record.verdict.objective, record.verdict.violation, record.verdict.feasible],
         "calls": record.evaluations,
         "failed": record.failed_evaluations,
@@ -96,16 +97,16 @@ def _unpacked(instance: str, solver: str, entry: dict[str, Any], run: dict[str, 
     evaluations, values = run["history"]
     return RunRecord(
         problem=instance,
-        algorithm=solver,
+        solver=solver,
         run=run["run"],
         seed=run["seed"],
         definition={**entry["definition"], "seed": run["seed"]},
         settings=entry["settings"],
         status=run["status"],
-        success=run["success"],
+        claimed=run["claimed"],
         x={str(k): value for k, value in enumerate(run["x"])},
-        objective=run["claim"][0],
-        violation=run["claim"][1],
+        claimed_objective=run["claim"][0],
+        claimed_violation=run["claim"][1],
         verdict=Verdict(
             objective=math.nan if objective is None else objective,
             violation=math.inf if violation is None else violation,
@@ -114,6 +115,7 @@ def _unpacked(instance: str, solver: str, entry: dict[str, Any], run: dict[str, 
             dense=None,
             dense_feasible=None,
             violated=(),
+            guaranteed=None,
         ),
         evaluations=run["calls"],
         failed_evaluations=run["failed"],

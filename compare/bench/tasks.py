@@ -37,7 +37,7 @@ def instance_spec(id: str) -> ProblemSpec:
 
 def bench_tasks(
     instances: Sequence[str],
-    algorithm: str | Algorithm,
+    solver: str | Algorithm,
     *,
     settings: Mapping[str, Any] | None = None,
     label: str = "",
@@ -49,7 +49,7 @@ def bench_tasks(
     return tuple(
         Task(
             problem=instance_spec(id),
-            algorithm=algorithm,
+            solver=solver,
             settings=settings or {},
             label=label,
             stop=Stop(evaluations=evaluations, time_limit_s=time_limit_s),

@@ -216,7 +216,7 @@ def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
         names = [name for name in names if name not in GRADIENT_SOLVERS]
     elif IPOPT not in names:
         names.insert(0, IPOPT)
-    return [SolverSpec(algorithm=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
+    return [SolverSpec(name=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
 
 
 def _refuse_others(context: typer.Context, flag: str) -> None:

@@ -45,7 +45,7 @@ def search(
     from nlp_gait.backends.kernel.compiled import available_cores
 
     spec = problem.spec()
-    solver = SolverSpec(algorithm=algorithm, runs=searches.runs, polish=searches.polish)
+    solver = SolverSpec(name=algorithm, runs=searches.runs, polish=searches.polish)
     tasks = searches.make_study([spec], [solver]).tasks()
     with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
         records, stopped = until_interrupted(
@@ -68,7 +68,7 @@ def search(
             f"{problem.name}, {algorithm}",
             records,
             {
-                "solver": lambda r: r.algorithm,
+                "solver": lambda r: r.solver,
                 "run": lambda r: str(r.run),
                 "seed": lambda r: str(r.seed),
                 loaded.objective.name: lambda r: with_unit(r.verdict.objective, loaded.objective.unit),

@@ -26,7 +26,7 @@ def starts(problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping
     model, rng = problem.load(), np.random.default_rng(seed)
     points = [model.by_name(model.start_point(rng)) for _ in range(count)]
     return [
-        Task(problem=problem, algorithm=IPOPT, settings=settings or {}, seed=seed, run=run, start=point)
+        Task(problem=problem, solver=IPOPT, settings=settings or {}, seed=seed, run=run, start=point)
         for run, point in enumerate(points)
     ]
 
@@ -34,7 +34,7 @@ def starts(problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping
 def searches(problem: ProblemSpec, label: str, algorithm: Algorithm, runs: int, evaluations: int) -> list[Task]:
     """Runs of a search algorithm; run k has seed k."""
     stop = Stop(evaluations=evaluations)
-    return [Task(problem=problem, algorithm=algorithm, label=label, stop=stop, run=run) for run in range(runs)]
+    return [Task(problem=problem, solver=algorithm, label=label, stop=stop, run=run) for run in range(runs)]
 
 
 def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = run_task) -> Runs:
@@ -61,7 +61,7 @@ def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = 
         if not record.x:
             file = record_file(folder, task)
             raise InputError(f"{file.parent.name}/{file.stem} {record.status}; mend that and delete {str(file)!r}")
-        found.setdefault((record.problem, record.algorithm), []).append(record)
+        found.setdefault((record.problem, record.solver), []).append(record)
     return found
 
 
@@ -73,7 +73,7 @@ def best(records: Iterable[RunRecord]) -> RunRecord:
 def _rank(record: RunRecord) -> tuple[bool, bool, float]:
     verdict = record.verdict
     sign = 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
-    return not record.success, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
+    return not record.claimed, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
 
 
 def objectives(records: Iterable[RunRecord]) -> list[float]:

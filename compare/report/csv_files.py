@@ -31,7 +31,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
         rows = [
             _cells(
                 [
-                    r.algorithm,
+                    r.solver,
                     r.run,
                     *(r.x.get(n) for n in names),
                     *judged(r),

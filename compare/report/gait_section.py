@@ -23,7 +23,7 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
     if not records:
         return None
     try:
-        gaits = {record.algorithm: _gait(record) for record in records}
+        gaits = {record.solver: _gait(record) for record in records}
     except GaitError as error:
         return f"The gaits are not drawn: {error}."
     found = {title: gait for title, gait in gaits.items() if gait is not None}

@@ -74,7 +74,7 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
     runtime = text_table(
         ("solver", *(f"to {t}" for t in targets), *(f"seconds to {t}" for t in targets)),
         [
-            (s.algorithm, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
+            (s.solver, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
             for s in summaries
         ],
         "Expected running time to targets: cost of all runs until then, divided by the number that reached it",
@@ -83,7 +83,7 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
         ("solver", "feasible between samples", "95 % interval of the median", "build", "compile", "solve, median"),
         [
             (
-                s.algorithm,
+                s.solver,
                 "-" if s.dense_feasible is None else f"{s.dense_feasible}/{s.runs}",
                 "-" if s.median_interval is None else f"{s.median_interval[0]:.6f} to {s.median_interval[1]:.6f}",
                 seconds(s.build_s, ".2f"),
@@ -162,7 +162,7 @@ def _binding(comparison: Comparison) -> Section | None:
     return Section(
         title="Active constraints at the optimum",
         parts=(
-            f"At the best optimum of {record.algorithm} (run {record.run}). The price is the change of the optimal "
+            f"At the best optimum of {record.solver} (run {record.run}). The price is the change of the optimal "
             f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
             text_table(("constraint", "side", "at", "price", "for a step"), rows),
         ),
@@ -189,14 +189,14 @@ def _failures(comparison: Comparison) -> Section | None:
     failed = [r for r in comparison.records if not r.verdict.feasible]
     if not failed:
         return None
-    rows = [(r.algorithm, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
+    rows = [(r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
     table = text_table(("solver", "run", "seed", "status", "violated, worst first"), rows, prose=True)
     return Section(title="Runs that ended infeasible or failed", parts=(table,))
 
 
 def _between(comparison: Comparison) -> Section | None:
     rows = [
-        (r.algorithm, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _proven(r))
+        (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _proven(r))
         for r in comparison.records
         if r.verdict.feasible and (r.verdict.dense_feasible is False or _proven(r) != "-")
     ]

@@ -50,5 +50,5 @@ def run_apart(task: Task, run: Callable[[], RunRecord]) -> RunRecord:
         record = record_from(json.loads(sent))  # checked as a record from a file
     except (ValueError, RecursionError) as error:
         return RunRecord.failed(task, f"failed: its process sent no record: {error}")
-    same = (record.problem, record.algorithm, record.run) == (task.problem.title, task.title, task.run)
+    same = (record.problem, record.solver, record.run) == (task.problem.title, task.title, task.run)
     return record if same else RunRecord.failed(task, "failed: its process sent the record of another run")

@@ -20,7 +20,7 @@ MATHEMATICS = "the problem's mathematics or limits"
 WORDS: Mapping[tuple[str, ...], str] = {
     ("problem", HASH): MATHEMATICS,
     ("problem", SOURCE): "the problem's source",
-    ("algorithm", SOURCE): "the algorithm's source",
+    ("solver", SOURCE): "the solver's source",
     ("polishes", "key"): "the search that it polishes",
 }
 INPUT_WORDS = {
@@ -54,26 +54,17 @@ def group_of(definition: Mapping[str, Any]) -> dict[str, Any]:
     return {key: part for key, part in _content(definition).items() if key not in ("seed", "start", "imported")}
 
 
-def without_hashes(definition: Mapping[str, Any]) -> dict[str, Any]:
-    """A definition as the first records have it; that of code of one's own, which they could not identify, is like no other."""
-    problem = {key: value for key, value in definition["problem"].items() if key != HASH}
-    found = {**definition, "problem": problem}
-    if "polishes" in found:
-        found["polishes"] = {key: value for key, value in found["polishes"].items() if key != "key"}
-    return found
-
-
 def _content(definition: Mapping[str, Any]) -> dict[str, Any]:
     problem = dict(definition["problem"])
-    if HASH in problem:
-        problem["name"] = shorten_name(problem["name"]) if SOURCE in problem else problem["name"]
-        robot = problem["options"].get("robot")
-        if isinstance(robot, str) and is_robot_file(robot):
-            problem["options"] = {**problem["options"], "robot": ""}  # it is in the hash
-    algorithm = definition["algorithm"]
-    if isinstance(algorithm, Mapping) and "name" in algorithm:
-        algorithm = {**algorithm, "name": shorten_name(algorithm["name"])}
-    return {**definition, "problem": problem, "algorithm": algorithm}
+    if SOURCE in problem:
+        problem["name"] = shorten_name(problem["name"])
+    robot = problem["options"].get("robot")
+    if isinstance(robot, str) and is_robot_file(robot):
+        problem["options"] = {**problem["options"], "robot": ""}  # the hash includes the robot
+    solver = definition["solver"]
+    if isinstance(solver, Mapping) and "name" in solver:
+        solver = {**solver, "name": shorten_name(solver["name"])}
+    return {**definition, "problem": problem, "solver": solver}
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -34,7 +34,7 @@ class Played:
 
     Attributes:
         problem: label, as in the record.
-        algorithm: label, likewise.
+        solver: label, likewise.
         run: number, likewise.
         drive: of the servos.
         steps: of a cycle; None for a phase.
@@ -46,7 +46,7 @@ class Played:
     """
 
     problem: str
-    algorithm: str
+    solver: str
     run: int
     drive: Drive
     steps: int | None
@@ -86,7 +86,7 @@ def play_records(
             played = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
             found.append(decoded(Played, played))
         if progress is not None:
-            progress(f"{record.problem} {record.algorithm}")
+            progress(f"{record.problem} {record.solver}")
     return found
 
 
@@ -119,7 +119,7 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
     return asdict(
         Played(
             problem=record.problem,
-            algorithm=record.algorithm,
+            solver=record.solver,
             run=record.run,
             drive=drive,
             steps=steps,
@@ -133,7 +133,7 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
 
 
 def _name(record: RunRecord) -> str:
-    return run_file(Path("simulations"), record.problem, record.algorithm, record.run).with_suffix("").as_posix()
+    return run_file(Path("simulations"), record.problem, record.solver, record.run).with_suffix("").as_posix()
 
 
 def _gait(record: RunRecord) -> dict[str, Any]:

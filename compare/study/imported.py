@@ -104,7 +104,7 @@ def imported(
         records.append(
             RunRecord(
                 problem=spec.title,
-                algorithm=label,
+                solver=label,
                 run=run,
                 seed=seed,
                 definition=json.loads(
@@ -112,7 +112,7 @@ def imported(
                         {
                             "problem": part,
                             "objective": objective,
-                            "algorithm": label,
+                            "solver": label,
                             "settings": {},
                             "seed": seed,
                             "imported": {"sha256": sha256_of(content)},
@@ -121,10 +121,10 @@ def imported(
                 ),
                 settings={"kind": "imported", "file": finals.name},
                 status=f"imported from {finals.name}",
-                success=claim is not None and not row["violation"] > 0.0,
+                claimed=claim is not None and not row["violation"] > 0.0,
                 x=problem.by_name(x),
-                objective=claim,
-                violation=None if math.isnan(row["violation"]) else row["violation"],
+                claimed_objective=claim,
+                claimed_violation=None if math.isnan(row["violation"]) else row["violation"],
                 verdict=verdict,
                 evaluations={"f": history.evaluations[-1]},
                 failed_evaluations=0,

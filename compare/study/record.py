@@ -21,7 +21,7 @@ from nlp_gait.notebook import html_table
 from nlp_gait.proofs.guarantee import Guarantee
 from nlp_gait.user_code import resolve_code
 
-SCHEMA = 2
+SCHEMA = 3
 REMEDY = "delete it to have it made anew"
 CALLS = frozenset(field.name for field in fields(Evaluations))
 
@@ -70,8 +70,7 @@ class Verdict:
         dense: the same on the dense grid, if there is one.
         dense_feasible: no row violated on the dense grid; None without one.
         violated: names of the worst violated rows with the amount, own samples first.
-        guaranteed: what is proven between the samples; None where the point is infeasible, or in a record from before it was
-            asked.
+        guaranteed: what is proven between the samples; None where the point is infeasible.
     """
 
     objective: float
@@ -81,7 +80,7 @@ class Verdict:
     dense: Mapping[str, float] | None
     dense_feasible: bool | None
     violated: tuple[str, ...]
-    guaranteed: Guarantee | None = None
+    guaranteed: Guarantee | None
 
     @classmethod
     def of(cls, evaluation: Evaluation) -> Verdict:
@@ -109,6 +108,7 @@ class Verdict:
             dense=None,
             dense_feasible=None,
             violated=(),
+            guaranteed=None,
         )
 
 
@@ -118,16 +118,16 @@ class RunRecord:
 
     Attributes:
         problem: label, or name without one.
-        algorithm: label, or name without one.
+        solver: label, or name without one.
         run: number within the study.
         seed: of this run alone: it repeats the run.
         definition: all that the result depends on.
-        settings: of the algorithm, defaults included.
+        settings: of the solver, defaults included.
         status: why it ended, in words.
-        success: the solver itself claims a feasible result.
+        claimed: whether the solver claims a feasible result.
         x: by variable name; empty if the run failed before it had a point.
-        objective: as claimed, in the problem's sense; None without a claim.
-        violation: as claimed; None without a claim.
+        claimed_objective: in the problem's sense; None without a claim.
+        claimed_violation: total; None without a claim.
         verdict: of the judge.
         evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
         failed_evaluations: calls that gave NaN or infinity.
@@ -138,16 +138,16 @@ class RunRecord:
     """
 
     problem: str
-    algorithm: str
+    solver: str
     run: int
     seed: int
     definition: Mapping[str, Any]
     settings: Mapping[str, Any]
     status: str
-    success: bool
+    claimed: bool
     x: Mapping[str, float]
-    objective: float | None
-    violation: float | None
+    claimed_objective: float | None
+    claimed_violation: float | None
     verdict: Verdict
     evaluations: Mapping[str, int]
     failed_evaluations: int
@@ -161,7 +161,7 @@ class RunRecord:
         """Record of a task, with what its run found: the fields from ``settings`` on."""
         return cls(
             problem=task.problem.title,
-            algorithm=task.title,
+            solver=task.title,
             run=task.run,
             seed=task.run_seed,
             definition=task.definition(),
@@ -175,10 +175,10 @@ class RunRecord:
             task,
             settings={},
             status=status,
-            success=False,
+            claimed=False,
             x={},
-            objective=None,
-            violation=None,
+            claimed_objective=None,
+            claimed_violation=None,
             verdict=Verdict.without_point(),
             evaluations={"f": 0},
             failed_evaluations=0,
@@ -198,7 +198,7 @@ class RunRecord:
 
     def __repr__(self) -> str:
         """One line: whose run on what, and what the judge finds."""
-        return f"<RunRecord of {self.algorithm} on {self.problem}, run {self.run}: {self.objective_in_words}>"
+        return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_in_words}>"
 
     def _repr_html_(self) -> str:
         calls = ", ".join(f"{kind} {count}" for kind, count in self.evaluations.items())
@@ -216,7 +216,7 @@ class _Definition:
 
     problem: StoredProblem
     objective: Objective
-    algorithm: str | Mapping[str, Any]
+    solver: str | Mapping[str, Any]
     settings: Mapping[str, Any]
     seed: int
     imported: Mapping[str, str] | None = None
@@ -234,7 +234,7 @@ def gait_of(record: RunRecord) -> Result:
             has other variables than the record.
     """
     stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
-    name = resolve_code(stored.name, "problem", f"the record of {record.algorithm}, run {record.run},")
+    name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
     problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
     return Result(problem=problem, x=problem.check_x(record.x))
 
@@ -272,7 +272,7 @@ def _checked(record: RunRecord) -> RunRecord:
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")
-    for title in (record.problem, record.algorithm):
+    for title in (record.problem, record.solver):
         if not LABEL.fullmatch(title):  # names of files are made from it
             raise ValueError(f"{title!r} is not a label of a problem or solver")
     history, times, verdict = record.history, record.time_s, record.verdict

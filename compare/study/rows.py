@@ -11,7 +11,7 @@ from nlp_gait.notebook import pandas
 CALLS = ("f", "g", "gradient", "jacobian", "hessian")
 JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
 HEADER = (
-    *("problem", "solver", "run", "seed", "success", "status", "claimed_objective", "claimed_violation"),
+    *("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation"),
     *JUDGED,
     *(f"calls_{kind}" for kind in CALLS),
     *("failed_evaluations", "iterations", "time_s"),
@@ -20,10 +20,10 @@ HEADER = (
 
 def row_of(record: RunRecord) -> list[object]:
     """A run under ``HEADER``; None where something is not known."""
-    claims = (record.objective, record.violation)
+    claims = (record.claimed_objective, record.claimed_violation)
     calls = [record.evaluations.get(kind) for kind in CALLS]
     return [
-        *(record.problem, record.algorithm, record.run, record.seed, record.success, record.status, *claims),
+        *(record.problem, record.solver, record.run, record.seed, record.claimed, record.status, *claims),
         *judged(record),
         *(*calls, record.failed_evaluations, record.iterations, record.time_s.solve),
     ]

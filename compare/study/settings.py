@@ -25,14 +25,14 @@ class SolverSpec:
     """A solver of a study.
 
     Attributes:
-        algorithm: name.
+        name: as in ``nlp-gait list``, or user code as ``file.py:name`` or ``module:name``.
         label: what the study calls it; the name if empty.
         runs: how many; None for the study's.
         settings: of the algorithm, where they differ from its defaults.
         polish: IPOPT from each of its results, as a solver of its own called ``<label>+ipopt``.
     """
 
-    algorithm: str
+    name: str
     label: str = ""
     runs: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class StudySettings:
 
     def __post_init__(self) -> None:
         """Refuse counts and seeds that no study can have."""
-        solvers = ((f"runs of {solver.label or solver.algorithm}", solver.runs) for solver in self.solvers)
+        solvers = ((f"runs of {solver.label or solver.name}", solver.runs) for solver in self.solvers)
         for name, count in (("runs", self.runs), ("starts", self.starts), *solvers):
             if count is not None and not 1 <= count <= MOST_RUNS:
                 raise InputError(f"{name} must be a whole number from 1 to {MOST_RUNS}, got {count}")
@@ -77,7 +77,7 @@ class StudySettings:
             for solver in self.solvers:
                 task = Task(
                     problem=problem,
-                    algorithm=solver.algorithm,
+                    solver=solver.name,
                     settings=solver.settings,
                     handling=self.handling,
                     stop=self.stop,
@@ -88,7 +88,7 @@ class StudySettings:
                 found += [replace(task, run=run) for run in runs]
                 if solver.polish:
                     polish = replace(
-                        task, algorithm=IPOPT, settings={}, label=f"{task.title}+{IPOPT}", polishes=task.title
+                        task, solver=IPOPT, settings={}, label=f"{task.title}+{IPOPT}", polishes=task.title
                     )
                     found += [replace(polish, run=run, polished=replace(task, run=run)) for run in runs]
         return tuple(found)
@@ -111,7 +111,7 @@ class StudySettings:
     def _runs(self, solver: SolverSpec) -> int:
         if solver.runs is not None:
             return solver.runs
-        return self.starts if solver.algorithm in GRADIENT_SOLVERS else self.runs
+        return self.starts if solver.name in GRADIENT_SOLVERS else self.runs
 
 
 def as_named(settings: StudySettings, owner: str) -> StudySettings:
@@ -124,7 +124,7 @@ def as_named(settings: StudySettings, owner: str) -> StudySettings:
         settings,
         problems=tuple(replace(p, name=resolve_code(p.called, "problem", owner)) for p in settings.problems),
         solvers=tuple(
-            s if s.algorithm in solver_names() else replace(s, algorithm=resolve_code(s.algorithm, "algorithm", owner))
+            s if s.name in solver_names() else replace(s, name=resolve_code(s.name, "algorithm", owner))
             for s in settings.solvers
         ),
     )

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from compare.judge import evaluate
-from compare.study.definition import differences, key_of, without_hashes
-from compare.study.record import RunRecord, Verdict, read_record, run_file
+from compare.study.definition import differences, key_of
+from compare.study.record import RunRecord, read_record, run_file
 from compare.study.rows import frame_of
 from compare.study.runner import Run, run_task
 from compare.study.runs.gradient_run import PLANNED_RUNS
 from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
-from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
@@ -163,7 +160,7 @@ def _build_solvers(tasks: Sequence[Task]) -> None:
     for _, group in groupby(sorted(named, key=_solver_of), key=_solver_of):
         runs = list(group)
         with suppress(GaitError):  # each run says it, in its record
-            runs[0].solver().prepare(runs[0].problem.load(), PLANNED_RUNS)
+            runs[0].make_solver().prepare(runs[0].problem.load(), PLANNED_RUNS)
 
 
 def _solver_of(task: Task) -> tuple[str, str]:
@@ -176,7 +173,7 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
     Raises:
         OutputError: the file cannot be written.
     """
-    path = run_file(folder / RECORDS, record.problem, record.algorithm, record.run)
+    path = run_file(folder / RECORDS, record.problem, record.solver, record.run)
     if not path.parent.is_dir():
         writable_folder(path.parent)
     if path.exists():
@@ -228,15 +225,13 @@ def read_records(folder: Path) -> list[RunRecord]:
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
     records = [(path, _named_alike(path, read_record(path))) for path in paths]
-    records.sort(
-        key=lambda item: item[0] != run_file(folder / RECORDS, item[1].problem, item[1].algorithm, item[1].run)
-    )
+    records.sort(key=lambda item: item[0] != run_file(folder / RECORDS, item[1].problem, item[1].solver, item[1].run))
     return [record for _, record in records]
 
 
 def _named_alike(path: Path, record: RunRecord) -> RunRecord:
     """The record, if it lies where a study puts it: a copy under another name would count twice."""
-    own = run_file(path.parents[1], record.problem, record.algorithm, record.run)
+    own = run_file(path.parents[1], record.problem, record.solver, record.run)
     if path not in (own, _keyed(own, record.definition)):
         raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
     if path != own and own.exists() and key_of(read_record(own).definition) == key_of(record.definition):
@@ -260,30 +255,11 @@ def _finished(study: Study) -> tuple[dict[int, RunRecord], dict[int, RunRecord]]
         for candidate in (path, _keyed(path, definition)):
             if candidate.exists():
                 record = _named_alike(candidate, read_record(candidate))
-                if is_of(record, definition, task):
-                    if HASH not in record.definition["problem"]:  # the judge has agreed with it
-                        record = replace(record, definition=definition)
-                        write_json(candidate, record.to_json())
+                if key_of(record.definition) == key_of(definition):
                     records[index] = record
                     break
                 others.setdefault(index, record)
     return records, {index: record for index, record in others.items() if index not in records}
-
-
-def is_of(record: RunRecord, definition: Mapping[str, Any], task: Task) -> bool:
-    """Whether a record is of a task with this definition.
-
-    One from before definitions held hashes is, if they agree in all that it says and the judge still finds at its point what it
-    found then; of code of one's own it is not, for nobody knows what that was.
-    """
-    if HASH in record.definition["problem"]:
-        return key_of(record.definition) == key_of(definition)
-    if not record.x or record.definition != without_hashes(definition):
-        return False
-    problem = task.problem.load()
-    now, then = Verdict.of(evaluate(problem, problem.check_x(record.x))), record.verdict
-    pairs = ((now.objective, then.objective), (now.violation, then.violation))
-    return all(math.isclose(a, b, rel_tol=SAME_VALUE, abs_tol=SAME_VALUE) for a, b in pairs)
 
 
 def _sentences(study: Study, others: Mapping[int, RunRecord]) -> list[str]:
@@ -291,13 +267,7 @@ def _sentences(study: Study, others: Mapping[int, RunRecord]) -> list[str]:
     found: Counter[tuple[str, str, str]] = Counter()
     for index, record in others.items():
         task = study.tasks[index]
-        old, new = record.definition, task.definition()
-        if HASH not in old["problem"]:
-            new = without_hashes(new)
-        reason = (
-            differences(old, new)
-            or "nothing says that it is of this problem: its record is from before hashes were kept"
-        )
+        reason = differences(record.definition, task.definition())
         found[task.problem.title, task.title, reason] += 1
     return [
         f"{solver} on {problem}: {count} run{'s' * (count > 1)} made again: {reason}"

@@ -125,7 +125,7 @@ class Task:
 
     Attributes:
         problem: what is solved.
-        algorithm: name of the solver, also of one's own as ``file.py:name`` or ``module:name``; or a search algorithm itself, or
+        solver: name of the solver, also of one's own as ``file.py:name`` or ``module:name``; or a search algorithm itself, or
             a plain function (see ``metaheuristics.as_algorithm``), which must be picklable.
         settings: of the named algorithm, where they differ from its defaults.
         handling: of constraints, in searches.
@@ -139,7 +139,7 @@ class Task:
     """
 
     problem: ProblemSpec
-    algorithm: str | Algorithm | Callable[..., object]
+    solver: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)
     handling: Handling = field(default_factory=Handling)
     stop: Stop = field(default_factory=Stop)
@@ -158,15 +158,15 @@ class Task:
     @property
     def title(self) -> str:
         """Label, or the algorithm's name without one."""
-        if isinstance(self.algorithm, str):
-            return self.label or (shorten_name(self.algorithm) if self.is_user_code else self.algorithm)
-        kind = type(self.algorithm).__name__
-        return self.label or str(getattr(self.algorithm, "name", getattr(self.algorithm, "__name__", kind)))
+        if isinstance(self.solver, str):
+            return self.label or (shorten_name(self.solver) if self.is_user_code else self.solver)
+        kind = type(self.solver).__name__
+        return self.label or str(getattr(self.solver, "name", getattr(self.solver, "__name__", kind)))
 
     @property
     def is_user_code(self) -> bool:
         """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
-        name = self.algorithm
+        name = self.solver
         if not isinstance(name, str) or name in solver_names() or name.startswith(PYMOO):
             return False
         return is_user_code(name, "algorithm")
@@ -174,7 +174,7 @@ class Task:
     @property
     def is_search(self) -> bool:
         """True for metaheuristics, False for gradient methods."""
-        return self.algorithm not in GRADIENT_SOLVERS
+        return self.solver not in GRADIENT_SOLVERS
 
     def definition(self) -> dict[str, Any]:
         """All that the result depends on, as JSON gives it back; equal definitions have equal results."""
@@ -182,13 +182,13 @@ class Task:
         parts: dict[str, Any] = {
             "problem": problem_part(problem),
             "objective": asdict(problem.objective),
-            "algorithm": self._algorithm_part(),
+            "solver": self._solver_part(),
             "settings": dict(self.settings),
             "seed": self.run_seed,
         }
         if self.is_search:
             parts |= {"handling": asdict(self.handling), "stop": asdict(self.stop)}
-        elif "evaluations" in list_settings(str(self.algorithm)):
+        elif "evaluations" in list_settings(str(self.solver)):
             parts["stop"] = asdict(self.stop)
         elif self.stop.time_limit_s is not None:
             parts["stop"] = {"time_limit_s": self.stop.time_limit_s}
@@ -203,36 +203,36 @@ class Task:
         except (TypeError, ValueError) as error:
             raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
 
-    def _algorithm_part(self) -> str | dict[str, Any]:
+    def _solver_part(self) -> str | dict[str, Any]:
         """Name, or settings, and the hash of the source where it is not this package's."""
-        if not isinstance(self.algorithm, str):
-            source = source_of(self.algorithm)
-            return {**plain_settings(self.algorithm), **({} if source is None else {SOURCE: source})}
+        if not isinstance(self.solver, str):
+            source = source_of(self.solver)
+            return {**plain_settings(self.solver), **({} if source is None else {SOURCE: source})}
         if self.is_user_code:
-            return {"name": self.algorithm, SOURCE: hash_source(self.algorithm, "algorithm")}
-        return self.algorithm
+            return {"name": self.solver, SOURCE: hash_source(self.solver, "algorithm")}
+        return self.solver
 
-    def search(self) -> Algorithm:
+    def make_search(self) -> Algorithm:
         """Settings of the search algorithm; code of one's own runs here for the first time.
 
         Raises:
             SearchError: it is no algorithm, or does not take its settings.
             UserCodeError: its code cannot be found or fails.
         """
-        if not isinstance(self.algorithm, str):
-            return as_algorithm(self.algorithm, self.title, self.settings)
+        if not isinstance(self.solver, str):
+            return as_algorithm(self.solver, self.title, self.settings)
         if self.is_user_code:
-            own = load_object(self.algorithm, "algorithm")
+            own = load_object(self.solver, "algorithm")
             return as_algorithm(own, self.title, self.settings)
-        return algorithm(self.algorithm, **self.settings)
+        return algorithm(self.solver, **self.settings)
 
-    def solver(self) -> Solver:
+    def make_solver(self) -> Solver:
         """NLP solver with its settings and the limits that it heeds.
 
         Raises:
             InputError: a time limit that it cannot heed, or a setting that is not allowed.
         """
-        name = str(self.algorithm)
+        name = str(self.solver)
         known = list_settings(name)
         if self.stop.time_limit_s is not None and "time_limit_s" not in known:
             raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
@@ -250,16 +250,16 @@ def check_task(task: Task) -> None:
                 f"a label has 1 to 64 letters, digits, spaces and . _ + : ( ) -, and begins with a letter or digit; got {title!r}"
             )
     if task.is_user_code:
-        check_reference(str(task.algorithm), "algorithm")  # without running it
-    elif isinstance(task.algorithm, str) and task.algorithm not in solver_names():
-        raise unknown("algorithm", task.algorithm, [*solver_names(), *find_entry_points("algorithm")])
+        check_reference(str(task.solver), "algorithm")  # without running it
+    elif isinstance(task.solver, str) and task.solver not in solver_names():
+        raise unknown("algorithm", task.solver, [*solver_names(), *find_entry_points("algorithm")])
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
     if not task.is_search:
-        task.solver().check(problem)
+        task.make_solver().check(problem)
     else:
         handling(task.handling.name, **task.handling.settings)
-        search = UNREAD if task.is_user_code else task.search()
+        search = UNREAD if task.is_user_code else task.make_search()
         check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
     if task.start:
         if task.is_search:

@@ -26,14 +26,14 @@ class StoredProblem:
         name: that ``load`` takes.
         options: of its maker.
         parameters: that differ from the defaults.
-        sha256: hash of what was made, empty in records from before there was one.
+        sha256: hash of the mathematics and the parameters.
         source_sha256: hash of the source of a problem of one's own.
     """
 
     name: str
     options: Mapping[str, str | int | float | bool]
     parameters: Mapping[str, float]
-    sha256: str = ""
+    sha256: str
     source_sha256: str = ""
 
 
@@ -41,7 +41,7 @@ class StoredProblem:
 class _RecordFile:
     """What is read of a study's record."""
 
-    schema: Literal[2]
+    schema: Literal[3]
     definition: Mapping[str, Any]
     x: Mapping[str, float]
 

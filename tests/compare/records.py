@@ -25,13 +25,13 @@ POWER = {"name": "power", "unit": "W", "sense": "minimise"}
 
 
 def record(
-    algorithm: str,
+    solver: str,
     run: int,
     history: Sequence[tuple[int, float | None]],
     *,
     problem: str = "walk",
     feasible: bool = True,
-    success: bool = True,
+    claimed: bool = True,
     status: str = "evaluation budget used",
     claim: float | None = None,
     seconds_per_evaluation: float = 0.01,
@@ -45,9 +45,9 @@ def record(
     """A run of two variables with a history of (evaluations, best objective so far)."""
     value = next((v for _, v in reversed(history) if v is not None), None)
     definition: dict[str, Any] = {
-        "problem": {"name": problem, "options": {}, "parameters": {}},
+        "problem": {"name": problem, "options": {}, "parameters": {}, "sha256": "0" * 64},
         "objective": objective,
-        "algorithm": algorithm,
+        "solver": solver,
         "settings": {},
         "seed": run,
     }
@@ -56,16 +56,16 @@ def record(
     seconds = tuple(count * seconds_per_evaluation for count, _ in history)
     return RunRecord(
         problem=problem,
-        algorithm=algorithm,
+        solver=solver,
         run=run,
         seed=run,
         definition=definition,
-        settings={"kind": algorithm},
+        settings={"kind": solver},
         status=status,
-        success=success,
+        claimed=claimed,
         x={"a": 0.0, "b": 1.0},
-        objective=value if claim is None else claim,
-        violation=0.0 if feasible else 1.0,
+        claimed_objective=value if claim is None else claim,
+        claimed_violation=0.0 if feasible else 1.0,
         verdict=Verdict(
             objective=math.nan if value is None else value,
             violation=0.0 if feasible else 1.0,
@@ -74,6 +74,7 @@ def record(
             dense=None,
             dense_feasible=dense_feasible,
             violated=violated,
+            guaranteed=None,
         ),
         evaluations=evaluations or {"f": history[-1][0]},
         failed_evaluations=0,
@@ -109,7 +110,7 @@ def study() -> list[RunRecord]:
             2,
             [(100, None), (500, None)],
             feasible=False,
-            success=False,
+            claimed=False,
             claim=9.0,
             status="<script>alert(1)</script> | failed",
             violated=("reach[<i>left</i>, 3] by 0.5",),
@@ -124,7 +125,7 @@ def study() -> list[RunRecord]:
             evaluations=calls,
             search=False,
             feasible=False,
-            success=True,
+            claimed=True,
             claim=9.5,
             seconds_per_evaluation=0.1,
             status="restoration failed",

@@ -30,7 +30,7 @@ STOP = Stop(evaluations=300)
 def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     backwards = itertools.count(2e9, -3600.0)
     monkeypatch.setattr(time, "time", lambda: next(backwards))
-    tasks = tuple(Task(problem=WALK, algorithm=name, stop=STOP) for name in ("pso", "slsqp", "ipopt"))
+    tasks = tuple(Task(problem=WALK, solver=name, stop=STOP) for name in ("pso", "slsqp", "ipopt"))
     for record in run_study(Study(tasks=tasks, folder=tmp_path)):
         times = record.time_s
         assert min(times.build, times.compile, times.solve, *times.history) >= 0.0
@@ -40,7 +40,7 @@ def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypat
 
 
 def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path) -> None:
-    task = Task(problem=WALK, algorithm="pso", stop=STOP)
+    task = Task(problem=WALK, solver="pso", stop=STOP)
     run_study(Study(tasks=(task,), folder=tmp_path))
     (record,) = tmp_path.glob("records/*/*.json")
     leftover = record.with_name(".abc.tmp")
@@ -77,12 +77,12 @@ class DiesOnce:
 @pytest.mark.slow
 def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
     dying = tuple(
-        Task(problem=WALK, algorithm=DiesOnce(marker=str(tmp_path / "dead")), run=run, stop=STOP) for run in range(6)
+        Task(problem=WALK, solver=DiesOnce(marker=str(tmp_path / "dead")), run=run, stop=STOP) for run in range(6)
     )
     records = run_study(Study(tasks=dying, folder=tmp_path / "study", jobs=2))
     assert (tmp_path / "dead").exists()
     healthy = tuple(
-        Task(problem=WALK, algorithm="pso", settings={"population": 20}, run=run, stop=STOP) for run in range(6)
+        Task(problem=WALK, solver="pso", settings={"population": 20}, run=run, stop=STOP) for run in range(6)
     )
     assert [record.x for record in records] == [record.x for record in run_study(Study(tasks=healthy))]
     assert len([read_record(path) for path in (tmp_path / "study").rglob("*.json")]) == 6

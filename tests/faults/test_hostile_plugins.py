@@ -95,8 +95,8 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
     impatient: None, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    alone = run_study(Study(tasks=(Task(problem=WALK, algorithm="pso", stop=STOP),)))
-    solvers, ways = [SolverSpec(algorithm="pso")], {}
+    alone = run_study(Study(tasks=(Task(problem=WALK, solver="pso", stop=STOP),)))
+    solvers, ways = [SolverSpec(name="pso")], {}
     for i in range(ROUNDS):
         for k, way in enumerate(WAYS):
             if i and way in ONCE:
@@ -104,30 +104,30 @@ def test_a_hundred_hostile_plug_ins_leave_the_others_records_whole(
             name = f"h{i}-{k}"
             ways[name] = way
             reference = f"{written(tmp_path, name, way)}:Algorithm"
-            solvers.append(SolverSpec(algorithm=reference, label=name))
+            solvers.append(SolverSpec(name=reference, label=name))
     assert len(ways) >= 100
     study = StudySettings(problems=(WALK,), solvers=tuple(solvers), runs=1, stop=STOP)
     records = run_study(Study(tasks=study.tasks(), folder=tmp_path / "out"))
     assert capfd.readouterr().out == ""
     assert len(read_records(tmp_path / "out")) == len(solvers)  # every file is read strictly
-    (pso,) = [record for record in records if record.algorithm == "pso"]
+    (pso,) = [record for record in records if record.solver == "pso"]
     assert (pso.x, pso.verdict, pso.history) == (alone[0].x, alone[0].verdict, alone[0].history)
     for record in records:
-        if record.algorithm in ways:
-            said = WAYS[ways[record.algorithm]][2]
+        if record.solver in ways:
+            said = WAYS[ways[record.solver]][2]
             if said is None:
-                assert record.success and record.status.startswith(ENDED), (ways[record.algorithm], record.status)
+                assert record.claimed and record.status.startswith(ENDED), (ways[record.solver], record.status)
             else:
-                assert not record.success and not record.verdict.feasible
+                assert not record.claimed and not record.verdict.feasible
                 assert pytest.approx(0) == record.time_s.solve
-                assert re.search(said, record.status), (ways[record.algorithm], record.status)
+                assert re.search(said, record.status), (ways[record.solver], record.status)
 
 
 def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
     bad = f"{written(tmp_path, 'bad', 'ends its process')}:Algorithm"
-    tasks = [Task(problem=WALK, algorithm=a, label=b, stop=PATIENT) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
+    tasks = [Task(problem=WALK, solver=a, label=b, stop=PATIENT) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
     records = run_study(Study(tasks=tuple(tasks), jobs=2))
-    assert [record.success for record in records] == [False, True, True] and "by status 7" in records[0].status
+    assert [record.claimed for record in records] == [False, True, True] and "by status 7" in records[0].status
 
 
 @pytest.mark.slow
@@ -147,7 +147,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient:
     )
 
     def record(name: str, stop: Stop) -> RunRecord:
-        return attempt(Task(problem=WALK, algorithm=f"{tmp_path / 'own.py'}:{name}", stop=stop))
+        return attempt(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:{name}", stop=stop))
 
     def status(name: str) -> str:
         return record(name, PATIENT).status

@@ -45,7 +45,7 @@ def an_archive(folder: Path, finished: Finished) -> None:
 
 
 def a_study(folder: Path, finished: Finished) -> None:
-    tasks = tuple(Task(problem=WALK, algorithm="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
+    tasks = tuple(Task(problem=WALK, solver="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
     study = Study(
         tasks=tasks,
         folder=folder,
@@ -74,7 +74,7 @@ def results_of_a_reproduction(folder: Path, finished: Finished) -> None:
 
 
 def sessions_of_a_study(folder: Path, finished: Finished) -> None:
-    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),))
+    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),))
     session = Session(command="x", started="now", machine={}, versions={}, kernel="", jobs="1")
     for _ in range(2):
         write_manifest(folder, settings, session)

@@ -67,12 +67,12 @@ def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     slow_iterations(monkeypatch, 0.02)
     end = make_solver(name, time_limit_s=0.03).run(problem, problem.start_point(np.random.default_rng(0)))
     assert (end.success, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
-    record = attempt(Task(problem=WALK, algorithm=name, stop=Stop(time_limit_s=0.03)))
-    assert record.status == "stopped at the time limit" and not record.success and record.x
+    record = attempt(Task(problem=WALK, solver=name, stop=Stop(time_limit_s=0.03)))
+    assert record.status == "stopped at the time limit" and not record.claimed and record.x
 
 
 def test_a_solver_that_cannot_heed_it_is_refused_by_name(tmp_path: Path) -> None:
-    task = Task(problem=WALK, algorithm="fatrop", stop=Stop(time_limit_s=1.0))
+    task = Task(problem=WALK, solver="fatrop", stop=Stop(time_limit_s=1.0))
     with pytest.raises(InputError, match="fatrop cannot be stopped at a time limit; leave out fatrop, or the limit"):
         run_study(Study(tasks=(task,), folder=tmp_path))
     with pytest.raises(InputError, match="fatrop has no settings, got 'time_limit_s'"):

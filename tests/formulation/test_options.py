@@ -52,7 +52,7 @@ def others(name: str) -> dict[str, Any]:
 
 
 def task(name: str, options: Mapping[str, Any]) -> Task:
-    return Task(problem=ProblemSpec(name=name, options=options), algorithm="ipopt")
+    return Task(problem=ProblemSpec(name=name, options=options), solver="ipopt")
 
 
 @pytest.mark.parametrize(

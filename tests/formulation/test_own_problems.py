@@ -74,10 +74,8 @@ def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatc
 def test_a_study_takes_a_problem_itself() -> None:
     spec = ProblemSpec(name=toy(corner), values={"limit": 0.25})
     assert spec.load().value("limit") == 0.25 and spec.title == "toy"
-    task = Task(problem=spec, algorithm="pso")
-    assert key_of(task.definition()) != key_of(
-        Task(problem=ProblemSpec(name=toy(corner)), algorithm="pso").definition()
-    )
+    task = Task(problem=spec, solver="pso")
+    assert key_of(task.definition()) != key_of(Task(problem=ProblemSpec(name=toy(corner)), solver="pso").definition())
     with pytest.raises(InputError, match="is built already, so it takes no options; got intervals"):
         spec.with_options(intervals=3).load()
 

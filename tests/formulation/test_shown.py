@@ -74,7 +74,7 @@ def test_records_and_studies_are_one_line_a_table_and_a_frame(tmp_path: Path) ->
     pytest.importorskip("pandas")
     frame = frame_of([run, record("colony", 0, [(500, None)], feasible=False)])
     assert tuple(frame.columns) == (*HEADER, "x.a", "x.b") and list(frame["feasible"]) == [True, False]
-    tasks = tuple(Task(problem=ProblemSpec(name="nao-dsp"), algorithm="pso", run=k) for k in range(2))
+    tasks = tuple(Task(problem=ProblemSpec(name="nao-dsp"), solver="pso", run=k) for k in range(2))
     study = Study(tasks=tasks, folder=tmp_path)
     assert repr(study) == f"<Study of nao-dsp by pso: 2 runs, kept in {str(tmp_path)!r}>"
     assert "<td>nao-dsp</td><td>pso</td><td>2</td>" in study._repr_html_()

@@ -53,7 +53,7 @@ def hostile_report() -> tuple[Page, str]:
     records = []
     for record in study():
         definition = json.loads(json.dumps(record.definition))
-        definition["problem"] = {"name": "walk", "options": {"robot": f"{MARKED}.json"}, "parameters": {MARKED: 1.0}}
+        definition["problem"] |= {"options": {"robot": f"{MARKED}.json"}, "parameters": {MARKED: 1.0}}
         records.append(
             replace(
                 record,
@@ -72,9 +72,7 @@ def hostile_report() -> tuple[Page, str]:
         kernel=MARKED,
         jobs=MARKED,
     )
-    settings = StudySettings(
-        problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(algorithm=MARKED),)
-    )
+    settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(name=MARKED),))
     document = make_study_document(records, Manifest(settings=settings, sessions=(session,)))
     page = Page()
     page.feed(

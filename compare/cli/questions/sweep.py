@@ -53,7 +53,7 @@ def sweep(
             ),
             folder=output.out,
         )
-    output.take(sweep_answer(points, spec.load(), Task(problem=spec, algorithm=algorithm).title), store=store)
+    output.take(sweep_answer(points, spec.load(), Task(problem=spec, solver=algorithm).title), store=store)
     if stopped:
         not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
         end_interrupted(f"{stopped}; these are in {output.out}{not_twice}; the same command continues")

@@ -67,7 +67,7 @@ class PhaseFindings:
     @cached_property
     def converged(self) -> int:
         """Starts of IPOPT that end within 1e-5 of the best."""
-        return sum(start.success and start.verdict.objective <= self.best * (1 + 1e-5) for start in self.starts)
+        return sum(start.claimed and start.verdict.objective <= self.best * (1 + 1e-5) for start in self.starts)
 
     def final_powers(self, algorithm: str) -> list[float]:
         """Power at the end of each run [W]; infinite without a feasible solution."""

@@ -70,13 +70,13 @@ def tasks(effort: Effort) -> list[Task]:
     specs = [spec_of(phase.problem, effort) for phase in PHASES]
     lever = replace(specs[1].with_options(torso_share="lever"), label=LEVER)
     found = [
-        Task(problem=spec, algorithm=name, stop=stop, run=k)
+        Task(problem=spec, solver=name, stop=stop, run=k)
         for spec in specs
         for name in ALGORITHMS
         for k in range(effort.runs)
     ]
     for spec, starts in (*((spec, effort.starts) for spec in specs), (lever, effort.lever_starts)):
-        found += [Task(problem=spec, algorithm=IPOPT, run=k) for k in range(starts)]
+        found += [Task(problem=spec, solver=IPOPT, run=k) for k in range(starts)]
     return found
 
 

@@ -75,7 +75,7 @@ def _runs(phase: PhaseFindings) -> Rows:
     """Power at the end of all runs and starts."""
     rows = []
     for name, runs in (*phase.searches.items(), ("ipopt", phase.starts)):
-        powers = [run.verdict.objective for run in runs if run.verdict.feasible and run.success]
+        powers = [run.verdict.objective for run in runs if run.verdict.feasible and run.claimed]
         spread: list[Value] = [None] * 4
         if powers:
             middle = float(np.median(powers))

@@ -25,7 +25,7 @@ def document(findings: Findings) -> Document:
 def _values(findings: Findings) -> dict[str, Any]:
     ssp, dsp = findings.phases
     runs = ssp.searches["pso"]
-    solved = [start.verdict.objective for start in findings.lever if start.success]
+    solved = [start.verdict.objective for start in findings.lever if start.claimed]
     lever = f"{min(solved):.5f} W instead of {dsp.best:.5f} W" if solved else "no optimum"
     printed = [
         (optimum.power_W, phase.printed_here[name].objective, phase.printed_with_legs_twice[name])

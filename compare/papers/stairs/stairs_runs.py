@@ -161,7 +161,7 @@ def track_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
         spec = track_spec(case, plan_of(runs, case))
         for name, algorithm in ALGORITHMS.items():
             yield from searches(spec, name, algorithm, effort.runs, effort.track_evaluations)
-        yield Task(problem=spec, algorithm=IPOPT, settings=effort.track_settings, start=TRACK_START)
+        yield Task(problem=spec, solver=IPOPT, settings=effort.track_settings, start=TRACK_START)
 
 
 def plan_of(runs: Runs, case: int, minimise: str = "energy") -> dict[str, float]:

@@ -115,7 +115,7 @@ def _plans(findings: Findings, case: int) -> Rows:
         runs, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
         every = ", ".join(f"{value:.2f}" for value in objectives(runs))
         if solver == IPOPT:
-            ends = objectives(run for run in runs if run.success)
+            ends = objectives(run for run in runs if run.claimed)
             hits = sum(value <= verdict.objective * (1 + MATCH) for value in ends)
             every = f"{hits} of {len(runs)} starts, {len(ends)} converged"
         between = "feasible" if verdict.dense_feasible else verdict.violated[0]
@@ -161,7 +161,7 @@ def _tracks(findings: Findings, case: int) -> Rows:
 def _ideal(findings: Findings, case: int) -> Sequence[Value]:
     """Full trajectory optimisation."""
     runs, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
-    every = ", ".join(f"{run.verdict.objective:.3f}" if run.success else "failed" for run in runs)
+    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in runs)
     energies = [verdict.indexes["energy_J"], findings.best("plan", case).verdict.objective]
     others = [verdict.indexes["peak_torque_Nm"], verdict.indexes["torso_pitch_rad"]]
     return [case, verdict.objective, every, *energies, *others, _time_s(runs)]
@@ -195,7 +195,7 @@ def _other(findings: Findings) -> Rows:
         for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
             run = best(findings.runs[other_spec(findings.effort, name, tread, rise).title, IPOPT])
             worst = ", ".join(run.verdict.violated[:3])
-            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.success else f"none; in the way: {worst}")
+            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; in the way: {worst}")
         rows.append(cells)
     return rows
 

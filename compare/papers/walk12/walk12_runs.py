@@ -98,7 +98,7 @@ def first_tasks(effort: Effort) -> Iterator[Task]:
         free = _spec(f"moment-free-{weight:g}", {"zmp": "moment-free"}, {"lambda": weight, "f1max": F1MAX})
         yield from starts(free, effort.starts)
     corner = _spec("corner", {}, {"lambda": 0.15, "f1max": F1MAX})
-    yield Task(problem=corner, algorithm=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
+    yield Task(problem=corner, solver=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
 
 
 def second_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:

@@ -101,7 +101,7 @@ def _table_3(findings: Findings, label: str) -> Rows:
             cells += [max(f), float(np.median(f)), min(f)]
         begun, optimum = findings.of(label, row.weight, IPOPT), findings.optimum(label, row.weight)
         f_best = optimum.verdict.objective
-        agreeing = sum(r.success and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
+        agreeing = sum(r.claimed and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
         time_s = float(np.median([r.time_s.solve for r in begun]))
         rows.append([*cells, f_best, dense(optimum)["f"], agreeing, time_s])
     return rows

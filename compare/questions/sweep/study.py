@@ -119,7 +119,7 @@ def sweep(
     walk = [dict(zip(names, at, strict=True)) for at in _snake(axes)]
     problem = spec.load()
     specs = [replace(spec, values=dict(placed(problem, at).values)) for at in walk]  # all checked before the work
-    tasks = [Task(problem=s, algorithm=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
+    tasks = [Task(problem=s, solver=algorithm, stop=Stop(evaluations=evaluations), seed=seed) for s in specs]
     check_task(tasks[0])
     store = store or Store()
     asked = {axis.name: list(axis.values) for axis in axes}
@@ -132,7 +132,7 @@ def sweep(
         if tasks[0].is_search:
             ends = _searched(tasks, store, progress)
         else:
-            problems, solver = [s.load() for s in specs], store_runs(store, tasks[0].solver())
+            problems, solver = [s.load() for s in specs], store_runs(store, tasks[0].make_solver())
             ends = solve_both_ways(problems, starts=starts, seed=seed, solver=solver, progress=lambda: progress(""))
     except Interrupted as interrupt:
         ends, sentence = cast("list[Solution | RunRecord | None]", interrupt.partial), interrupt.sentence

@@ -30,13 +30,13 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
         InputError: the run to polish has no point.
     """
     started = time.perf_counter()
-    problem, solver = task.problem.load(), task.solver()
+    problem, solver = task.problem.load(), task.make_solver()
     if task.start:
         x0 = problem.check_within(task.start)
     elif start is None:
         x0 = problem.start_point(np.random.default_rng(task.run_seed))
     elif not start.x:
-        raise InputError(f"{start.algorithm}, run {start.run}, has no point to polish: {start.status}")
+        raise InputError(f"{start.solver}, run {start.run}, has no point to polish: {start.status}")
     else:
         x0 = problem.check_within(start.x)
     outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
@@ -60,11 +60,11 @@ def gradient_run(task: Task, start: RunRecord | None = None) -> RunRecord:
     return RunRecord.of(
         task,
         settings=settings,
-        status=solution.status if task.algorithm == IPOPT else outcome.status,  # other solvers are quoted
-        success=outcome.claimed,
+        status=solution.status if task.solver == IPOPT else outcome.status,  # other solvers are quoted
+        claimed=outcome.claimed,
         x=problem.by_name(outcome.x),
-        objective=verdict.objective if math.isfinite(verdict.objective) else None,
-        violation=outcome.violation if math.isfinite(outcome.violation) else None,
+        claimed_objective=verdict.objective if math.isfinite(verdict.objective) else None,
+        claimed_violation=outcome.violation if math.isfinite(outcome.violation) else None,
         verdict=verdict,
         evaluations=evaluations,
         failed_evaluations=0,

@@ -29,7 +29,7 @@ def search_run(task: Task, callback: Callable[..., None] | None = None) -> RunRe
     sign, stop = problem.objective.sign, task.stop
     result = minimize(
         objective,
-        task.search(),
+        task.make_search(),
         evaluations=stop.evaluations,
         seed=task.run_seed,
         handling=handling(task.handling.name, **task.handling.settings),
@@ -47,10 +47,10 @@ def search_run(task: Task, callback: Callable[..., None] | None = None) -> RunRe
         task,
         settings={**plain_settings(result.algorithm), "handling": plain_settings(result.handling)},
         status="; ".join(result.reasons),
-        success=result.feasible,
+        claimed=result.feasible,
         x=problem.by_name(result.x),
-        objective=sign * result.objective if math.isfinite(result.objective) else None,
-        violation=result.violation if math.isfinite(result.violation) else None,
+        claimed_objective=sign * result.objective if math.isfinite(result.objective) else None,
+        claimed_violation=result.violation if math.isfinite(result.violation) else None,
         verdict=Verdict.of(evaluate(problem, result.x)),
         evaluations={"f": result.evaluations},
         failed_evaluations=result.failed_evaluations,

@@ -17,11 +17,11 @@ from nlp_gait.simulation.drive import DRIVES
 
 
 def played(
-    algorithm: str, model: float, engine: float | None, *, way: float | None = None, problem: str = "nao-dsp"
+    solver: str, model: float, engine: float | None, *, way: float | None = None, problem: str = "nao-dsp"
 ) -> Played:
     return Played(
         problem=problem,
-        algorithm=algorithm,
+        solver=solver,
         run=0,
         drive=DRIVES["feed-forward"],
         steps=None if way is None else 10,

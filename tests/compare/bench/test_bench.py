@@ -41,9 +41,7 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
     first = path.read_bytes()
     assert pack(ID, runs, tmp_path).read_bytes() == first
     again = baseline_records(ID, tmp_path)
-    assert [(r.algorithm, r.run, r.seed, r.status) for r in again] == [
-        (r.algorithm, r.run, r.seed, r.status) for r in runs
-    ]
+    assert [(r.solver, r.run, r.seed, r.status) for r in again] == [(r.solver, r.run, r.seed, r.status) for r in runs]
     known = references([ID])
     (before,), (after,) = (compare_problems(records, references=known) for records in (runs, again))
     for old, new in zip(before.solvers, after.solvers, strict=True):
@@ -68,7 +66,7 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
     assert sum(path.stat().st_size for path in FOLDER.glob("*.json.gz")) <= 20e6
     for id in shipped():
         records = baseline_records(id)
-        assert sorted((r.algorithm, r.run) for r in records) == sorted(product(BASELINE, range(RUNS)))
+        assert sorted((r.solver, r.run) for r in records) == sorted(product(BASELINE, range(RUNS)))
         assert all(r.seed == r.run and r.problem == id for r in records)
         assert {r.definition["stop"]["evaluations"] for r in records if "handling" in r.definition} == {10_000}
 
@@ -101,17 +99,17 @@ def test_places_follow_from_expected_running_times() -> None:
     ranks = [standing.mean_rank for standing in board.standings]
     assert ranks == sorted(ranks) and sum(ranks) == pytest.approx(len(ranks) * (len(ranks) + 1) / 2)
     first = board.standings[0].solver
-    records = [record for id in ids for record in baseline_records(id) if record.algorithm == first]
+    records = [record for id in ids for record in baseline_records(id) if record.solver == first]
     faster = [
         replace(
             record,
-            algorithm="faster",
+            solver="faster",
             evaluations={kind: count // 2 for kind, count in record.evaluations.items()},
             history=replace(record.history, evaluations=tuple(e // 2 for e in record.history.evaluations)),
         )
         for record in records
     ]
-    twin = [replace(record, algorithm="twin") for record in records]
+    twin = [replace(record, solver="twin") for record in records]
     assert leaderboard(ids, faster).place("faster") == 1
     with_twin = {s.solver: s for s in leaderboard(ids, twin).standings}
     assert with_twin["twin"].mean_rank == with_twin[first].mean_rank
@@ -126,12 +124,12 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     failed = [
         replace(
             record,
-            algorithm="nothing",
+            solver="nothing",
             verdict=replace(record.verdict, objective=math.nan, violation=1.0, feasible=False),
         )
         for id in ids
         for record in baseline_records(id)
-        if record.algorithm == "random"
+        if record.solver == "random"
     ]
     board = leaderboard(ids, failed)
     last = board.standings[-1]
@@ -142,7 +140,7 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
 @pytest.mark.slow
 def test_the_page_says_it(tmp_path: Path) -> None:
     ids = ("walk12-w015", "ssp-v5")
-    twin = [replace(r, algorithm="twin") for id in ids for r in baseline_records(id) if r.algorithm == "pso"]
+    twin = [replace(r, solver="twin") for id in ids for r in baseline_records(id) if r.solver == "pso"]
     board = leaderboard(ids, twin)
     written = write_document(tmp_path, leaderboard_page(board, "twin", "two instances"), "leaderboard")
     assert {path.name for path in written} >= {"leaderboard.html", "leaderboard.md", "gaitbench-runtime.png"}

@@ -20,7 +20,7 @@ name = "my.py:two_link"
 options = {intervals = 10}
 fix = {time_s = 1.5}
 [[solver]]
-algorithm = "my.py:Shrinking"
+name = "my.py:Shrinking"
 settings = {population = 10}
 polish = true
 """

@@ -19,9 +19,9 @@ evaluations = 300
 [[problem]]
 name = "nao-ssp"
 [[solver]]
-algorithm = "ipopt"
+name = "ipopt"
 [[solver]]
-algorithm = "pso"
+name = "pso"
 label = "little-pso"
 settings = {population = 20}
 """
@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
     (out / "study.toml").write_text(STUDY)
     done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")
-    assert [s["algorithm"] for s in done["problems"]["nao-ssp"]] == ["ipopt", "little-pso"]
+    assert [s["solver"] for s in done["problems"]["nao-ssp"]] == ["ipopt", "little-pso"]
     assert all(Path(file).stat().st_size for file in done["files"])
     return out / "out"
 
@@ -94,5 +94,5 @@ def test_all_are_those_that_can_use_up_the_budget(
 ) -> None:
     monkeypatch.setattr(sys.modules[chosen_solvers.__module__], "installed_algorithms", lambda: ("pso", "bayes"))
     solvers = chosen_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
-    names = [solver.algorithm for solver in solvers]
+    names = [solver.name for solver in solvers]
     assert ("bayes" in names) == takes_part and {"ipopt", "pso"} <= set(names)

@@ -28,9 +28,9 @@ def test_starts_are_those_of_one_solve_with_as_many() -> None:
 
 def test_the_best_run_succeeds_before_it_is_cheap() -> None:
     runs = [record("ga", run, [(10, value)]) for run, value in enumerate((3.0, 2.0, 1.0, 0.5))]
-    runs[2] = replace(runs[2], success=False)
+    runs[2] = replace(runs[2], claimed=False)
     runs[3] = replace(
-        runs[3], success=False, verdict=replace(runs[3].verdict, feasible=False, violation=1.0, objective=0.5)
+        runs[3], claimed=False, verdict=replace(runs[3].verdict, feasible=False, violation=1.0, objective=0.5)
     )
     assert best(runs) is runs[1] and best(runs[2:]) is runs[2]
     maximised = [replace(r, definition={"objective": {"sense": "maximise"}}) for r in runs[:2]]
@@ -48,6 +48,6 @@ def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path
 
 def test_a_start_point_is_for_nlp_solvers() -> None:
     point = starts(WALK, 1)[0].start
-    check_task(Task(problem=WALK, algorithm="slsqp", start=point))
+    check_task(Task(problem=WALK, solver="slsqp", start=point))
     with pytest.raises(InputError, match="'pso' takes no start point"):
-        check_task(Task(problem=WALK, algorithm="pso", start=point))
+        check_task(Task(problem=WALK, solver="pso", start=point))

@@ -68,7 +68,7 @@ def test_the_report_holds_every_table_and_figure(done: tuple[Path, list[str]]) -
 def test_tables_tell_what_the_records_hold(done: tuple[Path, list[str]]) -> None:
     out, _ = done
     plan = read_record(out / "records" / "plan-2" / "ipopt-0000.json")
-    assert plan.success and plan.verdict.feasible
+    assert plan.claimed and plan.verdict.feasible
     (ipopt,) = [row for row in rows(out / "plans.csv") if row["solver"] == "ipopt"]
     assert float(ipopt["best [J]"]) == plan.verdict.objective
     assert ipopt["all runs [J]"] == "1 of 1 starts, 1 converged" and ipopt["feasible"] == "true"

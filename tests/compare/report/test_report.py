@@ -88,7 +88,7 @@ def test_summaries_by_hand() -> None:
     (comparison,) = compare_problems(study())
     assert comparison.reference == 10.0
     newton, swarm, colony = summarise(comparison)
-    assert [s.algorithm for s in (newton, swarm, colony)] == ["newton", "swarm", "colony"]
+    assert [s.solver for s in (newton, swarm, colony)] == ["newton", "swarm", "colony"]
     # n = 2: 5 + 5 + 4 * 3 + 4 * 3 + 3 * 6 = 52; two successes and one failure: 3 * 52 / 2.
     assert newton.evaluations == 52.0 and newton.expected_evaluations == (78.0,) * 4
     assert newton.expected_s == pytest.approx((0.75,) * 4)
@@ -201,7 +201,7 @@ def test_page_loads_nothing(page: str, tables: Tables) -> None:
 @pytest.mark.slow
 def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
     for r in study():
-        path = tmp_path / RECORDS / r.problem / f"{r.algorithm}-{r.run:04d}.json"
+        path = tmp_path / RECORDS / r.problem / f"{r.solver}-{r.run:04d}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         write_json(path, r.to_json())
     rebuild_report(tmp_path)
@@ -220,7 +220,7 @@ def test_two_problems_have_a_performance_profile(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_nothing_feasible_is_said_plainly(tmp_path: Path) -> None:
-    failed = [record("pso", run, [(10, None)], feasible=False, success=False) for run in range(2)]
+    failed = [record("pso", run, [(10, None)], feasible=False, claimed=False) for run in range(2)]
     write_report(tmp_path, failed, Manifest(settings=None, sessions=()))
     assert "No solver found a feasible point of walk." in (tmp_path / "report.md").read_text(encoding="utf-8")
 

@@ -18,7 +18,7 @@ from compare.study import apart
 from compare.study.record import RunRecord
 from compare.study.task import ProblemSpec, Stop, Task
 
-TASK = Task(problem=ProblemSpec(name="walk12"), algorithm="pso", stop=Stop(evaluations=20, time_limit_s=60.0))
+TASK = Task(problem=ProblemSpec(name="walk12"), solver="pso", stop=Stop(evaluations=20, time_limit_s=60.0))
 IN_A_HURRY = replace(TASK, stop=Stop(evaluations=20, time_limit_s=0.05))
 
 pytestmark = pytest.mark.skipif(

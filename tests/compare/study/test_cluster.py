@@ -23,7 +23,7 @@ pytest.importorskip("distributed")
 
 STUDY = StudySettings(
     problems=(ProblemSpec(name="nao-ssp"),),
-    solvers=(SolverSpec(algorithm="pso", polish=True), SolverSpec(algorithm="ga")),
+    solvers=(SolverSpec(name="pso", polish=True), SolverSpec(name="ga")),
     runs=3,
     stop=Stop(evaluations=500),
 )

@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("study")
     (path / RECORDS / "nao-dsp").mkdir(parents=True)
     for made in (dsp("pso", 3.0), dsp("ga", 4.0, 0.35)):
-        write_json(path / RECORDS / "nao-dsp" / f"{made.algorithm}-0000.json", made.to_json())
+        write_json(path / RECORDS / "nao-dsp" / f"{made.solver}-0000.json", made.to_json())
     return path
 
 
@@ -56,7 +56,7 @@ def refuse(*_: object, **__: object) -> None:
 def test_the_command_plays_each_solvers_best_gait(report: dict[str, object], folder: Path) -> None:
     gaits = report["gaits"]
     assert isinstance(gaits, list)
-    assert [gait["algorithm"] for gait in gaits] == ["pso", "ga"]
+    assert [gait["solver"] for gait in gaits] == ["pso", "ga"]
     for gait in gaits:
         assert gait["unit"] == "W" and gait["fell_at_s"] is None and gait["steps"] is None
         assert gait["engine"] == pytest.approx(gait["model"], rel=0.2)

@@ -25,8 +25,8 @@ OPTIMUM = 0.845868
 
 @pytest.mark.slow
 def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
-    record = run_task(Task(problem=SSP, algorithm="slsqp"))
-    assert record.success and record.verdict.feasible
+    record = run_task(Task(problem=SSP, solver="slsqp"))
+    assert record.claimed and record.verdict.feasible
     assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-4)
     assert record.evaluations["f"] == record.history.evaluations[-1] > 10 * record.iterations
     assert (np.diff(record.history.evaluations) > 0).all() and (np.diff(record.time_s.history) > 0.0).all()
@@ -34,16 +34,16 @@ def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
 
 @pytest.mark.slow
 def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
-    record = run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=45)))
-    assert record.status == "evaluation budget used" and not record.success
+    record = run_task(Task(problem=SSP, solver="slsqp", stop=Stop(evaluations=45)))
+    assert record.status == "evaluation budget used" and not record.claimed
     assert record.evaluations["f"] <= 45 and set(record.x) == set(SSP.load().names)
-    assert run_task(Task(problem=SSP, algorithm="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
+    assert run_task(Task(problem=SSP, solver="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
 
 
 @pytest.mark.slow
 def test_slsqp_leaves_fixed_variables_alone() -> None:
     fixed = ProblemSpec(name="nao-ssp", values=dict(SSP.load().fix(swing_height_m=0.02).values))
-    record = run_task(Task(problem=fixed, algorithm="slsqp", run=1))
+    record = run_task(Task(problem=fixed, solver="slsqp", run=1))
     assert record.x["swing_height_m"] == 0.02 and record.verdict.feasible
 
 
@@ -53,8 +53,8 @@ def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
     reason = nlpsol.probe(name)
     if reason is not None:
         pytest.skip(f"{name} does not run here: {reason}")
-    record = run_task(Task(problem=SSP, algorithm=name))
-    assert record.success
+    record = run_task(Task(problem=SSP, solver=name))
+    assert record.claimed
     assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-5)
     assert record.verdict.violation < 1e-5  # fatrop relaxes bounds by more than the judge's 1e-6, and is told so
     assert record.evaluations["f"] > 0 and record.evaluations["gradient"] > 0
@@ -64,7 +64,7 @@ def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
 def test_other_nlp_solvers_print_nothing() -> None:
     program = (
         "from compare.study.runner import run_task; from compare.study.task import ProblemSpec, Task\n"
-        "run_task(Task(problem=ProblemSpec(name='walk12'), algorithm='sqpmethod'))"
+        "run_task(Task(problem=ProblemSpec(name='walk12'), solver='sqpmethod'))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
@@ -95,7 +95,7 @@ def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytes
         return prepare(settings, problem, solves)
 
     monkeypatch.setattr(IpoptSettings, "prepare", watched)
-    tasks = [Task(problem=ProblemSpec(name="walk12"), algorithm="ipopt", run=run) for run in range(2)]
+    tasks = [Task(problem=ProblemSpec(name="walk12"), solver="ipopt", run=run) for run in range(2)]
     for count in (1, 2):
         run_study(Study(tasks=tasks[:count], jobs=1))
     assert len(planned) == 5 and len(set(planned)) == 1
@@ -103,6 +103,6 @@ def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytes
 
 @pytest.mark.slow
 def test_a_gradient_run_charges_all_its_calls() -> None:
-    record = run_task(Task(problem=SSP, algorithm="ipopt"))
+    record = run_task(Task(problem=SSP, solver="ipopt"))
     assert record.history.evaluations == (record.evaluations["f"],) and record.active_constraints
     assert record.definition["objective"] == {"name": "power", "unit": "W", "sense": "minimise"}

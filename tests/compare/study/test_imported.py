@@ -39,7 +39,7 @@ def finals(folder: Path, *, header: bool = True, extra: dict[str, list[object]] 
 def test_each_row_is_a_judged_record(tmp_path: Path) -> None:
     extra = {"run": [4, 5, 6], "objective": [0.5, "", 0.7], "violation": [0, 0, 2.5], "evaluations": [100, 200, 300]}
     records = imported(WALK, finals(tmp_path, extra=extra), "GA (MATLAB)")
-    assert [(r.run, r.success, r.objective, r.evaluations["f"]) for r in records] == [
+    assert [(r.run, r.claimed, r.claimed_objective, r.evaluations["f"]) for r in records] == [
         (4, True, 0.5, 100),
         (5, False, None, 200),
         (6, False, 0.7, 300),
@@ -69,15 +69,15 @@ def test_histories_give_runs_their_course(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
-    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
+    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
     records = imported(WALK, finals(tmp_path), "GA (MATLAB)", evaluations=5000)
     for record in records:
         keep_record(record, tmp_path)
     again = read_records(tmp_path)
-    assert {record.algorithm for record in again} == {"pso", "GA (MATLAB)"}
+    assert {record.solver for record in again} == {"pso", "GA (MATLAB)"}
     (comparison,) = compare_problems(again)
-    (ga,) = [s for s in summarise(comparison) if s.algorithm == "GA (MATLAB)"]
+    (ga,) = [s for s in summarise(comparison) if s.solver == "GA (MATLAB)"]
     row = format_cells(ga, comparison)
     assert row[-1] == "-" and row[2] == "-" and "nan" not in " ".join(row)
     assert all(math.isnan(seconds) for seconds in ga.expected_s) and ga.evaluations == 5000
@@ -132,12 +132,12 @@ def test_what_nobody_can_know_is_asked_for(tmp_path: Path) -> None:
 
 
 def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
-    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(algorithm="pso"),), runs=2, stop=Stop(evaluations=200))
+    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
     from dataclasses import replace
 
     run_study(Study(tasks=replace(study, runs=1, stop=Stop(evaluations=300)).tasks(), folder=tmp_path))
-    labels = [(r.problem, r.algorithm, r.run) for r in label_editions(read_records(tmp_path))]
+    labels = [(r.problem, r.solver, r.run) for r in label_editions(read_records(tmp_path))]
     earlier = "pso (evaluations 200)"
     assert sorted(labels) == [("walk12", "pso", 0), ("walk12", earlier, 0), ("walk12", earlier, 1)]
 
@@ -178,7 +178,7 @@ def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: 
     with pytest.raises(GaitError, match="a run stands twice"):
         imported(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)
     plain = imported(WALK, finals(tmp_path), "ga", evaluations=3)
-    assert [(r.run, r.seed, r.evaluations, r.success, r.violation) for r in plain] == [
+    assert [(r.run, r.seed, r.evaluations, r.claimed, r.claimed_violation) for r in plain] == [
         (k, k, {"f": 3}, False, None) for k in range(3)
     ]
     for record in plain:
@@ -186,7 +186,7 @@ def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: 
         assert (record.failed_evaluations, record.iterations) == (0, 0)
     said = {"seed": [7, 8, 9], "time_s": [0.5, "", 2.0], "objective": [1, 2, 3]}
     full = imported(WALK, finals(tmp_path, extra=said), "ga", evaluations=3)
-    assert [(r.seed, r.success, r.definition["seed"]) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
+    assert [(r.seed, r.claimed, r.definition["seed"]) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
     assert (full[0].time_s.solve, full[2].time_s.history) == (0.5, (2.0,)) and math.isnan(full[1].time_s.solve)
     keys = {r.definition["imported"]["sha256"] for r in (*plain, *full)}
     assert len(keys) == 6

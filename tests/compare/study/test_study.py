@@ -31,9 +31,9 @@ SSP = ProblemSpec(name="nao-ssp")
 SMALL = StudySettings(
     problems=(SSP,),
     solvers=(
-        SolverSpec(algorithm="pso", polish=True),
-        SolverSpec(algorithm="ga"),
-        SolverSpec(algorithm="pso", label="pso-20", settings={"population": 20}),
+        SolverSpec(name="pso", polish=True),
+        SolverSpec(name="ga"),
+        SolverSpec(name="pso", label="pso-20", settings={"population": 20}),
     ),
     runs=2,
     stop=Stop(evaluations=500),
@@ -96,8 +96,8 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     good = record_file(undisturbed, task).read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
-        ("[]", "'schema' must be 2, got 'list'"),
-        (good.replace('"schema": 2', '"schema": 1'), "'schema' must be 2, got 1"),
+        ("[]", "'schema' must be 3, got 'list'"),
+        (good.replace('"schema": 3', '"schema": 1'), "'schema' must be 3, got 1"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
     ):
         path.write_text(text)
@@ -151,24 +151,24 @@ class Broken:
 
 @pytest.mark.slow
 def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
-    tasks = (Task(problem=SSP, algorithm=Broken()), Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)))
+    tasks = (Task(problem=SSP, solver=Broken()), Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)))
     broken, good = run_study(Study(tasks=tasks, folder=tmp_path))
-    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.success and not broken.verdict.feasible
+    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.claimed and not broken.verdict.feasible
     assert good.evaluations == {"f": 100}
-    again = next(r for r in read_records(tmp_path) if r.algorithm == "broken")
+    again = next(r for r in read_records(tmp_path) if r.solver == "broken")
     assert again.status == broken.status and np.isnan(again.verdict.objective) and again.x == {}
 
 
 def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
-    failed = attempt(Task(problem=SSP, algorithm=Broken()))
-    polished = attempt(Task(problem=SSP, algorithm="ipopt", label="broken+ipopt", polishes="broken"), failed)
+    failed = attempt(Task(problem=SSP, solver=Broken()))
+    polished = attempt(Task(problem=SSP, solver="ipopt", label="broken+ipopt", polishes="broken"), failed)
     assert "has no point to polish: failed: RuntimeError" in polished.status
 
 
 @pytest.mark.slow
 def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
     light = ProblemSpec(name="walk12")  # six workers build it
-    tasks = tuple(Task(problem=light, algorithm=Broken(deadly=True), run=run) for run in range(2))
+    tasks = tuple(Task(problem=light, solver=Broken(deadly=True), run=run) for run in range(2))
     with pytest.raises(GaitError, match="worker process died 3 times in a row"):
         run_study(Study(tasks=tasks, folder=tmp_path, jobs=2))
 
@@ -176,17 +176,17 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("task", "message"),
     [
-        (Task(problem=SSP, algorithm="psoo"), "unknown algorithm 'psoo'; did you mean"),
-        (Task(problem=SSP, algorithm="pso", settings={"inertial": 1}), "no setting 'inertial'"),
-        (Task(problem=SSP, algorithm="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
-        (Task(problem=SSP, algorithm="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
-        (Task(problem=SSP, algorithm="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
-        (Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
-        (Task(problem=SSP, algorithm="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
-        (Task(problem=SSP, algorithm="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
-        (Task(problem=SSP, algorithm="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
-        (Task(problem=SSP, algorithm="pso", label="../../etc"), "label has 1 to 64 letters"),
-        (Task(problem=ProblemSpec(name="nao-spp"), algorithm="pso"), "unknown problem"),
+        (Task(problem=SSP, solver="psoo"), "unknown algorithm 'psoo'; did you mean"),
+        (Task(problem=SSP, solver="pso", settings={"inertial": 1}), "no setting 'inertial'"),
+        (Task(problem=SSP, solver="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
+        (Task(problem=SSP, solver="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
+        (Task(problem=SSP, solver="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
+        (Task(problem=SSP, solver="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
+        (Task(problem=SSP, solver="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
+        (Task(problem=SSP, solver="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
+        (Task(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
+        (Task(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
+        (Task(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
     ],
 )
 def test_what_cannot_run_is_said_before_the_work(task: Task, message: str, tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_what_cannot_run_is_said_before_the_work(task: Task, message: str, tmp_p
 
 
 def test_two_solvers_of_one_name_are_refused() -> None:
-    task = Task(problem=SSP, algorithm="pso")
+    task = Task(problem=SSP, solver="pso")
     with pytest.raises(InputError, match="label them apart"):
         Study(tasks=(task, replace(task, settings={"population": 20})))
 
@@ -217,10 +217,10 @@ set = {torque_change_limit_Nm = 0.3}
 fix = {swing_height_m = 0.02}
 
 [[solver]]
-algorithm = "ipopt"
+name = "ipopt"
 
 [[solver]]
-algorithm = "pso"
+name = "pso"
 label = "small-pso"
 settings = {population = 20}
 polish = true
@@ -240,7 +240,7 @@ def test_study_file(tmp_path: Path) -> None:
     ]
     problem = tasks[0].problem.load()
     assert problem.options["robot"] == "nao-v6" and problem.value("swing_height_m.upper") == 0.02
-    assert tasks[2].search() == ParticleSwarm(population=20) and tasks[2].stop == Stop(evaluations=700, target=0.9)
+    assert tasks[2].make_search() == ParticleSwarm(population=20) and tasks[2].stop == Stop(evaluations=700, target=0.9)
     assert settings_from(json.loads(json.dumps(settings.to_json())), "again").tasks() == tasks
 
 
@@ -254,7 +254,7 @@ def test_study_file(tmp_path: Path) -> None:
         (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
         (("target = 0.9", "target = nan"), "finite numbers"),
         (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
-        (('algorithm = "ipopt"', 'label = "x"'), "solver\\[0\\].algorithm is missing"),
+        (('name = "ipopt"', 'label = "x"'), "solver\\[0\\].name is missing"),
         (("runs = 3", "runs = "), "is not valid TOML"),
         (('name = "nao-ssp"', "name = 3"), "problem\\[0\\].name must be a text, got 3"),
         (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
@@ -293,5 +293,5 @@ def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr(compare.study.workers, "attempt", swallowing)
     with pytest.raises(KeyboardInterrupt):
-        run_study(Study(tasks=(Task(problem=SSP, algorithm="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
+        run_study(Study(tasks=(Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
     assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before
