@@ -10,8 +10,8 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
-from nlp_gait.gaits.stairs.formulas.loads import MOVING
-from nlp_gait.gaits.stairs.simulation_model import whole_force
+from nlp_gait.gaits.stairs.display import compute_ground_force
+from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
 from nlp_gait.simulation.drive import Drive
@@ -55,7 +55,7 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
     rear = np.zeros((len(plan.signals.arrays["t"]), 3))
     t = own.arrays["t"]
     new = np.diff(t, prepend=-1.0) > 0.0
-    whole = whole_force(*(own.arrays[f"link_{name}"][new][:, : len(MOVING)] for name in ("q", "qd", "qdd")))
+    whole = compute_ground_force(*(own.arrays[f"link_{name}"][new][:, : len(MOVING)] for name in ("q", "qd", "qdd")))
     force = whole - own.arrays["stance_force"][new]
     # The engine at the problem's own samples, which are among the dense ones.
     at = np.searchsorted(plan.signals.arrays["t"], t[new] - 1e-9)

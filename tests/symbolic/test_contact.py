@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, centres, points
+from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.contact import (
     CREEP_SPEED,

@@ -15,8 +15,7 @@ from compare.report.document import Document
 from compare.report.template import fill_template
 from compare.study.task import IPOPT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
-from nlp_gait.gaits.stairs.governing import GOVERNING_VARIABLES
-from nlp_gait.gaits.stairs.stair import PAPER_TIMES
+from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
 
 NEAR_BOUND = 0.01  # of a gain's range
 

@@ -14,7 +14,7 @@ from compare.papers.stairs.stairs_paper import TABLE_4
 from compare.papers.stairs.stairs_runs import complete, plan_spec, tracked
 from compare.papers.stairs.stairs_tables import Findings
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 

@@ -11,10 +11,9 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.gait import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
-from nlp_gait.gaits.stairs.governing import GOVERNING, stair_plan
+from nlp_gait.gaits.stairs.planned_motion import Stair, ToeFoot, ankle, ankle_on_toe, foot_angles, hip, landed_angles
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY
+from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, make_stair_plan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,7 +80,7 @@ def _motion(plan: Mapping[str, float], tread: float, rise: float, times: Array) 
 @cache
 def _function() -> ca.Function:
     s, given = SX.sym("s", 4), SX.sym("given", len(GOVERNING) + 2)
-    plan, stair = stair_plan(given[:-2]), Stair(given[-2], given[-1])
+    plan, stair = make_stair_plan(given[:-2]), Stair(given[-2], given[-1])
     robot = toe_foot_biped()
     foot = ToeFoot(robot.sole_m, robot.toe_m)
     landed = landed_angles(plan, s)

@@ -10,8 +10,7 @@ import numpy as np
 from casadi import MX, SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.loads import MOVING, link_angles
-from nlp_gait.gaits.stairs.formulas.planar_biped import biped_dynamics
+from nlp_gait.gaits.stairs.planar_biped import MOVING, biped_dynamics, link_angles
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import GRAVITY
 

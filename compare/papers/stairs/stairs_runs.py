@@ -22,8 +22,8 @@ from metaheuristics.interface import Algorithm
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.closed_loop import InverseKinematics
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
-from nlp_gait.gaits.stairs.network import LEGS, NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import PAPER_TIMES
 from nlp_gait.gaits.stairs.track import PLAN
@@ -101,7 +101,7 @@ def plan_spec(effort: Effort, case: int, minimise: str = "energy") -> ProblemSpe
     """Planner of a case."""
     label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
     options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
-    return ProblemSpec(name="stairs-plan", options=options, values=stair_of(case), label=label)
+    return ProblemSpec(name="stairs-plan", options=options, values=read_stair(case), label=label)
 
 
 def hip_spec(effort: Effort, case: int) -> ProblemSpec:
@@ -114,12 +114,12 @@ def hip_spec(effort: Effort, case: int) -> ProblemSpec:
 def ideal_spec(effort: Effort, case: int) -> ProblemSpec:
     """Full trajectory optimisation of a case."""
     options = {"intervals": effort.ideal_intervals}
-    return ProblemSpec(name="stairs-ideal", options=options, values=stair_of(case), label=f"ideal-{case}")
+    return ProblemSpec(name="stairs-ideal", options=options, values=read_stair(case), label=f"ideal-{case}")
 
 
 def track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemSpec:
     """Tracking of a plan, given by the planner's variables, in a case."""
-    values = {**stair_of(case), **{name: plan[name] for name in PLAN}}
+    values = {**read_stair(case), **{name: plan[name] for name in PLAN}}
     return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
 
 
@@ -130,7 +130,7 @@ def other_spec(effort: Effort, name: str, tread: float, rise: float) -> ProblemS
     return ProblemSpec(name=name, options={"intervals": intervals}, values=values, label=f"{name}-{tread:g}-{rise:g}")
 
 
-def stair_of(case: int) -> dict[str, float]:
+def read_stair(case: int) -> dict[str, float]:
     """Parameters of a case of Table IV."""
     row = TABLE_4[case]
     return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}

@@ -14,7 +14,7 @@ from compare.papers.stairs.stairs_runs import ALGORITHMS, Effort, best_track, ot
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
-from nlp_gait.gaits.stairs.governing import GOVERNING_VARIABLES
+from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
 
 MATCH = 1e-3  # a start that ends within this of the best is counted as having found it (relative)
 # Name of a table of one step's results in each case: the step, and keys of its result.

@@ -1,7 +1,7 @@
-"""The nine planar links as a tree of rigid bodies that an engine can take.
+"""The nine planar links as a tree of rigid bodies for the engine.
 
-Both legs lie in one plane and pass through each other. A foot is a rod on the ground, ankle included; what touches the stairs is
-a plate above it. The leg with primes, which stands first, is the left one.
+Both legs lie in one plane and pass through each other. A foot is a rod on the ground, ankle included; a plate above it touches
+the stairs. The leg with primes, which stands first, is the left one.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.loads import JOINTS as MODEL_JOINTS
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, Rod
+from nlp_gait.gaits.stairs.planar_biped import JOINTS as MODEL_JOINTS
+from nlp_gait.gaits.stairs.planar_biped import LINKS, Rod
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import GRAVITY
 from nlp_gait.robots import Foot, Joint, Link, Robot
@@ -20,9 +20,9 @@ from nlp_gait.robots.robot import Vector
 
 # The paper has no motors. The largest torque of each is the robot's weight at a lever as long as what the joint moves: leg,
 # shank, foot, toe. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
-FOOT_HALF_WIDTH = 0.05  # [m]; in the plane nothing depends on it
-RANGE = (-np.pi, np.pi)  # of every joint [rad]: what the paper limits, its plans keep within
-RATE_LIMIT = 100.0  # [rad/s]; nothing reads it
+FOOT_HALF_WIDTH = 0.05  # [m]; has no effect in the plane
+RANGE = (-np.pi, np.pi)  # of every joint [rad]; the plans satisfy the paper's limits
+RATE_LIMIT = 100.0  # [rad/s]; not used
 TORSO = "torso"
 # Links of a leg from the hip down, by the name of the joint before them, with the paper's name and the link in front.
 LEG = {"Hip": ("thigh", "HK"), "Knee": ("shank", "KA"), "Ankle": ("sole", "AS"), "Toe": ("toe", "ST")}
@@ -42,7 +42,7 @@ MODEL_JOINT = {
 
 @cache
 def rigid_bodies() -> Robot:
-    """Tree from the torso, whose frame stands at the hip; in its zero pose it stands upright with straight legs."""
+    """Return the tree from the torso, whose frame is at the hip; in the zero pose it stands upright with straight legs."""
     biped = toe_foot_biped()
     rods = biped.rods
     levers = {"Hip": rods["HK"].length + rods["KA"].length, "Knee": rods["KA"].length}
@@ -81,7 +81,7 @@ def rigid_bodies() -> Robot:
 
 
 def joint_angles(q: Array, *, rates: bool = False) -> Array:
-    """(T, 8) angles of the robot's joints from absolute link angles (T, 9) in the order of ``LINKS``, or so of rates."""
+    """Return joint angles (T, 8) from absolute link angles (T, 9) in the order of ``LINKS``; with ``rates``, rates."""
     turned = _forward_turns(q, 0.0 if rates else 1.0)
     columns = []
     for _, mark in SIDES.values():
@@ -94,11 +94,11 @@ def joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 
 def joint_torques(model: Array, stance_toe: Array) -> Array:
-    """(T, 8) torques of the robot's joints from those of the model (T, 7), in the order of its JOINTS [Nm].
+    """Return joint torques (T, 8) from those of the model (T, 7), in the order of its JOINTS [Nm].
 
     Args:
         model: as ``loads`` gives them.
-        stance_toe: (T,) of the toe that stands, which the model takes as one with its sole [Nm].
+        stance_toe: (T,) of the standing toe, which the model joins with its sole [Nm].
     """
     columns = []
     for name in JOINTS:
@@ -111,12 +111,12 @@ def joint_torques(model: Array, stance_toe: Array) -> Array:
 
 
 def torso_lean(q: Array) -> Array:
-    """(T,) rotation of the torso from upright, forward [rad]."""
+    """Return the rotation (T,) of the torso from upright, forward [rad]."""
     return _forward_turns(q, 1.0)["UH"]
 
 
 def _forward_turns(q: Array, share: float) -> dict[str, Array]:
-    """Rotation of every link about the axis to the left, from its place in the zero pose; ``share`` 0 of their rates."""
+    """Return the rotation of every link about the axis to the left from the zero pose; ``share`` 0 for rates."""
     upright = share * np.pi / 2
     zero = {"UH": -upright, "AS": 0.0, "ST": 0.0}
     turns = {}
@@ -127,7 +127,7 @@ def _forward_turns(q: Array, share: float) -> dict[str, Array]:
 
 
 def _link(name: str, rod: Rod, along: Vector) -> Link:
-    """Rod from its frame's origin along an axis; alike about all axes, for it turns about one only and an engine needs all."""
+    """Return a rod from its frame's origin along an axis; equal inertia about all axes, as it turns about one only."""
     x, y, z = (rod.length / 2 * part for part in along)
     tensor = (rod.inertia, rod.inertia, rod.inertia, 0.0, 0.0, 0.0)
     return Link(name=name, mass_kg=rod.mass, com_m=(x, y, z), inertia_com_kgm2=tensor)

@@ -12,14 +12,11 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
-from nlp_gait.gaits.stairs.formulas.gait import Stair, stair_height
-from nlp_gait.gaits.stairs.formulas.loads import LEAST_LOAD, link_angles
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, biped_dynamics, centres, points
-from nlp_gait.gaits.stairs.formulas.posture import posture
-from nlp_gait.gaits.stairs.governing import GOVERNING, governing, stair_plan
-from nlp_gait.gaits.stairs.network import learned
+from nlp_gait.gaits.stairs.leg_network import solve_legs_by_network
+from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, biped_dynamics, centres, link_angles, points
+from nlp_gait.gaits.stairs.planned_motion import Stair, posture, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, stair_of
+from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
@@ -34,11 +31,11 @@ from nlp_gait.symbolic.quantised import (
 Scheme = Literal["implicit", "explicit"]
 InverseKinematics = Literal["closed-form", "network"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
-EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
+EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 # Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
 CONTACTS = ("T", "S", "A", "S'", "T'")
 N = len(LINKS)
-# What a quantum is given besides the state and what is tuned, with sizes: desired angles and rates, time, tread and rise,
+# Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated with respect to it.
 GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
 TORSO = LINKS.index("UH")
@@ -68,7 +65,7 @@ class ClosedLoop:
         quanta: number of steps of the rollout.
         scheme: of the quantised dynamics.
         gains: number of different K_p, and of different K_d: 1 or one for each link.
-        inverse_kinematics: where the desired angles of both legs come from.
+        inverse_kinematics: source of the desired angles of both legs.
     """
 
     quanta: int
@@ -77,20 +74,20 @@ class ClosedLoop:
     inverse_kinematics: InverseKinematics = "closed-form"
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
-        """States, torques and ZMP.
+        """Return states, torques and ZMP.
 
         Args:
-            point: for the problem's parameters.
+            point: with the problem's parameters.
             tuned: K_p (gains,), K_d (gains,) and the desired torso pitch; gains are not negative.
-            ops: interpretation of what is not smooth.
+            ops: interpretation of non-smooth operations.
         """
-        stair = stair_of(point)
+        stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
-        plan = ca.repmat(ca.vertcat(governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
+        plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
         desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
         if self.inverse_kinematics == "network":
-            desired = learned(desired)
+            desired = solve_legs_by_network(desired)
         constants = ca.vertcat(
             size,
             *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
@@ -109,7 +106,7 @@ class ClosedLoop:
 
     @cached_property
     def step(self) -> ca.Function:
-        """(state (18,), given, tuned) to the state one quantum later."""
+        """Function of (state (18,), given, tuned) to the state one quantum later."""
         state, inputs, parts = self._symbols()
         following = after(state, solve_definite(*self._equations(state, parts)), QUANTUM)
         return ca.Function(
@@ -117,7 +114,7 @@ class ClosedLoop:
         )
 
     def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
-        """Of the acceleration within one quantum."""
+        """Return the equations of the acceleration within one quantum."""
         q, v = state
         found = points(toe_foot_biped().rods, q, SX(2, 1))
         motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, q)
@@ -138,7 +135,7 @@ class ClosedLoop:
 
     @cached_property
     def _outcome(self) -> ca.Function:
-        """(state, next state, given, tuned, slope) to the torques (9,) and the ZMP, from a quantum's mean acceleration."""
+        """Function of (state, next state, given, tuned, slope) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         slope = SX.sym("slope")
@@ -167,7 +164,7 @@ class ClosedLoop:
         )
 
     def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
-        """QuantisedState, the inputs given and tuned, and what they hold by name, with controller and desired state."""
+        """Return the state, the inputs given and tuned, and their parts by name, with controller and desired state."""
         given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
         ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
         parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
@@ -180,10 +177,10 @@ class ClosedLoop:
 
 
 def _desired(ops: Nonsmooth) -> ca.Function:
-    """(time, governing parameters with stair and reach margin) to the desired angles and rates (18,)."""
+    """Return the function of (time, governing parameters with stair and reach margin) to the desired state (18,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
-    plan = stair_plan(values)
+    plan = make_stair_plan(values)
     step = posture(
         toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
     )

@@ -1,4 +1,4 @@
-"""Climbing one step at least effort: full trajectory optimisation, the floor under every planner and controller."""
+"""Climbing one step at least effort: full trajectory optimisation, a lower bound for every planner and controller."""
 
 from __future__ import annotations
 
@@ -25,13 +25,11 @@ from nlp_gait.formulation import (
     parameters,
 )
 from nlp_gait.formulation.blocks import Block, Layout
-from nlp_gait.gaits.stairs.formulas.gait import Stair, StairPlan
-from nlp_gait.gaits.stairs.formulas.loads import JOINTS, MOVING
-from nlp_gait.gaits.stairs.formulas.posture import posture
+from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.ideal_model import AXES, IdealModel
+from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.simulation_model import Performance, simulation_model, standing
-from nlp_gait.gaits.stairs.skeleton import skeleton
 from nlp_gait.gaits.stairs.stair import (
     ANGLE_LIMITS,
     COLUMNS,
@@ -49,7 +47,7 @@ FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of th
 SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
 # A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
-# A plan whose legs reach on common stairs; it need be neither optimal nor balanced.
+# A plan whose legs reach on common stairs; neither optimal nor balanced.
 PLAN = {
     "hip_height": 0.66,
     "zmp_start": 0.18,
@@ -62,9 +60,9 @@ PLAN = {
     "catch_angle": 0.01,
     **dict(zip(("t1", "t2", "t_bc", "t3"), PAPER_TIMES, strict=True)),
 }
-HIP_BEHIND = 0.08  # the hip starts so far behind the middle of the rear tread [m]
-REACH_MARGIN = 0.02  # on the cosine of a knee, which keeps a start off the stretched leg
-FINE_INTERVALS = 1000  # of a gait that is played
+HIP_BEHIND = 0.08  # of the hip at the start, from the middle of the rear tread [m]
+REACH_MARGIN = 0.02  # on the cosine of a knee: avoids stretched legs at the start
+FINE_INTERVALS = 1000  # of a simulated gait
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
@@ -111,23 +109,23 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         step_time = float(at["step_time_s"])
         loads = model.loads_at(values)
 
-        def held(columns: Array) -> Array:
-            """What holds during an interval, at its first instant; the last instant repeats the last interval."""
+        def repeat_last(columns: Array) -> Array:
+            """Return values of intervals at their first instants; the last instant repeats the last interval."""
             return np.concatenate([columns, columns[:, -1:]], axis=1).T
 
         return Signals(
             joints=JOINTS,
             arrays={
                 "t": np.linspace(0.0, step_time, intervals + 1),
-                **joint_signals(values["angle"].T, values["rate"].T, held(values["acceleration"])),
-                "tau": held(loads.torque),
-                "stance_force": held(loads.stance_force),
-                "zmp": held(loads.stance_pressure)[:, 0],
+                **joint_signals(values["angle"].T, values["rate"].T, repeat_last(values["acceleration"])),
+                "tau": repeat_last(loads.torque),
+                "stance_force": repeat_last(loads.stance_force),
+                "zmp": repeat_last(loads.stance_pressure)[:, 0],
             },
             columns=COLUMNS,
         )
 
-    def performance(at: NumericPoint) -> Performance:
+    def step_motion(at: NumericPoint) -> StepMotion:
         values = layout.values(at.x.full().ravel())
         step = float(at["step_time_s"]) / intervals
         per_interval = math.ceil(FINE_INTERVALS / intervals)
@@ -137,18 +135,18 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         since = np.append(since, step)[:, None]
         q, qd, qdd = (values[name].T[which] for name in ("angle", "rate", "acceleration"))
 
-        def borne(name: str) -> Array:
+        def expand_force(name: str) -> Array:
             force = np.zeros((intervals, 2))
             force[: values[name].shape[1]] = values[name].T
             return force[which]
 
-        return standing(
+        return make_standing_step(
             which * step + since[:, 0],
             q + qd * since + qdd * since**2 / 2,
             qd + qdd * since,
             qdd,
-            borne("toe_force"),
-            borne("sole_force"),
+            expand_force("toe_force"),
+            expand_force("sole_force"),
             toe_off * step,
         )
 
@@ -160,13 +158,13 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         objective=Objective(name="effort", unit="1"),
         assemble=model.assemble,
         grid=Grid(intervals=intervals),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance, repeats=True)),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion, repeats=True)),
         hints=SolverHints(start=start, starts=3, searchable=False),
     )
 
 
 def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
-    """Angles and rates at all instants; accelerations and ground forces hold during an interval."""
+    """Return the layout: angles and rates at all instants; accelerations and ground forces constant during an interval."""
     angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
     rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
     accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
@@ -186,7 +184,7 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
 
 
 def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Planned angles with noise, rates and accelerations by differences, a share of the weight behind."""
+    """Return planned angles with noise, rates and accelerations by differences, and a share of the weight on the rear foot."""
     tread = values["stair_length_m"] / 2
     angle = _planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
     angle += NOISE * rng.standard_normal(angle.shape)
@@ -205,7 +203,7 @@ def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.
 
 
 def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
-    """(7, intervals + 1) link angles of a plausible step at equidistant times [rad].
+    """Return link angles (7, intervals + 1) of a plausible step at equidistant times [rad].
 
     Args:
         tread: of one step [m].

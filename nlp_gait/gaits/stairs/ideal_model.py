@@ -12,14 +12,13 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Assembly, Constraint, Point
 from nlp_gait.formulation.blocks import Layout
-from nlp_gait.gaits.stairs.formulas.gait import Stair, stair_height
-from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, MOVING, StanceLoads, link_angles, loads
-from nlp_gait.gaits.stairs.formulas.planar_biped import points
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, StanceLoads, link_angles, loads, points
+from nlp_gait.gaits.stairs.planned_motion import Stair, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, rows, stair_of, stance_load, stance_zmp
+from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, read_stair, rows, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-EDGE_WIDTH = 0.012  # of the sigmoid that stands for an edge of the stair [m]
+EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
 AXES = ("x", "z")
 
 
@@ -30,8 +29,8 @@ class IdealModel:
     Attributes:
         layout: of the variables.
         intervals: N, equal parts of the step.
-        sole_off: number of intervals in which the rear sole bears.
-        toe_off: number of intervals in which the rear toe bears: the double support.
+        sole_off: number of intervals with load on the rear sole.
+        toe_off: number of intervals with load on the rear toe: the double support.
     """
 
     layout: Layout
@@ -40,7 +39,7 @@ class IdealModel:
     toe_off: int
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Objective and constraints; everything is smooth."""
+        """Return objective and constraints; everything is smooth."""
         x = self.layout.split(point)
         step = point["step_time_s"] / self.intervals
         torque, stance, pressure = self._loads(x)
@@ -67,7 +66,7 @@ class IdealModel:
         )
 
     def loads_at(self, values: Mapping[str, Array]) -> StanceLoads[Array]:
-        """Torques, stance force and its centre of pressure in every interval, from numbers: columns are intervals."""
+        """Compute torques, stance force and its centre of pressure from numbers; columns are intervals."""
         symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
         return StanceLoads(*(np.array(ca.evalf(part)) for part in symbolic))
 
@@ -94,7 +93,7 @@ class IdealModel:
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
     def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
-        """Quantised dynamics (eqs. 44, 45), rest at both ends, a still torso."""
+        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends, and a still torso."""
         n = self.intervals
         q, v, a = x["angle"], x["rate"], x["acceleration"]
         rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
@@ -109,9 +108,9 @@ class IdealModel:
         )
 
     def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Where the swing foot stands, and how far it stays above the stair."""
+        """Return rows of the swing foot's positions and of its height above the stair."""
         n, lift = self.intervals, self.toe_off
-        stair = stair_of(point)
+        stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         q = x["angle"]
         swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
@@ -138,5 +137,5 @@ class IdealModel:
 def _equal(
     name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
 ) -> Constraint:
-    """Rows value == 0."""
+    """Return rows value == 0."""
     return rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)

@@ -29,17 +29,25 @@ from nlp_gait.formulation import (
     maker,
     parameters,
 )
-from nlp_gait.gaits.stairs.formulas.gait import PHASES
-from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
-from nlp_gait.gaits.stairs.governing import GIVEN_PARAMETERS, GOVERNING, GOVERNING_VARIABLES, REACH_MARGIN
+from nlp_gait.gaits.stairs.display import (
+    StepMotion,
+    compute_ground_force,
+    make_standing_step,
+    simulation_model,
+    skeleton,
+)
 from nlp_gait.gaits.stairs.plan_samples import GROUND_SHARE, PlannedStep, PlanSamples, grid_at, reach_function
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.planned_motion import PHASES
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.simulation_model import Performance, simulation_model, standing, whole_force
-from nlp_gait.gaits.stairs.skeleton import skeleton
 from nlp_gait.gaits.stairs.stair import (
     ANGLE_LIMITS,
     COLUMNS,
+    GIVEN_PARAMETERS,
+    GOVERNING,
+    GOVERNING_VARIABLES,
     LEAST_STANCE_FORCE,
+    REACH_MARGIN,
     STAIR_PARAMETERS,
     grip,
     joint_signals,
@@ -66,19 +74,19 @@ VARIABLES = (
         description="share of the ground force below the rear toe at the start",
     ),
 )
-# Start points scatter about a plan that is plausible on common stairs (normal, in units of the ranges): from uniform ones
+# Start points are normally distributed around a plausible plan for common stairs, in units of the ranges: from uniform points
 # half of all runs of IPOPT end at unreachable poses. Of two optima, the better one catches the cycloid early (t_bc at 1.0 to
-# 1.4 s on the stairs of Table IV, against 2.7 to 2.8 s), so that is where the starts are.
+# 1.4 s on the stairs of Table IV, instead of 2.7 to 2.8 s), as the starts do.
 PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.4, 0.35, 0.2)
 SCATTER = 0.1
 DRAWS = 100
-# Between samples an edge may come nearer than at them, by what falls with the square of their distance: this over the
-# square of the intervals in a phase is kept in reserve [m]; a millimetre on the usual grid.
+# Between samples an edge may be nearer than at them; the difference falls with the square of their distance. This divided by
+# the square of the number of intervals in a phase is kept in reserve [m]: a millimetre on the usual grid.
 SAMPLING_RESERVE = 0.1
 
 PHASE_ENDS = ("", "t1_s", "t2_s", "t_bc_s", "t3_s")  # the step begins at zero
 
-FINE_INTERVALS = 250  # of each phase of a gait that is played
+FINE_INTERVALS = 250  # of each phase of a simulated gait
 
 PARAMETERS = (
     *STAIR_PARAMETERS,
@@ -132,15 +140,15 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
         return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=COLUMNS)
 
-    def performance(at: NumericPoint) -> Performance:
+    def step_motion(at: NumericPoint) -> StepMotion:
         fine = PlannedStep(per_phase=FINE_INTERVALS).samples(at, Exact())
         t, q, qd, qdd, stance = (
             np.array(ca.evalf(part)).T for part in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
         )
         new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
         t, q, qd, qdd, stance = (part[new] for part in (t, q, qd, qdd, stance))
-        toe = whole_force(q, qd, qdd) - stance
-        return standing(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
+        toe = compute_ground_force(q, qd, qdd) - stance
+        return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
 
     return GaitProblem(
         name="stairs-plan",
@@ -150,7 +158,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance)),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion)),
         hints=SolverHints(start=_start),
         rows_over_time=tuple(
             RowsOverTime(
@@ -165,15 +173,15 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
 
 
 def _phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
-    """Instants at which a phase begins and ends [s]."""
+    """Return the start and end of a phase [s]."""
     start, end = (values[name] if name else 0.0 for name in PHASE_ENDS[phase : phase + 2])
     return start, end
 
 
 def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:
-    """Rows of one phase of the step at fractions (1, k) of it.
+    """Return the rows of one phase of the step at fractions (1, k) of it.
 
-    Clearance is asked for itself: the reserve of its samples is for what lies between them.
+    Clearance has no reserve here, which accounts for the motion between samples.
     """
     grid = grid_at(phase, fractions)
     samples = step.samples(point, ops, grid)
@@ -192,7 +200,7 @@ def _clearance(heights: MX, least: MX) -> Constraint:
 
 
 def _rows_at(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
-    """Posture and ground at every sample."""
+    """Return rows of posture and ground at every sample."""
     return (
         *_posture_rows(point, samples),
         stance_load(point, samples.stance_force),
@@ -225,7 +233,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
 
 
 def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
-    """Reach, link angles, knees and accelerations at every sample."""
+    """Return rows of reach, link angles, knees and accelerations at every sample."""
     m = samples.q.shape[1]
     lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
     most = point["acceleration_limit_rad_s2"]
@@ -238,7 +246,7 @@ def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
 
 
 def _phase_durations(point: Point) -> Constraint:
-    """Every phase takes time."""
+    """Return rows for a least duration of every phase."""
     ends = ca.vertcat(*(point[name] if name else 0 for name in PHASE_ENDS))
     return Constraint(
         name="phase_duration",
@@ -251,7 +259,7 @@ def _phase_durations(point: Point) -> Constraint:
 
 
 def _start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Scattered about the plausible plan, drawn again until every phase takes time and the legs reach."""
+    """Draw a point around the plausible plan, again until every phase has a duration and the legs reach."""
     ranges = np.array([variable.upper - variable.lower for variable in VARIABLES])
     tread = parameters["stair_length_m"] / 2
     size, margin = [tread, parameters["rise_run_ratio"] * tread], parameters[REACH_MARGIN[0]]
@@ -263,9 +271,9 @@ def _start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         plan = np.concatenate([x[: len(GOVERNING_VARIABLES)], given])
         named = dict(zip(GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
-        beyond = np.array(_reach()(plan, size, margin)) - (1 - margin)
+        out_of_reach = np.array(_reach()(plan, size, margin)) - (1 - margin)
         violation = float(
-            np.maximum(parameters["least_phase_s"] - durations, 0.0).sum() + np.maximum(beyond, 0.0).sum()
+            np.maximum(parameters["least_phase_s"] - durations, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum()
         )
         if not best.size or violation < least:
             best, least = x, violation

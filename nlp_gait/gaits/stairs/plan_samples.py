@@ -11,17 +11,14 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Point
-from nlp_gait.gaits.stairs.formulas.gait import PHASES, Stair, StairPlan, stair_height
-from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
-from nlp_gait.gaits.stairs.formulas.planar_biped import points
-from nlp_gait.gaits.stairs.formulas.posture import Posture, posture
-from nlp_gait.gaits.stairs.governing import GOVERNING, governing, stair_plan
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, link_angles, loads, points
+from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, posture, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, stair_of
+from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
-EDGE_WIDTH = 0.003  # of the sigmoid that stands for an edge of the stair [m]
-# The swing foot is checked against the stair this often per interval, and not while the toe leaves or meets the ground.
+EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
+# Checks of the swing foot against the stair per interval; none while the toe leaves or meets the ground.
 CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1
 
@@ -60,7 +57,7 @@ class PlanSamples(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlannedStep:
-    """Per-sample functions of a planned step and where they are evaluated.
+    """Per-sample functions of a planned step and their grid.
 
     Attributes:
         per_phase: equal parts of each phase.
@@ -70,26 +67,26 @@ class PlannedStep:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Fractions of the phases and the phase that passes, (4, m) each, at the samples."""
+        """Fractions of the phases and the current phase, (4, m) each, at the samples."""
         return phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
 
     @cached_property
     def clearance_grid(self) -> tuple[Array, Array]:
-        """The same where the swing foot is checked against the stair."""
+        """The same for checks of the swing foot against the stair."""
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
         return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
     def samples(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> PlanSamples:
-        """The step at all samples, or at those of another grid."""
+        """Return the step at all samples, or at those of another grid."""
         s, passing = grid or self.grid
-        return PlanSamples(*self._mapped(sample_function(ops), point, s, passing, point["rear_share"]))
+        return PlanSamples(*self._map_samples(sample_function(ops), point, s, passing, point["rear_share"]))
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> MX:
-        """(3, m) heights of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._mapped(clearance_function(ops), point, *(grid or self.clearance_grid))
+        """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
+        return self._map_samples(clearance_function(ops), point, *(grid or self.clearance_grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
-        """Integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
+        """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
         power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
         total = MX(0)
         for first in self._phase_starts:
@@ -100,7 +97,7 @@ class PlannedStep:
         return total
 
     def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
-        """Joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum of time [s]."""
+        """Return joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum [s]."""
         change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
         columns = []
         for k in range(change.shape[1]):
@@ -113,16 +110,16 @@ class PlannedStep:
         """Number of the first sample of each phase."""
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
-    def _mapped(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
-        stair = stair_of(point)
-        constants = (governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
+    def _map_samples(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
+        stair = read_stair(point)
+        constants = (collect_governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
         columns = s.shape[1]
         repeated = (ca.repmat(value, 1, columns) for value in constants)
         return function.map(columns)(s if isinstance(s, MX) else DM(s), DM(passing), *repeated)
 
 
 def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
-    """The same grid as ``phase_grid`` gives, at fractions (1, k) of one phase alone."""
+    """Return the grid of ``phase_grid`` at fractions (1, k) of one phase."""
     k = int(fractions.shape[1])
     parts = [MX(DM.ones(1, k) * float(j < phase)) for j in range(len(PHASES))]
     parts[phase] = fractions
@@ -130,7 +127,7 @@ def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
 
 
 def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
-    """Fractions s (4, m) of all phases, and the phase that passes as a column with a single one (4, m).
+    """Return fractions s (4, m) of all phases, and the current phase as columns with a single one (4, m).
 
     Args:
         fractions: for each phase the fractions of it at which to sample.
@@ -144,7 +141,7 @@ def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
 
 @cache
 def _dynamics() -> ca.Function:
-    """What ``loads`` finds, of (q, qd, qdd, force on the rear toe); alike in every interpretation."""
+    """Function of (q, qd, qdd, force on the rear toe) to ``loads``; the same in every interpretation."""
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     toe = SX.sym("toe", 2)
     found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
@@ -152,11 +149,13 @@ def _dynamics() -> ca.Function:
 
 
 def sample_function(ops: Nonsmooth) -> ca.Function:
-    """One sample: (s, passing phase, governing parameters, size, reach margin, rear share) to the fields of ``PlanSamples``.
+    """Return the function of one sample to the fields of ``PlanSamples``.
+
+    Its inputs are s, the current phase, governing parameters, size, reach margin and rear share.
 
     The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
     """
-    inputs, plan, stair, step = _planned(ops)
+    inputs, plan, stair, step = _make_symbols(ops)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
     dynamics = _dynamics()
@@ -183,16 +182,16 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
 
 
 def clearance_function(ops: Nonsmooth) -> ca.Function:
-    """Heights (3,) of toe, sole and ankle above the stair, from the inputs of ``sample_function`` but the last."""
-    inputs, _, stair, step = _planned(ops)
+    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``sample_function`` but the last."""
+    inputs, _, stair, step = _make_symbols(ops)
     found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
 def reach_function(per_phase: int) -> ca.Function:
-    """Cosines of both knees (2, m) at the samples of a step, from governing parameters, size and reach margin."""
-    inputs, _, _, step = _planned(Exact())
+    """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
+    inputs, _, _, step = _make_symbols(Exact())
     s, passing = PlannedStep(per_phase=per_phase).grid
     one = ca.Function("reach", inputs, [ca.cse(step.reach)])
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
@@ -202,10 +201,10 @@ def reach_function(per_phase: int) -> ca.Function:
     )
 
 
-def _planned(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+def _make_symbols(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
-    plan, stair = stair_plan(values), Stair(size[0], size[1])
+    plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
     step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
     return [s, passing, values, size, margin], plan, stair, step

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nlp_gait.decoding import read_decoded
 from nlp_gait.errors import RobotDataError
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, Rod
+from nlp_gait.gaits.stairs.planar_biped import LINKS, Rod
 from nlp_gait.robots.robot import check_numbers
 
 DEFAULT_FILE = resources.files("nlp_gait.gaits.stairs") / "biped.json"
@@ -22,8 +22,8 @@ class PlanarLink:
 
     Attributes:
         name: its two ends, for example ``"HK"``.
-        length_m: between them.
-        mass_kg: its mass, spread evenly.
+        length_m: between the ends.
+        mass_kg: uniformly distributed.
     """
 
     name: str
@@ -31,7 +31,7 @@ class PlanarLink:
     mass_kg: float
 
     def __post_init__(self) -> None:
-        """Length and mass are positive."""
+        """Check that length and mass are positive."""
         check_numbers(f"link {self.name!r}", self, positive=("length_m", "mass_kg"))
 
 
@@ -42,8 +42,8 @@ class ToeFootBiped:
     Attributes:
         name: of the robot.
         source: of the numbers.
-        inertia: how the moments of inertia follow from them.
-        links: in the order of ``planar_biped.LINKS``; both legs are alike.
+        inertia: formula of the moments of inertia.
+        links: in the order of ``planar_biped.LINKS``; both legs are equal.
 
     Source:
         Bhardwaj, Mishra, Sukavanam, Balasubramanian, Table I. The paper gives no moments of inertia: m l^2 / 12.
@@ -55,14 +55,14 @@ class ToeFootBiped:
     links: tuple[PlanarLink, ...]
 
     def __post_init__(self) -> None:
-        """Refuse missing links and legs that differ."""
+        """Reject missing links and legs that differ."""
         names = tuple(link.name for link in self.links)
         if names != LINKS:
             raise RobotDataError(f"robot {self.name!r}: links must be {', '.join(LINKS)}, got {', '.join(names)}")
         for swing, stance in (("HK", "HK'"), ("KA", "K'A'"), ("AS", "A'S'"), ("ST", "S'T'")):
             a, b = self.link(swing), self.link(stance)
             if (a.length_m, a.mass_kg) != (b.length_m, b.mass_kg):
-                raise RobotDataError(f"robot {self.name!r}: links {swing} and {stance} must be alike")
+                raise RobotDataError(f"robot {self.name!r}: links {swing} and {stance} must be equal")
 
     def link(self, name: str) -> PlanarLink:
         """Link by name."""
@@ -98,7 +98,7 @@ class ToeFootBiped:
 
 @cache
 def toe_foot_biped(path: str = "") -> ToeFootBiped:
-    """Robot from a JSON file with the fields of ``ToeFootBiped``; by default that of the paper.
+    """Read a robot from a JSON file with the fields of ``ToeFootBiped``; by default the paper's.
 
     Raises:
         RobotDataError: the file cannot be read, or does not describe such a robot.

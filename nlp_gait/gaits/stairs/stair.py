@@ -1,22 +1,23 @@
-"""What the stair problems share: the stair as two parameters, gravity, limits of the links, rows of knees and stance foot."""
+"""Definitions shared by the stair problems: the stair, governing parameters of a step, limits, rows of knees and stance foot."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from math import inf
 
 import casadi as ca
-from casadi import MX
+from casadi import MX, SX
 
 from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, in_space, parameters
 from nlp_gait.formulation.blocks import labels
-from nlp_gait.gaits.stairs.formulas.gait import Stair
-from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 
 GRAVITY = 9.81  # [m/s^2]
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
-SETBACK = 0.06  # an edge lies so far behind the ankle that stands on the step [m]
+SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [m]
 
 # Stairs of Table IV by case: double tread ("stair length") [m], rise over run.
 CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
@@ -57,19 +58,19 @@ STAIR_PARAMETERS = parameters(
 LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stance foot", 0.0, inf)
 
 
-def within(point: Point, variable: Variable) -> MX:
-    """Value of a variable for the mathematics, kept within its minimum and maximum, beyond which no bound may be set."""
+def clip_to_range(point: Point, variable: Variable) -> MX:
+    """Return a variable clipped to its minimum and maximum, beyond which no bound may be set."""
     return ca.fmin(ca.fmax(point[variable.name], variable.minimum), variable.maximum)
 
 
-def stair_of(point: Point) -> Stair[MX]:
+def read_stair(point: Point) -> Stair[MX]:
     """Tread and rise of one step from the problem's parameters."""
     tread: MX = point["stair_length_m"] / 2
     return Stair(tread, point["rise_run_ratio"] * tread)
 
 
 def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
-    """Histories of joints (columns as JOINTS) from those of links (columns as MOVING, m rows), with the latter beside.
+    """Return histories of joints (columns as JOINTS) and of links (columns as MOVING, m rows).
 
     A joint's angle is the difference of its links' absolute angles, see ``JOINT_RATES``.
     """
@@ -89,7 +90,7 @@ def rows(
     upper: MX | float | None = None,
     columns: Sequence[int] = (),
 ) -> Constraint:
-    """Rows of a table (r, m), each of whose r quantities is bounded at each of m instants.
+    """Return rows for r quantities at each of m instants.
 
     Args:
         name: of the rows.
@@ -114,25 +115,65 @@ def rows(
 
 
 def knee_limits(name: str, q: MX) -> Constraint:
-    """Knees bent within their limits; q (7, m) are link angles [rad]."""
+    """Return rows for the limits of both knees; q (7, m) are link angles [rad]."""
     knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
     return rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
 
 
 def grip(name: str, force: MX, friction: MX) -> Constraint:
-    """|F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
+    """Return |F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
     limit = friction * force[1, :]
     both = ca.vertcat(limit - force[0, :], limit + force[0, :])
     return rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
 
 
 def stance_load(point: Point, force: MX) -> Constraint:
-    """The ground carries the stance foot with a force (2, m) [N] at least as large as the parameter says."""
+    """Return rows for the least load of the stance foot, with forces (2, m) [N]."""
     return rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
 
 
 def stance_zmp(point: Point, pressure: MX) -> Constraint:
-    """The centre of pressure (1, m) [m] lies within the stance foot, by the margin that the parameter says."""
+    """Return rows for the centre of pressure (1, m) [m] within the stance foot, with the margin parameter."""
     margin = point["zmp_margin_m"]
     front = toe_foot_biped().foot_m - margin
     return rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)
+
+
+# Name, unit, description; bounds; minimum and maximum, beyond which no plan makes sense and numbers may overflow.
+_TABLE = (
+    ("hip_height_m", "m", "z_Ci, above the rear ankle at the start", (0.5, 0.8), (0.1, 2.0)),
+    ("hip_start_m", "m", "hip ahead of the rear ankle at the start", (-0.1, 0.25), (-2.0, 2.0)),
+    ("zmp_start_m", "m", "planned ZMP ahead of the rear ankle", (-0.1, 0.4), (-2.0, 2.0)),
+    ("zmp_end_m", "m", "planned ZMP ahead of the stance ankle", (-0.3, 0.4), (-2.0, 2.0)),
+    ("end_rate_rad_s", "rad/s", "rate of the cycloid's angle at t3", (0.0, 3.0), (-20.0, 20.0)),
+    ("torso_pitch_rad", "rad", "q5, from the forward axis", (0.8, 1.75), (-3.2, 3.2)),
+    ("t1_s", "s", "t1, end of the heel's rise", (0.2, 1.0), (0.0, 20.0)),
+    ("t2_s", "s", "t2, end of the double support", (0.6, 2.0), (0.0, 20.0)),
+    ("t_bc_s", "s", "t_bc, the cycloid is caught", (1.0, 3.2), (0.0, 20.0)),
+    ("foot_pitch_rad", "rad", "upward pitch of the foot in the air", (0.0, 0.6), (-1.6, 1.6)),
+)
+GOVERNING_VARIABLES = tuple(
+    Variable(name=name, unit=unit, lower=lower, upper=upper, description=text, minimum=minimum, maximum=maximum)
+    for name, unit, text, (lower, upper), (minimum, maximum) in _TABLE
+)
+GIVEN_PARAMETERS = parameters(  # Table III
+    ("t3_s", "s", 3.5, "t3, end of the step", 0.5, inf),
+    ("sole_angle_rad", "rad", math.pi / 6, "theta_a, largest angle of the rear sole", 0.0, 1.2),
+    ("toe_angle_rad", "rad", math.pi / 6, "theta_b, angle of the rear toe as it lifts", 0.0, 1.2),
+    ("catch_angle_rad", "rad", 0.01, "Delta theta_c0, half of what the bridge covers on the cycloid", 1e-4, 0.5),
+)
+# Row of a table of parameters.
+REACH_MARGIN = ("reach_margin", "1", 0.005, "knees keep 1 - cos(knee) above this: 0.1 rad", 1e-6, 0.5)
+# In the order of StairPlan's fields.
+GOVERNING = (*(variable.name for variable in GOVERNING_VARIABLES), *(parameter.name for parameter in GIVEN_PARAMETERS))
+
+
+def collect_governing(point: Point) -> MX:
+    """(14,) governing parameters in the order of GOVERNING, variables or parameters of the problem."""
+    variables = (clip_to_range(point, variable) for variable in GOVERNING_VARIABLES)
+    return ca.vertcat(*variables, *(point[parameter.name] for parameter in GIVEN_PARAMETERS))
+
+
+def make_stair_plan(values: SX) -> StairPlan:
+    """Plan from its governing parameters (14,)."""
+    return StairPlan(*ca.vertsplit(values))

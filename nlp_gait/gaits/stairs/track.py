@@ -27,12 +27,18 @@ from nlp_gait.formulation import (
     parameters,
 )
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
-from nlp_gait.gaits.stairs.governing import GIVEN_PARAMETERS, GOVERNING_VARIABLES, REACH_MARGIN
+from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
+from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.simulation_model import Performance, driven, simulation_model
-from nlp_gait.gaits.stairs.skeleton import skeleton
-from nlp_gait.gaits.stairs.stair import COLUMNS, STAIR_PARAMETERS, rows, within
+from nlp_gait.gaits.stairs.stair import (
+    COLUMNS,
+    GIVEN_PARAMETERS,
+    GOVERNING_VARIABLES,
+    REACH_MARGIN,
+    STAIR_PARAMETERS,
+    clip_to_range,
+    rows,
+)
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
@@ -50,8 +56,8 @@ PLAN = {
     "foot_pitch_rad": 0.3169,
 }
 TORSO_PITCH = "torso_pitch_rad"
-# Start points scatter about gains and a torso pitch with which the robot stays near its plan (normal, in units of the ranges):
-# a rollout of a robot that falls has no gradient of use.
+# Start points are normally distributed, in units of the ranges, around gains and a torso pitch with which the robot stays near
+# its plan: a rollout of a falling robot has no useful gradient.
 PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
 SCATTER = 0.05
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
@@ -120,7 +126,7 @@ def stairs_track(
     )
 
     def rollout(point: Point, ops: Nonsmooth) -> Rollout:
-        return loop.rollout(point, ca.vertcat(*(within(point, variable) for variable in variables)), ops)
+        return loop.rollout(point, ca.vertcat(*(clip_to_range(point, variable) for variable in variables)), ops)
 
     def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
         gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
@@ -147,10 +153,10 @@ def stairs_track(
             },
         )
 
-    def performance(at: NumericPoint) -> Performance:
+    def step_motion(at: NumericPoint) -> StepMotion:
         arrays = motion(at).arrays
         state = np.hstack([arrays["q"], arrays["qd"]])
-        return driven(arrays["t"], state, arrays["tau"], arrays["zmp"], float(at["t2_s"]))
+        return make_driven_step(arrays["t"], state, arrays["tau"], arrays["zmp"], float(at["t2_s"]))
 
     return GaitProblem(
         name="stairs-track",
@@ -159,17 +165,17 @@ def stairs_track(
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
         assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(performance)),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion)),
         hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
     )
 
 
 def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
-    """Mean of (53) over all quanta, and how far the ZMP leaves the supporting polygon."""
+    """Return the mean of (53) over all quanta, with a penalty for the ZMP outside the support polygon."""
     quanta = loop.state.shape[1]
     errors = loop.state - loop.desired
     power = loop.torque * loop.state[N:, :]
-    below, above = _beyond(point, loop.zmp)
+    below, above = _zmp_violations(point, loop.zmp)
     tolerance = point["tracking_tolerance_rad"]
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
@@ -200,10 +206,10 @@ def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
     )
 
 
-def _beyond(point: Point, zmp: MX) -> tuple[MX, MX]:
-    """Distance by which the ZMP lies behind and ahead of the supporting polygon, (m, 1) each [m]; negative inside.
+def _zmp_violations(point: Point, zmp: MX) -> tuple[MX, MX]:
+    """Return distances of the ZMP behind and ahead of the support polygon, (m, 1) each [m]; negative inside.
 
-    It reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
+    The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
     """
     foot = toe_foot_biped().foot_m
     times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)

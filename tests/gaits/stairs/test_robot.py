@@ -33,7 +33,7 @@ def changed(tmp_path: Path, index: int, **values: object) -> str:
 
 
 def test_legs_that_differ(tmp_path: Path) -> None:
-    with pytest.raises(RobotDataError, match="HK and HK' must be alike"):
+    with pytest.raises(RobotDataError, match="HK and HK' must be equal"):
         toe_foot_biped(changed(tmp_path, 0, mass_kg=7.0))
 
 

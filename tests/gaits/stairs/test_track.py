@@ -10,7 +10,7 @@ from metaheuristics import AntColony, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.planar_biped import LINKS
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
 FOLLOWED_RAD = 0.05

@@ -9,8 +9,7 @@ from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.leg_network import leg_rates, leg_vector
-from nlp_gait.gaits.stairs.network import NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.leg_network import NetworkSettings, leg_rates, leg_vector, network_angles
 
 THIGH = SHANK = 0.4
 # A millimetre at the ankle, on a knee bent by at least 0.5 rad.

@@ -1,4 +1,4 @@
-"""Planar biped with toes: points, centres of mass and energies from absolute link angles.
+"""Planar biped with toes: points, dynamics and loads from absolute link angles.
 
 All angles are absolute. Those of legs and feet turn clockwise from the forward axis x (a leg that hangs down has pi / 2), that of
 the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is the base.
@@ -7,11 +7,11 @@ the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import DM, SX
 
 from nlp_gait.symbolic.lagrange import EquationsOfMotion, equations_of_motion
 
@@ -57,11 +57,11 @@ def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, ankle: SX) -> dict[str
         q: nine angles in the order of LINKS [rad].
         ankle: (2,) position of the stance ankle A' [m].
     """
-    return _walked(ankle, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
+    return _sum_along_links(ankle, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
 
 
-def _walked(base: V, along: Callable[[str], V]) -> dict[str, V]:
-    """Sums of what lies along the links on the way from the stance ankle to every point, by the point's name."""
+def _sum_along_links(base: V, along: Callable[[str], V]) -> dict[str, V]:
+    """Return sums along the links from the stance ankle to every point, by the point's name."""
     found = {"A'": base}
     for link, sense in _PATH:
         near, far = ENDS[link][::sense]
@@ -71,7 +71,9 @@ def _walked(base: V, along: Callable[[str], V]) -> dict[str, V]:
 
 def _couplings(rods: Mapping[str, Rod]) -> np.ndarray:
     """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
-    arms = _walked(np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)])
+    arms = _sum_along_links(
+        np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)]
+    )
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
     return middles.T @ np.diag([rods[link].mass for link in LINKS]) @ middles
 
@@ -107,3 +109,76 @@ def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angle
                 kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])
         potential += rods[link].mass * gravity * middles[link][1]  # (eq. 38)
     return equations_of_motion(kinetic, potential, q, qd)
+
+
+# Links that move while the stance foot stands flat: coordinates q of the model.
+MOVING = LINKS[:7]
+# Joints between them, from the stance foot to the swing toe.
+JOINTS = ("ankle'", "knee'", "hip'", "hip", "knee", "ankle", "toe")
+# Joint rates are JOINT_RATES @ qd: differences of absolute link rates. The torso's angle runs the other way.
+JOINT_RATES = np.array(
+    [  # HK, KA, HK', K'A', UH, AS, ST
+        [0, 0, 0, 1, 0, 0, 0],
+        [0, 0, 1, -1, 0, 0, 0],
+        [0, 0, 1, 0, 1, 0, 0],
+        [1, 0, 0, 0, 1, 0, 0],
+        [-1, 1, 0, 0, 0, 0, 0],
+        [0, -1, 0, 0, 0, 1, 0],
+        [0, 0, 0, 0, 0, -1, 1],
+    ]
+)
+# In free fall there is no pressure below the foot: a smaller stance force counts as this share of the weight in its centre.
+LEAST_LOAD = 1e-3
+
+
+E = TypeVar("E")
+
+
+class StanceLoads(NamedTuple, Generic[E]):
+    """Joint torques and ground reaction.
+
+    Attributes:
+        torque: (7,) of the joints [Nm], in the order of JOINTS.
+        stance_force: (2,) of the ground on the stance foot [N].
+        stance_pressure: its centre of pressure, ahead of the stance ankle [m].
+    """
+
+    torque: E
+    stance_force: E
+    stance_pressure: E
+
+
+def link_angles(q: SX) -> SX:
+    """(9,) absolute angles of all links with the stance foot flat [rad], from q (7,)."""
+    return ca.vertcat(q, 0, 0)
+
+
+def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
+    """Inverse dynamics with given forces below the rear foot.
+
+    Args:
+        rods: of the robot.
+        gravity: [m/s^2].
+        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for derivatives are taken with respect to them.
+        qd: (7,) rates [rad/s]; symbols.
+        qdd: (7,) [rad/s^2].
+        rear: forces of the ground (2,) [N] by the point of the rear foot on which they act.
+
+    Source:
+        Bhardwaj et al., eqs. (35), (42); the centre of pressure from the moment balance of the flat stance foot.
+    """
+    motion = biped_dynamics(rods, gravity, q, qd, link_angles(q))
+    found = points(rods, link_angles(q), SX(2, 1))
+    generalised = motion.M @ qdd + motion.C @ qd + motion.G  # (eq. 42)
+    for point, force in rear.items():
+        generalised -= ca.jacobian(found[point], q).T @ force  # (eq. 35)
+    torque = DM(np.linalg.inv(JOINT_RATES.T)) @ generalised
+
+    middles = centres(found)
+    mass = sum(rod.mass for rod in rods.values())
+    momentum = sum((rods[link].mass * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
+    force = ca.jtimes(momentum, q, qd) + ca.jtimes(momentum, qd, qdd) + ca.vertcat(0, mass * gravity)
+    stance = force - sum(rear.values(), SX(2, 1))
+    foot = sum((rods[link].mass * gravity * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
+    load = ca.fmax(stance[1], LEAST_LOAD * mass * gravity)
+    return StanceLoads(torque, stance, (foot - torque[0]) / load)

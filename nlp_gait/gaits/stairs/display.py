@@ -1,8 +1,8 @@
-"""Steps on the stairs as an engine is told to play them: the rear foot stands on the floor, the stance foot a rise above it."""
+"""Drawing and simulation of a step on the stairs: rods from the stance ankle, and the step for the engine."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import NamedTuple
 
@@ -12,16 +12,57 @@ from casadi import SX
 
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import SIMULATED, Tread
+from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
 from nlp_gait.gaits.several_steps import walk
 from nlp_gait.gaits.stairs.bodies import JOINTS, joint_angles, joint_torques, rigid_bodies, torso_lean
-from nlp_gait.gaits.stairs.formulas.loads import JOINT_RATES, MOVING, link_angles, loads
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS, points
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, LINKS, MOVING, link_angles, loads, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK
 
+LINES = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
 
-class Performance(NamedTuple):
-    """A step to be played; rows are instants.
+
+def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+    """Return the skeleton of the robot on its stair."""
+    history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
+    q = SX.sym("q", history.shape[1])
+    found = points(toe_foot_biped().rods, q if q.numel() == len(LINKS) else link_angles(q), SX(2, 1))
+    function = ca.Function("points", [q], list(found.values()))
+    samples = len(signals.arrays["t"])
+    values = dict(zip(found, function.map(samples)(history.T), strict=True))
+    at = {name: np.array(value.full().T) for name, value in values.items()}
+    tread = parameters["stair_length_m"] / 2
+    rise = tread * parameters["rise_run_ratio"]
+    edges = [
+        (-1.6 * tread, -1),
+        (-SETBACK, -1),
+        (-SETBACK, 0),
+        (tread - SETBACK, 0),
+        (tread - SETBACK, 1),
+        (1.8 * tread, 1),
+    ]
+    zmp = signals.arrays.get("zmp")
+    return Skeleton(
+        t=signals.arrays["t"],
+        limbs=tuple(
+            Limb(side=side, points=np.stack([_sagittal(at[name]) for name in names], axis=1))
+            for side, names in LINES.items()
+        ),
+        soles=(),
+        ground=np.array([(x, level * rise) for x, level in edges]),
+        com=None,
+        zmp=None if zmp is None else _sagittal(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)])),
+        planar=True,
+    )
+
+
+def _sagittal(points: Array) -> Array:
+    """(T, 3) from (T, 2) of x and z."""
+    return np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+
+
+class StepMotion(NamedTuple):
+    """A step to simulate; rows are instants.
 
     Attributes:
         t: (T,) [s].
@@ -29,8 +70,8 @@ class Performance(NamedTuple):
         qd: (T, 9) [rad/s].
         qdd: (T, 9) [rad/s^2].
         tau: (T, 8) of the robot's joints [Nm].
-        pressure: (T,) centre of pressure of everything that stands, ahead of the stance ankle [m].
-        double_support_s: how long the rear foot bears, on its toe at last.
+        pressure: (T,) centre of pressure of both feet, ahead of the stance ankle [m].
+        double_support_s: duration of load on the rear foot, finally on its toe.
     """
 
     t: Array
@@ -42,17 +83,17 @@ class Performance(NamedTuple):
     double_support_s: float
 
 
-def simulation_model(performance: Callable[[NumericPoint], Performance], *, repeats: bool = False) -> SimulationModel:
-    """How a step is played.
+def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False) -> SimulationModel:
+    """Return the model of a step for the engine.
 
     Args:
-        performance: of a gait.
-        repeats: the step ends as it began, a step further up and with the legs exchanged.
+        step_motion: function of a gait to its step.
+        repeats: the step ends as it began, one step up and with the legs exchanged.
     """
 
     def motion(at: NumericPoint, steps: int) -> Signals:
         _, rise = _stair(at)
-        return walk(_signals(performance(at), rise), rigid_bodies(), steps, rise_m=rise)
+        return walk(_signals(step_motion(at), rise), rigid_bodies(), steps, rise_m=rise)
 
     def ground(at: NumericPoint, steps: int) -> tuple[Tread, ...]:
         tread, rise = _stair(at)
@@ -63,10 +104,10 @@ def simulation_model(performance: Callable[[NumericPoint], Performance], *, repe
     )
 
 
-def standing(
+def make_standing_step(
     t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array, double_support_s: float
-) -> Performance:
-    """A step over the flat stance foot.
+) -> StepMotion:
+    """Return a step over the flat stance foot.
 
     Args:
         t: (T,) [s].
@@ -75,7 +116,7 @@ def standing(
         qdd: (T, 7) [rad/s^2].
         toe: (T, 2) force of the ground on the rear toe [N].
         sole: (T, 2) on the rear sole joint [N].
-        double_support_s: how long the rear foot bears.
+        double_support_s: duration of load on the rear foot.
     """
     torque, stance, pressure, toe_x, sole_x = (
         np.array(part).T for part in _loads().map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
@@ -84,50 +125,50 @@ def standing(
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
     flat = np.zeros((len(t), len(LINKS) - len(MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
-    return Performance(
+    return StepMotion(
         t,
         q,
         qd,
         qdd,
-        joint_torques(torque, _standing_toe(stance[:, 1], pressure[:, 0])),
+        joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0])),
         carried / whole,
         double_support_s,
     )
 
 
-def whole_force(q: Array, qd: Array, qdd: Array) -> Array:
-    """(T, 2) force of the ground on the whole robot [N], from the motion of the moving links (T, 7)."""
+def compute_ground_force(q: Array, qd: Array, qdd: Array) -> Array:
+    """Return the ground force (T, 2) on the whole robot [N] from the motion of the moving links (T, 7)."""
     nothing = np.zeros((2, len(q)))
     return np.array(_loads().map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
 
 
-def driven(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> Performance:
-    """A step whose links were driven by torques against the world.
+def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> StepMotion:
+    """Return a step whose links were driven by torques against the world.
 
-    A link's torque against the world cannot be built. Joints that give seven links theirs, and the toe that stands, leave over a
-    moment on the stance foot: there the ground answers, not a motor.
+    No motor acts on a link against the world. Joints that give seven links their torques, and the standing toe, leave a
+    moment on the stance foot, which the ground takes.
 
     Args:
         t: (T,) [s].
         state: (T, 18) angles and rates of the links [rad], [rad/s].
         torque: (T, 9) on the links [Nm].
         pressure: (T,) ahead of the stance ankle [m].
-        double_support_s: how long the rear foot bears.
+        double_support_s: duration of load on the rear foot.
     """
     q, qd = np.split(state, 2, axis=1)
     between = torque[:, : len(MOVING)] @ np.linalg.inv(JOINT_RATES)
     tau = joint_torques(between, torque[:, LINKS.index("S'T'")])
-    return Performance(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
+    return StepMotion(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
 
 
-def _signals(step: Performance, rise: float) -> Signals:
+def _signals(step: StepMotion, rise: float) -> Signals:
     hip, ankle, stance_ankle = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
     lean = torso_lean(step.q)
     still = np.zeros_like(lean)
-    rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at last
+    rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
 
-    def placed(point: Array) -> Array:
-        """(T, 3) above the floor on which the rear foot stands."""
+    def lift(point: Array) -> Array:
+        """Return points (T, 3) above the floor on which the rear foot stands."""
         return np.column_stack([point[:, 0], still, point[:, 1] + rise])
 
     arrays = {
@@ -137,20 +178,20 @@ def _signals(step: Performance, rise: float) -> Signals:
         "qdd": joint_angles(step.qdd, rates=True),
         "tau": step.tau,
         "zmp": np.column_stack([step.pressure, still]),
-        "hip": placed(hip),
+        "hip": lift(hip),
         "attitude": np.column_stack([np.cos(lean / 2), still, np.sin(lean / 2), still]),
-        "left_foot": placed(stance_ankle),
-        "right_foot": placed(ankle),
+        "left_foot": lift(stance_ankle),
+        "right_foot": lift(ankle),
         "left_bears": np.ones((len(step.t), 1)),
         "right_bears": rear[:, None].astype(float),
     }
     return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
 
 
-def _standing_toe(load: Array, pressure: Array) -> Array:
+def _stance_toe_torque(load: Array, pressure: Array) -> Array:
     """(T,) torque of the standing toe, from the force on the whole foot [N] and its centre ahead of the ankle [m].
 
-    Ahead of the joint, the toe alone can carry; with the pressure behind it, it lies on the ground and needs no torque.
+    With the pressure ahead of the joint the toe carries the load; behind it, the toe needs no torque.
     """
     biped = toe_foot_biped()
     weight = biped.link("ST").mass_kg * GRAVITY * biped.toe_m / 2
@@ -165,7 +206,7 @@ def _stair(at: NumericPoint) -> tuple[float, float]:
 
 @cache
 def _loads() -> ca.Function:
-    """One instant: loads as ``loads`` gives them, and where along x the points of the rear foot are."""
+    """Function of one instant: ``loads``, and the x positions of the rear foot's points."""
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     rear = {"T": SX.sym("toe", 2), "S": SX.sym("sole", 2)}
     found = points(toe_foot_biped().rods, link_angles(q), SX(2, 1))

@@ -1,4 +1,4 @@
-"""The paper's inverse kinematics: a small network trained online, pose after pose, on the ankle's own error."""
+"""The paper's inverse kinematics: a small network trained online, pose after pose, on the error of its own ankle."""
 
 from __future__ import annotations
 
@@ -13,9 +13,95 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.formulas.leg_network import leg_rates, leg_vector, network_error, trained_path
-from nlp_gait.gaits.stairs.formulas.planar_biped import LINKS
+from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
+
+LEAST_KNEE_SINE = 1e-3
+
+
+def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
+    """(2,) from hip to ankle, forward and up [m], of absolute angles (2,) of thigh and shank, clockwise from forward [rad].
+
+    Source:
+        Bhardwaj et al., eqs. (27), (28).
+    """
+    return ca.vertcat(
+        thigh * ca.cos(angles[0]) + shank * ca.cos(angles[1]),
+        -thigh * ca.sin(angles[0]) - shank * ca.sin(angles[1]),
+    )
+
+
+def leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
+    """(2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
+
+    Damped where the knee is straight or folded within a thousandth of a radian, so that they are always finite.
+
+    Source:
+        Bhardwaj et al., eqs. (27), (28), differentiated by time.
+    """
+    (a, b), (c, d) = (
+        ca.vertsplit(row) for row in ca.horzsplit(ca.jacobian(leg_vector(angles, thigh, shank), angles).T)
+    )
+    determinant = a * d - b * c
+    damped = determinant / (determinant**2 + (LEAST_KNEE_SINE * thigh * shank) ** 2)
+    return damped * ca.vertcat(d * velocity[0] - b * velocity[1], a * velocity[1] - c * velocity[0])
+
+
+def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[SX, SX]:
+    """Angles of a leg by one hidden layer of sigmoids, and the squared distance of its ankle from the target [m^2].
+
+    Args:
+        weights: (4 h,) of h hidden nodes: those of the inputs (h, 2), then those of the outputs (2, h), by columns.
+        target: (2,) from hip to ankle [m].
+        thigh: length [m].
+        shank: length [m].
+
+    Returns:
+        (2,) absolute angles of thigh and shank [rad], and the error.
+
+    Source:
+        Bhardwaj et al., section VI and eqs. (27)-(29).
+    """
+    nodes = weights.shape[0] // 4
+    inner, outer = ca.reshape(weights[: 2 * nodes], nodes, 2), ca.reshape(weights[2 * nodes :], 2, nodes)
+    hip, knee = ca.vertsplit(outer @ (1 / (1 + ca.exp(-(inner @ target)))))
+    angles = ca.vertcat(hip, hip + knee)
+    return angles, ca.sumsqr(leg_vector(angles, thigh, shank) - target)  # (eq. 29)
+
+
+def make_training_path(
+    nodes: int, thigh: float, shank: float, poses: int, rate: float, iterations: int, tolerance: float
+) -> ca.Function:
+    """Function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
+
+    Each pose starts from the weights of the last one and is trained by gradient steps until its error is small enough.
+
+    Args:
+        nodes: h, of the hidden layer.
+        thigh: length [m].
+        shank: length [m].
+        poses: m.
+        rate: of learning.
+        iterations: most steps for one pose.
+        tolerance: squared distance of the ankle at which the training of a pose ends [m^2].
+
+    Source:
+        Bhardwaj et al., Algorithm 1 and eq. (30).
+    """
+    weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
+    angles, error = network_error(weights, target, thigh, shank)
+    trained = weights - rate * (error > tolerance) * ca.gradient(error, weights)  # (eq. 30)
+    step = ca.Function("step", [weights, target], [ca.cse(trained)])
+    answer = ca.Function("answer", [weights, target], [angles])
+
+    w, aim = ca.MX.sym("w", 4 * nodes), ca.MX.sym("aim", 2)
+    learned = step.fold(iterations)(w, ca.repmat(aim, 1, iterations))
+    pose = ca.Function("pose", [w, aim], [learned, answer(learned, aim)])
+    first, targets = ca.MX.sym("first", 4 * nodes), ca.MX.sym("targets", 2, poses)
+    _, found = pose.mapaccum(poses)(first, targets)
+    # Trained for given poses: nothing is ever differentiated with respect to them.
+    return ca.Function("path", [first, targets], [found], {"is_diff_in": [False, False]})
+
 
 Rule = Literal["gradient", "adam"]
 # Decay rates of Adam's two moments and its guard against division by zero (Kingma, Ba 2015).
@@ -33,7 +119,7 @@ class NetworkSettings:
         rule: plain gradient steps as in (30), or Adam.
         rate: learning rate.
         iterations: most steps for one pose.
-        tolerance_m2: squared distance of the ankle that ends the training of a pose [m^2].
+        tolerance_m2: squared distance of the ankle at which the training of a pose ends [m^2].
         seed: of the first weights.
     """
 
@@ -45,7 +131,7 @@ class NetworkSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse settings with which nothing can be trained."""
+        """Validate the settings."""
         if self.rule not in get_args(Rule):
             raise InputError(f"rule must be one of {', '.join(get_args(Rule))}, got {self.rule!r}")
         if self.hidden < 1 or self.iterations < 1:
@@ -55,14 +141,14 @@ class NetworkSettings:
 
     @property
     def first_weights(self) -> Array:
-        """(4 h,) as ``leg_network.network_error`` takes them: normally distributed."""
+        """Normally distributed weights (4 h,) for ``network_error``."""
         rng = np.random.default_rng(self.seed)
         inner, outer = rng.standard_normal((self.hidden, 2)), rng.standard_normal((2, self.hidden))
         return np.concatenate([inner.ravel(order="F"), outer.ravel(order="F")])
 
 
 # Gradient steps, as printed, at a rate with which every pose of the three planned steps converges within 40 of them; the
-# printed 5,000 would take a minute for each rollout, as all of them are counted.
+# printed 5,000 would take a minute for each rollout, as all of them are evaluated.
 ONLINE = NetworkSettings(rule="gradient", rate=0.3, iterations=100)
 LEGS = (("HK", "KA"), ("HK'", "K'A'"))
 
@@ -86,7 +172,7 @@ class NetworkPath(NamedTuple):
 def network_angles(
     hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings | None = None
 ) -> NetworkPath:
-    """Leg angles along a path, each pose starting from the weights of the last.
+    """Return leg angles along a path, each pose starting from the weights of the previous one.
 
     Args:
         hip_to_ankle: (m, 2) vectors, forward and up [m].
@@ -113,11 +199,11 @@ def network_angles(
     return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def learned(desired: MX) -> MX:
-    """Desired angles and rates (18, m) of all links along a path, those of thighs and shanks by the network.
+def solve_legs_by_network(desired: MX) -> MX:
+    """Replace desired angles and rates (18, m) of thighs and shanks along a path by those of the network.
 
-    The network learns where the ankle is from the hip; rates follow by differentiating its forward kinematics. It is trained
-    anew, pose after pose, in every evaluation: the paper trains online.
+    The network learns the ankle's position relative to the hip; rates follow by differentiating its forward kinematics. It
+    is trained again, pose after pose, in every evaluation: the paper trains online.
     """
     columns = desired.shape[1]
     rows = ca.vertsplit(desired)
@@ -129,7 +215,9 @@ def learned(desired: MX) -> MX:
         reached = leg_vector(q, *lengths)
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [leg_rates(q, velocity, *lengths)]).map(columns)
-        train = trained_path(ONLINE.hidden, *lengths, columns, ONLINE.rate, ONLINE.iterations, ONLINE.tolerance_m2)
+        train = make_training_path(
+            ONLINE.hidden, *lengths, columns, ONLINE.rate, ONLINE.iterations, ONLINE.tolerance_m2
+        )
         targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
         angles = train(DM(ONLINE.first_weights), targets)
         for i, row in zip(at, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):

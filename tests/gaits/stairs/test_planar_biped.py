@@ -9,9 +9,8 @@ from casadi import SX
 
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.bodies import toe_foot_biped
-from nlp_gait.gaits.stairs.formulas.gait import StairPlan, foot_angles
-from nlp_gait.gaits.stairs.formulas.loads import link_angles, loads
-from nlp_gait.gaits.stairs.formulas.planar_biped import ENDS, LINKS, points
+from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, link_angles, loads, points
+from nlp_gait.gaits.stairs.planned_motion import StairPlan, foot_angles
 
 GRAVITY, STEP = 9.81, 1e-4
 RODS = toe_foot_biped().rods

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.formulas.gait import (
+from nlp_gait.gaits.stairs.planar_biped import link_angles, points
+from nlp_gait.gaits.stairs.planned_motion import (
     Stair,
     StairPlan,
     ToeFoot,
@@ -16,11 +17,9 @@ from nlp_gait.gaits.stairs.formulas.gait import (
     hip,
     in_time,
     landed_angles,
+    posture,
     stair_height,
 )
-from nlp_gait.gaits.stairs.formulas.loads import link_angles
-from nlp_gait.gaits.stairs.formulas.planar_biped import points
-from nlp_gait.gaits.stairs.formulas.posture import posture
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import CASES, GRAVITY
 from nlp_gait.symbolic.nonsmooth import Exact
