@@ -1,39 +1,39 @@
 // Affine arithmetic over boxes: an interpreter of a function's instructions, LANES boxes at once.
 //
-// A quantity is c + sum a_i s_i + e t with the symbols s_i in [-1, 1] that the inputs share and an error t in [-1, 1] of its
-// own, and it lies in [lo, hi] as well: both hold, and each sharpens the other. Every rounding error goes into e: a sum or
-// product errs by half a unit in its last place, and sums of magnitudes are enlarged by far more than they can be rounded
-// (Stolfi, de Figueiredo 1997, sections 3.6 to 3.10; bounds of rounding errors as in Rump 2010, section 2). What is not
-// linear is taken as its Taylor polynomial of degree one about the middle with an enclosed remainder, roots and reciprocals as
-// the nearest line (Chebyshev). Where something is undefined on part of a box, the result is the whole line.
+// A quantity is middle + sum slope_i e_i + error t with symbols e_i in [-1, 1] that the inputs share and its own t in [-1, 1]. It
+// also lies in [lower, upper]; both enclosures are valid, and each sharpens the other. Every rounding error is added to the error:
+// a sum or product errs by half a unit in its last place, and sums of magnitudes are enlarged by far more than their rounding
+// errors (Stolfi, de Figueiredo 1997, sections 3.6 to 3.10; bounds of rounding errors as in Rump 2010, section 2). A nonlinear
+// operation is replaced by its Taylor polynomial of degree one about the middle with an enclosed remainder; roots and reciprocals
+// by the nearest line (Chebyshev). Where an operation is undefined on part of a box, the result is the whole line.
 
 #define LANES 8
 #define EACH for (int l = 0; l < LANES; ++l)
 
-// Numbers of CasADi's operations, and three of our own (a phase lies below its upper end, see HALF_OPEN_* in affine.py).
+// Numbers of CasADi's operations, and two of our own (see HALF_OPEN_* in affine.py).
 enum Operation {
   ASSIGN, ADD, SUB, MUL, DIV, NEG, EXP, LOG, POW, CONSTPOW, SQRT, SQ, TWICE, SIN, COS, TAN, ASIN, ACOS, ATAN, LT, LE, EQ, NE,
   NOT, AND, OR, FLOOR, CEIL, FMOD, FABS, SIGN, COPYSIGN, IF_ELSE_ZERO, ERF, FMIN, FMAX, INV, SINH, COSH, TANH, ASINH, ACOSH,
   ATANH, ATAN2, CONST, INPUT, OUTPUT, HALF_OPEN_LE = 200, HALF_OPEN_LT = 201
 };
 
-static const double UNIT = 0x1p-51;      // times magnitudes: more than three roundings
-static const double ROOM = 1 + 0x1p-40;  // on sums of magnitudes: more than they can be rounded, for fewer than 1000 terms
-static const double TINY = 1e-300;       // more than what underflows
+static const double UNIT = 0x1p-51;      // times magnitudes: more than three rounding errors
+static const double ROOM = 1 + 0x1p-40;  // times sums of magnitudes: more than their rounding errors, for fewer than 1000 terms
+static const double TINY = 1e-300;       // more than an underflow
 
-// Places of a quantity's parts, each LANES numbers: c, a_0 ... a_(n-1), e, lo, hi.
+// Places of a quantity's parts, each LANES numbers: middle, slope_0 ... slope_(n-1), error, lower, upper.
 struct View {
   double* at;
   int n;
-  double* c() const { return at; }
-  double* a(int i) const { return at + (1 + i) * LANES; }
-  double* e() const { return at + (1 + n) * LANES; }
-  double* lo() const { return at + (2 + n) * LANES; }
-  double* hi() const { return at + (3 + n) * LANES; }
-  Interval range(int l) const { return Interval(lo()[l], hi()[l]); }
+  double* middle() const { return at; }
+  double* slope(int i) const { return at + (1 + i) * LANES; }
+  double* error() const { return at + (1 + n) * LANES; }
+  double* lower() const { return at + (2 + n) * LANES; }
+  double* upper() const { return at + (3 + n) * LANES; }
+  Interval range(int l) const { return Interval(lower()[l], upper()[l]); }
 };
 
-// A line through what is enclosed: alpha x + beta y + gamma, off by delta at most; and bounds of the value itself.
+// A line near a function, alpha x + beta y + gamma with an error of at most delta, and the function's range.
 struct Line {
   double alpha = 0.0, beta = 0.0, gamma = 0.0, delta = INFINITY;
   Interval range = whole();
@@ -41,7 +41,7 @@ struct Line {
 
 static inline double magnitude(Interval a) { return most(__builtin_fabs(a.lo), __builtin_fabs(a.hi)); }
 static inline double middle(Interval a) { return 0.5 * a.lo + 0.5 * a.hi; }
-// Distance from a point within it to the farther end, or more.
+// An upper bound of the distance from a point of the interval to its farther end.
 static inline double reach(Interval a, double m) { return up(most(up(a.hi - m), up(m - a.lo))); }
 
 static inline Line constant(Interval a) {
@@ -57,8 +57,8 @@ static inline Line constant(Interval a) {
   return line;
 }
 
-// What is left of f, f - alpha x - beta y, lies within `rest`.
-static inline Line sloped(double alpha, Interval rest, Interval range, double beta = 0.0) {
+// The line of a function f for which f - alpha x - beta y lies in `rest`.
+static inline Line make_line(double alpha, Interval rest, Interval range, double beta = 0.0) {
   Line line = constant(rest);
   if (!(line.delta + __builtin_fabs(alpha) + __builtin_fabs(beta) < INFINITY)) return constant(range);
   line.alpha = alpha;
@@ -79,7 +79,7 @@ static inline Line taylor(Interval x, F f, D first, S second) {
   const Interval square(0.0, up(r * r));
   const Interval rest = f(Interval(m)) - Interval(alpha) * Interval(m) +
                         (slope - Interval(alpha)) * Interval(-r, r) + Interval(0.5) * bend * square;
-  return sloped(alpha, rest, range);
+  return make_line(alpha, rest, range);
 }
 
 // A convex f (or a concave one, sense -1) lies below its chord, and above the line that touches it at u.
@@ -93,7 +93,7 @@ static inline Line chord(Interval x, double sense, F f, D first, double u, doubl
   const Interval touch = f(Interval(u)) - a * Interval(u) + (first(Interval(u)) - a) * Interval(-far, far);
   const Interval rest = sense > 0.0 ? Interval(touch.lo, most(left.hi, right.hi))
                                     : Interval(least(left.lo, right.lo), touch.hi);
-  return rest.lo <= rest.hi ? sloped(alpha, rest, range) : constant(range);
+  return rest.lo <= rest.hi ? make_line(alpha, rest, range) : constant(range);
 }
 
 static inline Interval power(Interval a, int k) {  // k >= 0
@@ -125,7 +125,7 @@ static Line square_root(Interval x) {
 }
 static Line inverse(Interval x) {
   const auto f = [](Interval v) { return reciprocal(v); };
-  if (holds(x, 0.0) || !(x.hi - x.lo < INFINITY) || x.lo == x.hi) return constant(f(x));
+  if (contains(x, 0.0) || !(x.hi - x.lo < INFINITY) || x.lo == x.hi) return constant(f(x));
   const double alpha = -1.0 / x.lo / x.hi, u = __builtin_sqrt(-1.0 / alpha);
   return chord(x, x.lo > 0.0 ? 1.0 : -1.0, f, [](Interval v) { return -squared(reciprocal(v)); }, x.lo > 0.0 ? u : -u, alpha);
 }
@@ -145,9 +145,9 @@ static Line absolute(Interval x) {
   if (!(x.hi - x.lo < INFINITY)) return constant(line.range);
   const double alpha = (x.hi + x.lo) / (x.hi - x.lo);  // |x| - alpha x is 0 at 0 and greatest at an end
   const Interval a(alpha), low = Interval(-x.lo) - a * Interval(x.lo), high = Interval(x.hi) - a * Interval(x.hi);
-  return sloped(alpha, Interval(0.0, most(low.hi, high.hi)), line.range);
+  return make_line(alpha, Interval(0.0, most(low.hi, high.hi)), line.range);
 }
-static Line raised(Interval x, Interval exponent) {
+static Line raise_to(Interval x, Interval exponent) {
   const double p = exponent.lo;
   if (exponent.lo != exponent.hi || !(__builtin_fabs(p) < 64.0)) return Line();
   const int k = (int)p;
@@ -155,7 +155,7 @@ static Line raised(Interval x, Interval exponent) {
     return taylor(
         x, [k](Interval v) { return power(v, k); }, [k](Interval v) { return Interval(k) * power(v, k - 1); },
         [k](Interval v) { return Interval(k * (k - 1.0)) * power(v, k - 2); });
-  if (k == p && k == 1) return sloped(1.0, Interval(0.0), x);
+  if (k == p && k == 1) return make_line(1.0, Interval(0.0), x);
   if (k == p && k <= 0) return constant(reciprocal(power(x, -k)));
   return x.lo > 0.0 ? constant(exp(Interval(p) * log(x))) : Line();
 }
@@ -210,7 +210,7 @@ static Line unary(int op, Interval x) {
 // The angle of a point: its second derivatives are at most 1 / distance^2 in every direction.
 static Line angle(Interval y, Interval x) {
   Line line = constant(atan2(y, x));
-  if ((x.lo <= 0.0 && holds(y, 0.0)) || !(x.hi - x.lo < INFINITY) || !(y.hi - y.lo < INFINITY)) return line;
+  if ((x.lo <= 0.0 && contains(y, 0.0)) || !(x.hi - x.lo < INFINITY) || !(y.hi - y.lo < INFINITY)) return line;
   const double my = middle(y), mx = middle(x);
   const Interval nearest = squared(fabs(x)) + squared(fabs(y));
   if (!(nearest.lo > 1e-200)) return line;
@@ -221,7 +221,7 @@ static Line angle(Interval y, Interval x) {
   const double bend = up(up(up(up(rx * rx) + up(ry * ry)) / nearest.lo) * 0.5);
   const Interval rest = atan2(Y, X) - Interval(alpha) * Y - Interval(beta) * X + (by_y - Interval(alpha)) * Interval(-ry, ry) +
                         (by_x - Interval(beta)) * Interval(-rx, rx) + Interval(-bend, bend);
-  return sloped(alpha, rest, line.range, beta);
+  return make_line(alpha, rest, line.range, beta);
 }
 
 static Line remainder_of(Interval x, Interval y) {
@@ -231,12 +231,12 @@ static Line remainder_of(Interval x, Interval y) {
   const double low = __builtin_trunc(turns.lo), high = __builtin_trunc(turns.hi);
   if (low == high && x.lo != 0.0 && turns.lo * turns.hi > 0.0) {
     const Interval rest = -(Interval(low) * Interval(d));
-    return sloped(1.0, rest, x + rest);
+    return make_line(1.0, rest, x + rest);
   }
   return constant(Interval(x.lo < 0.0 ? -d : 0.0, x.hi > 0.0 ? d : 0.0));
 }
 
-// The larger one, from bounds of the difference x - y: y + max(d, 0) = alpha x + (1 - alpha) y + rest.
+// The maximum, from bounds of the difference x - y: y + max(d, 0) = alpha x + (1 - alpha) y + rest.
 static Line larger(Interval x, Interval y, Interval d) {
   Line line;
   line.range = fmax(x, y);
@@ -248,7 +248,7 @@ static Line larger(Interval x, Interval y, Interval d) {
   }
   if (!(d.hi - d.lo < INFINITY)) return constant(line.range);
   const double alpha = __builtin_floor(d.hi / (d.hi - d.lo) * 0x1p30) * 0x1p-30, beta = 1.0 - alpha;  // both exact
-  return sloped(alpha, Interval(0.0, most(up(-alpha * d.lo), up(beta * d.hi))), line.range, beta);
+  return make_line(alpha, Interval(0.0, most(up(-alpha * d.lo), up(beta * d.hi))), line.range, beta);
 }
 
 static Line binary(int op, Interval x, Interval y, Interval difference) {
@@ -262,7 +262,7 @@ static Line binary(int op, Interval x, Interval y, Interval difference) {
     case HALF_OPEN_LE: return constant(y.hi <= x.lo ? Interval(0.0) : x <= y);
     case HALF_OPEN_LT: return constant(x.hi <= y.lo ? Interval(1.0) : x < y);
     case POW:
-    case CONSTPOW: return raised(x, y);
+    case CONSTPOW: return raise_to(x, y);
     case FMOD: return remainder_of(x, y);
     case ATAN2: return angle(x, y);
     case FMAX: return larger(x, y, difference);
@@ -281,7 +281,7 @@ static Line binary(int op, Interval x, Interval y, Interval difference) {
       Line line;
       line.range = if_else_zero(x, y);
       if (is(x, 0.0)) return constant(Interval(0.0));
-      if (!holds(x, 0.0)) {
+      if (!contains(x, 0.0)) {
         line.beta = 1.0;
         line.delta = 0.0;
         return line;
@@ -296,13 +296,13 @@ static Line binary(int op, Interval x, Interval y, Interval difference) {
   }
 }
 
-// After a result's form and first bounds: what the form says of the range, and a form from the range where there is none.
+// Sharpen the range of a result by its form; make a form from the range where there is none.
 static inline void settle(View z) {
   double reached[LANES];
-  double *c = z.c(), *e = z.e(), *lo = z.lo(), *hi = z.hi();
+  double *c = z.middle(), *e = z.error(), *lo = z.lower(), *hi = z.upper();
   EACH reached[l] = e[l];
   for (int i = 0; i < z.n; ++i) {
-    const double* a = z.a(i);
+    const double* a = z.slope(i);
     EACH reached[l] += __builtin_fabs(a[l]);
   }
   EACH {
@@ -317,31 +317,31 @@ static inline void settle(View z) {
     const Line line = constant(z.range(l));
     c[l] = line.gamma;
     e[l] = line.delta;
-    for (int i = 0; i < z.n; ++i) z.a(i)[l] = 0.0;
+    for (int i = 0; i < z.n; ++i) z.slope(i)[l] = 0.0;
   }
 }
 
-// z = alpha x + beta y + gamma, off by delta; lo and hi of z hold bounds of the value already. y may be missing.
+// z = alpha x + beta y + gamma with an error of delta; the range of z is already set. y may be missing.
 static inline void combine(View z, View x, const double* alpha, const View* y, const double* beta, const double* gamma,
                            const double* delta) {
   double off[LANES], c[LANES], e[LANES];
   EACH {
-    const double p = alpha[l] * x.c()[l];
+    const double p = alpha[l] * x.middle()[l];
     off[l] = __builtin_fabs(p) + __builtin_fabs(gamma[l]);
     c[l] = p + gamma[l];
-    e[l] = delta[l] + (alpha[l] == 0.0 ? 0.0 : __builtin_fabs(alpha[l]) * x.e()[l]);
+    e[l] = delta[l] + (alpha[l] == 0.0 ? 0.0 : __builtin_fabs(alpha[l]) * x.error()[l]);
   }
   if (y) EACH {
-    const double p = beta[l] * y->c()[l];
+    const double p = beta[l] * y->middle()[l];
     off[l] += __builtin_fabs(p);
     c[l] += p;
-    e[l] += beta[l] == 0.0 ? 0.0 : __builtin_fabs(beta[l]) * y->e()[l];
+    e[l] += beta[l] == 0.0 ? 0.0 : __builtin_fabs(beta[l]) * y->error()[l];
   }
   for (int i = 0; i < z.n; ++i) {
-    double* a = z.a(i);
-    const double* xa = x.a(i);
+    double* a = z.slope(i);
+    const double* xa = x.slope(i);
     if (y) {
-      const double* ya = y->a(i);
+      const double* ya = y->slope(i);
       EACH {
         const double p = alpha[l] * xa[l], q = beta[l] * ya[l];
         off[l] += __builtin_fabs(p) + __builtin_fabs(q);
@@ -355,8 +355,8 @@ static inline void combine(View z, View x, const double* alpha, const View* y, c
   }
   EACH {
     const bool exact = (alpha[l] == 0.0 || __builtin_fabs(alpha[l]) == 1.0) && (!y || beta[l] == 0.0 || __builtin_fabs(beta[l]) == 1.0);
-    z.c()[l] = c[l];
-    z.e()[l] = (e[l] + UNIT * off[l] * (exact && gamma[l] == 0.0 && (!y || alpha[l] * beta[l] == 0.0) ? 0.0 : 1.0)) * ROOM +
+    z.middle()[l] = c[l];
+    z.error()[l] = (e[l] + UNIT * off[l] * (exact && gamma[l] == 0.0 && (!y || alpha[l] * beta[l] == 0.0) ? 0.0 : 1.0)) * ROOM +
                (exact ? 0.0 : TINY);
   }
   settle(z);
@@ -366,24 +366,24 @@ static inline void combine(View z, View x, const double* alpha, const View* y, c
 static inline void sum(View z, View x, View y, double sign) {
   double off[LANES];
   EACH {
-    const double b = sign > 0.0 ? y.lo()[l] : -y.hi()[l], d = sign > 0.0 ? y.hi()[l] : -y.lo()[l];
-    const double lo = x.lo()[l] + b, hi = x.hi()[l] + d, c = x.c()[l] + sign * y.c()[l];
-    z.lo()[l] = lo == INFINITY ? __DBL_MAX__ : lo - 0x1p-52 * __builtin_fabs(lo);
-    z.hi()[l] = hi == -INFINITY ? -__DBL_MAX__ : hi + 0x1p-52 * __builtin_fabs(hi);
-    z.c()[l] = c;
-    z.e()[l] = x.e()[l] + y.e()[l];
+    const double b = sign > 0.0 ? y.lower()[l] : -y.upper()[l], d = sign > 0.0 ? y.upper()[l] : -y.lower()[l];
+    const double lo = x.lower()[l] + b, hi = x.upper()[l] + d, c = x.middle()[l] + sign * y.middle()[l];
+    z.lower()[l] = lo == INFINITY ? __DBL_MAX__ : lo - 0x1p-52 * __builtin_fabs(lo);
+    z.upper()[l] = hi == -INFINITY ? -__DBL_MAX__ : hi + 0x1p-52 * __builtin_fabs(hi);
+    z.middle()[l] = c;
+    z.error()[l] = x.error()[l] + y.error()[l];
     off[l] = __builtin_fabs(c);
   }
   for (int i = 0; i < z.n; ++i) {
-    const double *xa = x.a(i), *ya = y.a(i);
-    double* a = z.a(i);
+    const double *xa = x.slope(i), *ya = y.slope(i);
+    double* a = z.slope(i);
     EACH {
       const double s = xa[l] + sign * ya[l];
       a[l] = s;
       off[l] += __builtin_fabs(s);
     }
   }
-  EACH z.e()[l] = (z.e()[l] + UNIT * off[l]) * ROOM;
+  EACH z.error()[l] = (z.error()[l] + UNIT * off[l]) * ROOM;
   settle(z);
 }
 
@@ -393,13 +393,13 @@ static void product(View z, View x, View y) {
   EACH {
     const Interval r = x.range(l) * y.range(l);
     lo[l] = r.lo, hi[l] = r.hi;
-    c[l] = x.c()[l] * y.c()[l];
+    c[l] = x.middle()[l] * y.middle()[l];
     off[l] = __builtin_fabs(c[l]);
-    rx[l] = x.e()[l], ry[l] = y.e()[l];
+    rx[l] = x.error()[l], ry[l] = y.error()[l];
     shared[l] = squares[l] = 0.0;
   }
   for (int i = 0; i < z.n; ++i) {
-    const double *xa = x.a(i), *ya = y.a(i);
+    const double *xa = x.slope(i), *ya = y.slope(i);
     EACH {
       const double p = xa[l] * ya[l];
       rx[l] += __builtin_fabs(xa[l]);
@@ -410,37 +410,37 @@ static void product(View z, View x, View y) {
   }
   EACH {
     const double rest = rx[l] * ry[l] * ROOM - 0.5 * shared[l] * (2.0 - ROOM);
-    e[l] = (rest > 0.0 ? rest : 0.0) + __builtin_fabs(x.c()[l]) * y.e()[l] + __builtin_fabs(y.c()[l]) * x.e()[l];
+    e[l] = (rest > 0.0 ? rest : 0.0) + __builtin_fabs(x.middle()[l]) * y.error()[l] + __builtin_fabs(y.middle()[l]) * x.error()[l];
     // For up to 1000 symbols the sum of squares errs by less than 2^-42 of its terms' magnitudes.
     e[l] += rx[l] * ry[l] * 0x1p-40 + 0x1p-42 * shared[l];
     off[l] += 0.5 * shared[l];
   }
   for (int i = 0; i < z.n; ++i) {
-    const double *xa = x.a(i), *ya = y.a(i);
-    double* a = z.a(i);
+    const double *xa = x.slope(i), *ya = y.slope(i);
+    double* a = z.slope(i);
     EACH {
-      const double p = x.c()[l] * ya[l], q = y.c()[l] * xa[l];
+      const double p = x.middle()[l] * ya[l], q = y.middle()[l] * xa[l];
       off[l] += __builtin_fabs(p) + __builtin_fabs(q);
       a[l] = p + q;
     }
   }
   EACH {
-    z.c()[l] = c[l] + 0.5 * squares[l];
-    z.e()[l] = (e[l] + UNIT * off[l]) * ROOM + (is(x.range(l), 0.0) || is(y.range(l), 0.0) ? 0.0 : TINY);
-    z.lo()[l] = lo[l], z.hi()[l] = hi[l];
+    z.middle()[l] = c[l] + 0.5 * squares[l];
+    z.error()[l] = (e[l] + UNIT * off[l]) * ROOM + (is(x.range(l), 0.0) || is(y.range(l), 0.0) ? 0.0 : TINY);
+    z.lower()[l] = lo[l], z.upper()[l] = hi[l];
   }
   settle(z);
 }
 
 static Interval difference_of(View x, View y, int l) {
   const Interval plain = x.range(l) - y.range(l);
-  double r = x.e()[l] + y.e()[l], off = __builtin_fabs(x.c()[l]) + __builtin_fabs(y.c()[l]);
+  double r = x.error()[l] + y.error()[l], off = __builtin_fabs(x.middle()[l]) + __builtin_fabs(y.middle()[l]);
   for (int i = 0; i < x.n; ++i) {
-    r += __builtin_fabs(x.a(i)[l] - y.a(i)[l]);
-    off += __builtin_fabs(x.a(i)[l]) + __builtin_fabs(y.a(i)[l]);
+    r += __builtin_fabs(x.slope(i)[l] - y.slope(i)[l]);
+    off += __builtin_fabs(x.slope(i)[l]) + __builtin_fabs(y.slope(i)[l]);
   }
   r = (r + UNIT * off) * ROOM;
-  const double c = x.c()[l] - y.c()[l], low = down(c - r), high = up(c + r);
+  const double c = x.middle()[l] - y.middle()[l], low = down(c - r), high = up(c + r);
   return low <= high ? Interval(most(plain.lo, low), least(plain.hi, high)) : plain;
 }
 
@@ -453,31 +453,31 @@ static void apply(int op, View z, View x, const View* y) {
     alpha[l] = line.alpha, beta[l] = line.beta, gamma[l] = line.gamma, delta[l] = line.delta;
     lo[l] = line.range.lo, hi[l] = line.range.hi;
   }
-  EACH z.lo()[l] = lo[l], z.hi()[l] = hi[l];
+  EACH z.lower()[l] = lo[l], z.upper()[l] = hi[l];
   combine(z, x, alpha, y, beta, gamma, delta);
 }
 
-static void negated(View z, View x) {
+static void negate(View z, View x) {
   EACH {
-    const double lo = x.lo()[l];
-    z.c()[l] = -x.c()[l], z.e()[l] = x.e()[l], z.lo()[l] = -x.hi()[l], z.hi()[l] = -lo;
+    const double lo = x.lower()[l];
+    z.middle()[l] = -x.middle()[l], z.error()[l] = x.error()[l], z.lower()[l] = -x.upper()[l], z.upper()[l] = -lo;
   }
-  for (int i = 0; i < z.n; ++i) EACH z.a(i)[l] = -x.a(i)[l];
+  for (int i = 0; i < z.n; ++i) EACH z.slope(i)[l] = -x.slope(i)[l];
 }
 
 struct Instruction {
   int op, out, first, second;
 };
 
-// Doubles of the workspace that the caller brings.
+// Number of doubles of the memory that the caller provides.
 extern "C" EXPORT long long nlp_gait_affine_doubles(int slots, int n) { return (long long)(slots + 2) * (n + 4) * LANES; }
 
-// Encloses a function over boxes.
+// Enclose a function over boxes.
 //
 //   code, constants  (count) instructions; an INPUT's `first` is its number, an OUTPUT's `out` its own and `first` a slot
-//   symbols          (inputs) number of the symbol along which an input varies; an input that is a number in all boxes may have -1
+//   symbols          (inputs) number of the symbol along which an input varies; -1 makes its width an error
 //   boxes            (many, inputs, 2)
-//   result           (many, outputs, n + 4): c, a, e, lo, hi
+//   result           (many, outputs, n + 4): middle, slopes, error, lower, upper
 extern "C" EXPORT void nlp_gait_affine(const Instruction* code, const double* constants, long long count, int n, int inputs,
                                        const int* symbols, long long many, const double* boxes, int outputs, double* result,
                                        double* memory) {
@@ -497,14 +497,14 @@ extern "C" EXPORT void nlp_gait_affine(const Instruction* code, const double* co
       }
       const View z = at(now.out);
       if (now.op == INPUT || now.op == CONST) {
-        for (int i = 0; i < n; ++i) EACH z.a(i)[l] = 0.0;
+        for (int i = 0; i < n; ++i) EACH z.slope(i)[l] = 0.0;
         EACH {
           const double* ends = now.op == INPUT ? boxes + (box(l) * inputs + now.first) * 2 : constants + k;
           const Interval r(ends[0], now.op == INPUT ? ends[1] : ends[0]);
           const Line line = constant(r);
           const int symbol = now.op == INPUT ? symbols[now.first] : -1;
-          z.c()[l] = line.gamma, z.e()[l] = line.delta, z.lo()[l] = r.lo, z.hi()[l] = r.hi;
-          if (symbol >= 0 && line.delta < INFINITY) z.a(symbol)[l] = line.delta, z.e()[l] = 0.0;
+          z.middle()[l] = line.gamma, z.error()[l] = line.delta, z.lower()[l] = r.lo, z.upper()[l] = r.hi;
+          if (symbol >= 0 && line.delta < INFINITY) z.slope(symbol)[l] = line.delta, z.error()[l] = 0.0;
         }
         continue;
       }
@@ -512,13 +512,13 @@ extern "C" EXPORT void nlp_gait_affine(const Instruction* code, const double* co
       if (now.second < 0) {
         if (now.op == ASSIGN) {
           if (now.out != now.first) __builtin_memcpy(z.at, x.at, width * sizeof(double));
-        } else if (now.op == NEG) negated(z, x);
+        } else if (now.op == NEG) negate(z, x);
         else if (now.op == TWICE) sum(z, x, x, 1.0);
         else apply(now.op, z, x, nullptr);
         continue;
       }
       const View y = at(now.second);
-      // A result's place may be that of an argument: the spare place stands between.
+      // A result may be stored in the place of an argument, so it is computed in the spare place.
       const View r = now.out == now.first || now.out == now.second ? spare : z;
       if (now.op == ADD || now.op == SUB) sum(r, x, y, now.op == ADD ? 1.0 : -1.0);
       else if (now.op == MUL) product(r, x, y);

@@ -1,8 +1,8 @@
-// Convex functions below quadratic ones over a box, and what touches them from below.
+// Convex functions below quadratic ones over a box, and their tangents.
 //
 // A sum of forms is bounded from below by making it convex with squares e_i^2 <= 1, and a convex function lies above its tangents
-// (Adjiman, Androulakis, Floudas 1998; Neumaier, Shcherbina 2004). The eigenvectors need not be right. All that is summed here errs
-// by less than SLACK of the magnitudes summed.
+// (Adjiman, Androulakis, Floudas 1998; Neumaier, Shcherbina 2004). The eigenvectors need not be exact. Every sum here errs by less
+// than SLACK times its magnitudes.
 
 static const double SLACK = 0x1p-40;
 
@@ -12,7 +12,7 @@ static inline double size_of(double a) { return __builtin_fabs(a); }
 static inline double down(double a) { return a - (0x1p-51 * size_of(a) + TINY); }
 static inline double up(double a) { return a + (0x1p-51 * size_of(a) + TINY); }
 
-// c + sum g_i e_i + sum_(i<=j) h e_i e_j, off by d; mag bounds what was summed.
+// c + sum g_i e_i + sum_(i<=j) h e_i e_j with an error of d: middle, slopes, bends; mag bounds the summed magnitudes.
 struct Quadratic {
   double c = 0.0, d = 0.0, mag = 0.0, g[MOST] = {}, h[MOST * (MOST + 1) / 2] = {};
 
@@ -26,12 +26,12 @@ struct Quadratic {
   void add(int n, const Layout& at, double w, const double* form) {
     c += w * form[0];
     for (int i = 0; i < n; ++i) g[i] += w * form[1 + i];
-    for (int k = 0; k < n * (n + 1) / 2; ++k) h[k] += w * form[at.h + k];
-    d += size_of(w) * form[at.d];
-    mag += size_of(w) * (size_of(form[0]) + form[at.G] + form[at.H]);
+    for (int k = 0; k < n * (n + 1) / 2; ++k) h[k] += w * form[at.bends + k];
+    d += size_of(w) * form[at.error];
+    mag += size_of(w) * (size_of(form[0]) + form[at.slope_sum] + form[at.bend_sum]);
   }
-  // In coordinates with e = m + r e'.
-  Quadratic moved(int n, const double* m, const double* r) const {
+  // The same in coordinates e' with e = m + r e'.
+  Quadratic rescale(int n, const double* m, const double* r) const {
     Quadratic q;
     q.c = c, q.d = d, q.mag = 4.0 * mag;
     for (int i = 0; i < n; ++i) q.g[i] = g[i], q.c += g[i] * m[i];
@@ -44,7 +44,7 @@ struct Quadratic {
     for (int i = 0; i < n; ++i) q.g[i] *= r[i];
     return q;
   }
-  // What is left of it beside c and g, from below.
+  // Lower bound of everything but c and g.
   double rest(int n) const {
     double low = -d;
     for (int j = 0, k = 0; j < n; ++j)
@@ -77,7 +77,7 @@ struct Linear {
   }
 };
 
-// Eigenvalues on a's diagonal and vectors in v's columns, by Jacobi's rotations.
+// Eigenvalues on a's diagonal and eigenvectors in v's columns, by Jacobi's rotations.
 static void eigen(int n, double a[MOST][MOST], double v[MOST][MOST]) {
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) v[i][j] = i == j;
@@ -151,7 +151,7 @@ struct Convex {
     for (int i = 0; i < n; ++i) c -= added[i], mag += added[i];
   }
 
-  // Near the least in the box.
+  // Find a point near the minimum in the box.
   void minimise(double* e) const {
     double A[MOST][MOST];
     for (int i = 0; i < n; ++i)
@@ -174,7 +174,7 @@ struct Convex {
     }
   }
 
-  // What touches it at e.
+  // The tangent at e.
   Linear tangent(const double* e) const {
     Linear line;
     double total = mag, a[MOST];

@@ -1,4 +1,4 @@
-// A number type of closed intervals, with which CasADi's generated code encloses the range of a function over a box.
+// Closed intervals, rounded outward.
 //
 // Every result is widened outward by at least the rounding error of its operation: basic operations and the square root
 // are rounded correctly (IEEE 754), so half a unit in the last place is enough for them and a whole one is taken; functions
@@ -30,15 +30,14 @@ static inline Interval outward(double lo, double hi, double units = 1.0) {
 }
 static inline double least(double a, double b) { return b < a ? b : a; }
 static inline double most(double a, double b) { return b > a ? b : a; }
-static inline bool holds(Interval a, double s) { return a.lo <= s && s <= a.hi; }
+static inline bool contains(Interval a, double s) { return a.lo <= s && s <= a.hi; }
 static inline bool is(Interval a, double s) { return a.lo == s && a.hi == s; }
 
-static inline Interval operator+(Interval a) { return a; }
 static inline Interval operator-(Interval a) { return Interval(-a.hi, -a.lo); }
 static inline Interval operator+(Interval a, Interval b) { return outward(a.lo + b.lo, a.hi + b.hi); }
 static inline Interval operator-(Interval a, Interval b) { return a + -b; }
 
-// 0 times an unbounded end is 0: an interval's end is a bound, not a value.
+// 0 times an infinite end is 0: an interval's end is a bound, not a value.
 static inline double product(double s, double t) { return s == 0.0 || t == 0.0 ? 0.0 : s * t; }
 static inline Interval operator*(Interval a, Interval b) {
   if (is(a, 0.0) || is(b, 0.0)) return Interval(0.0);
@@ -48,26 +47,20 @@ static inline Interval operator*(Interval a, Interval b) {
   return outward(least(least(p, q), least(r, s)), most(most(p, q), most(r, s)));
 }
 static inline Interval operator/(Interval a, Interval b) {
-  if (holds(b, 0.0)) return whole();
+  if (contains(b, 0.0)) return whole();
   const double p = a.lo / b.lo, q = a.lo / b.hi, r = a.hi / b.lo, s = a.hi / b.hi;
   return outward(least(least(p, q), least(r, s)), most(most(p, q), most(r, s)));
 }
-static inline Interval& operator+=(Interval& a, Interval b) { return a = a + b; }
-static inline Interval& operator-=(Interval& a, Interval b) { return a = a - b; }
-static inline Interval& operator*=(Interval& a, Interval b) { return a = a * b; }
-static inline Interval& operator/=(Interval& a, Interval b) { return a = a / b; }
 
 static inline Interval verdict(bool always, bool never) { return Interval(always ? 1.0 : 0.0, never ? 0.0 : 1.0); }
 static inline Interval operator<(Interval a, Interval b) { return verdict(a.hi < b.lo, a.lo >= b.hi); }
 static inline Interval operator<=(Interval a, Interval b) { return verdict(a.hi <= b.lo, a.lo > b.hi); }
-static inline Interval operator>(Interval a, Interval b) { return b < a; }
-static inline Interval operator>=(Interval a, Interval b) { return b <= a; }
-static inline Interval operator!(Interval a) { return verdict(is(a, 0.0), !holds(a, 0.0)); }
+static inline Interval operator!(Interval a) { return verdict(is(a, 0.0), !contains(a, 0.0)); }
 static inline Interval operator&&(Interval a, Interval b) {
-  return verdict(!holds(a, 0.0) && !holds(b, 0.0), is(a, 0.0) || is(b, 0.0));
+  return verdict(!contains(a, 0.0) && !contains(b, 0.0), is(a, 0.0) || is(b, 0.0));
 }
 static inline Interval operator||(Interval a, Interval b) {
-  return verdict(!holds(a, 0.0) || !holds(b, 0.0), is(a, 0.0) && is(b, 0.0));
+  return verdict(!contains(a, 0.0) || !contains(b, 0.0), is(a, 0.0) && is(b, 0.0));
 }
 static inline Interval operator==(Interval a, Interval b) {
   return verdict(a.lo == a.hi && b.lo == b.hi && a.lo == b.lo, a.hi < b.lo || b.hi < a.lo);
@@ -75,14 +68,13 @@ static inline Interval operator==(Interval a, Interval b) {
 static inline Interval operator!=(Interval a, Interval b) { return !(a == b); }
 static inline Interval if_else_zero(Interval condition, Interval value) {
   if (is(condition, 0.0)) return Interval(0.0);
-  return holds(condition, 0.0) ? Interval(least(0.0, value.lo), most(0.0, value.hi)) : value;
+  return contains(condition, 0.0) ? Interval(least(0.0, value.lo), most(0.0, value.hi)) : value;
 }
 
-static inline Interval fmin(Interval a, Interval b) { return Interval(least(a.lo, b.lo), least(a.hi, b.hi)); }
 static inline Interval fmax(Interval a, Interval b) { return Interval(most(a.lo, b.lo), most(a.hi, b.hi)); }
 static inline Interval fabs(Interval a) {
   const double s = __builtin_fabs(a.lo), t = __builtin_fabs(a.hi);
-  return Interval(holds(a, 0.0) ? 0.0 : least(s, t), most(s, t));
+  return Interval(contains(a, 0.0) ? 0.0 : least(s, t), most(s, t));
 }
 static inline Interval sign(Interval a) {
   return Interval(a.lo > 0.0 ? 1.0 : a.lo == 0.0 ? 0.0 : -1.0, a.hi < 0.0 ? -1.0 : a.hi == 0.0 ? 0.0 : 1.0);
@@ -99,7 +91,7 @@ static inline Interval sqrt(Interval a) {
 }
 static inline Interval within(Interval a, double lo, double hi) { return Interval(most(a.lo, lo), least(a.hi, hi)); }
 
-// The period's number of a phase, as a bound: whether a turning point may lie between two ends is asked with a margin.
+// Whether a turning point (`at`, modulo the period) may lie in an interval, with a margin.
 static inline bool may_turn(Interval a, double at) {
   const double period = 6.283185307179586, slack = 1e-9;
   const double n = floor((a.hi - at + slack) / period);
@@ -129,7 +121,7 @@ static inline Interval log(Interval a) { return a.lo <= 0.0 ? whole() : outward(
 static inline Interval floor(Interval a) { return Interval(__builtin_floor(a.lo), __builtin_floor(a.hi)); }
 static inline Interval atan2(Interval y, Interval x) {
   const double pi = 3.1415926535897936;  // not below pi
-  if (x.lo <= 0.0 && holds(y, 0.0)) return Interval(-pi, pi);  // the origin or the cut
+  if (x.lo <= 0.0 && contains(y, 0.0)) return Interval(-pi, pi);  // the origin or the cut
   double lo = INFINITY, hi = -INFINITY;  // monotone in each argument away from them: the extremes are at corners
   for (double s : {y.lo, y.hi})
     for (double t : {x.lo, x.hi}) {

@@ -1,12 +1,12 @@
-// Multipliers of rows and of terms of the cost, by a linear program over what is linear in all forms.
+// Multipliers of rows and of terms of the cost, by a linear program over the linear parts of all forms.
 //
-// Any multipliers >= 0 give a bound, so that the linear program need not be solved to its end.
+// All multipliers >= 0 give a valid bound, so the linear program need not be solved to optimality.
 
 #include <vector>
 
 static const int PIVOTS = 32;
 
-// A row (value <= 0) or something that the cost holds if it is positive, in [-1, 1]^n.
+// A row (value <= 0), or a term of which the cost contains the positive part, in [-1, 1]^n.
 struct Column {
   Quadratic form;
   double p, q[MOST], most_;
@@ -18,7 +18,7 @@ static void multipliers(int n, const double* cost, double constant, const std::v
   const int m = (int)columns.size();
   int basis[MOST];  // a column, or m + 2 j (+ 1) for the ends of symbol j
   double inverse[MOST][MOST] = {}, value[MOST], e[MOST];
-  std::vector<char> state(m, 0);  // 0 at zero, 1 at its most, 2 in the basis
+  std::vector<char> state(m, 0);  // 0 at zero, 1 at its maximum, 2 in the basis
   x.assign(m, 0.0);
   for (int j = 0; j < n; ++j) {
     const bool plus = cost[j] >= 0.0;

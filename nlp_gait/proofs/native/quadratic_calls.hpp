@@ -1,18 +1,18 @@
-// What Python calls of quadratic forms and their relaxation (see quadratic.py).
+// Functions of quadratic forms and their relaxation that quadratic.py calls.
 
 static const int CONTRACTIONS = 4;
 static const double LEAST_SHRINKAGE = 0.1;
 
-// Numbers of a form of n variables.
-extern "C" EXPORT int nlp_gait_quadratic_size(int n) { return Layout(padded(n)).size; }
+// Number of doubles of a form of n variables.
+extern "C" EXPORT int nlp_gait_quadratic_size(int n) { return Layout(pad(n)).size; }
 
-// Doubles of the memory that the caller brings.
+// Number of doubles of the memory that the caller provides.
 extern "C" EXPORT long long nlp_gait_quadratic_doubles(int slots, int n, int outputs) {
-  const Layout at(padded(n));
+  const Layout at(pad(n));
   return (tape_vectors(at, slots) + 1) * LANES + slots + 1 + (long long)LANES * outputs * at.size;
 }
 
-// Forms of boxes (many, n, 2) in `result` (many, outputs, size).
+// Enclose boxes (many, n, 2): forms in `result` (many, outputs, size).
 extern "C" EXPORT void nlp_gait_quadratic_forms(const Tape* tape, int n, int outputs, long long many, const double* boxes,
                                                 double* result, double* memory) {
   Runner runner(*tape, n, memory);
@@ -24,7 +24,7 @@ extern "C" EXPORT void nlp_gait_quadratic_forms(const Tape* tape, int n, int out
   }
 }
 
-// Boxes (many, n, 2) without slabs in which an output is beyond its bounds, in place: left (many) 0 or 1.
+// Cut off slabs of boxes (many, n, 2) in which an output violates its bounds, in place: left (many) 0 or 1.
 extern "C" EXPORT void nlp_gait_quadratic_contract(const Tape* tape, int n, int outputs, long long many, double* boxes,
                                                    const double* lower, const double* upper, int* left, double* memory) {
   Runner runner(*tape, n, memory);
@@ -36,7 +36,7 @@ extern "C" EXPORT void nlp_gait_quadratic_contract(const Tape* tape, int n, int 
   const long long each = (long long)outputs * runner.at.size;
   for (long long first = 0; first < many; first += LANES) {
     const int count = first + LANES < many ? LANES : (int)(many - first);
-    bool again[LANES];  // each box for itself: what becomes of it must not depend on the others
+    bool again[LANES];  // the result of a box must not depend on the others
     for (int l = 0; l < LANES; ++l) again[l] = l < count;
     bool any_again = true;
     for (int round = 0; round < CONTRACTIONS && any_again; ++round) {
@@ -55,7 +55,7 @@ extern "C" EXPORT void nlp_gait_quadratic_contract(const Tape* tape, int n, int 
   }
 }
 
-// What is left of boxes (many, n, 2), in place: left (many) 0 or 1, lowest (many), cut (many).
+// Prune boxes (many, n, 2) in place: left (many) 0 or 1, lowest (many), cut (many).
 extern "C" EXPORT void nlp_gait_quadratic_prune(const Tape* tape, const PowerRows* rows, double target, long long many, double* boxes,
                                                  int* left, double* lowest, int* cut, double* memory) {
   Runner runner(*tape, rows->n, memory);

@@ -1,15 +1,15 @@
-// What quadratic forms say of a gait's least power over a box: a bound, and the part of the box in which less may be had.
+// A bound of the least power over a box from quadratic forms, and the part of the box in which it may be lower.
 //
 // The cost is u (sum of w |torque rate|) + heat with u = 1 / T; rows are forms with bounds. On a box, in coordinates in [-1, 1]:
 //   u C >= u_min C + C_min (u - u_min), and u lies above its tangents
 //   |torque rate| is the product where its sign is known; else it lies above +-(least |rate|) torque, or +-(least |torque|) rate
-//   rows that may fail enter with multipliers
+//   rows that may be violated are added with multipliers
 //   the sum is made convex, and bounded by a tangent
 
 static const int SWEEPS = 3, ROUNDS = 3, PASSES = 3;
-// An error of so large a part of the range leaves it to the multipliers whether a form counts.
+// A form whose error is this share of its range is only added with a multiplier.
 static const double VAGUE = 0.25;
-// Where to cut: weights of errors of known products, and of an edge's width, beside what is lost to the rest.
+// Choice of the cut: weights of the errors of products of known sign, and of an edge's width.
 static const double ERROR_SHARE = 0.7, WIDTH_SHARE = 0.125;
 
 struct PowerRows {
@@ -18,11 +18,11 @@ struct PowerRows {
   const double *lower, *upper, *weight, *loss, *ranges;
 };
 
-// What is known of one box.
+// The remaining part of a box.
 struct Box {
   double low[MOST], high[MOST];  // in [-1, 1]
 
-  // Without what a e <= b excludes; false if nothing is left.
+  // Cut off the part that a e <= b excludes; false if nothing is left.
   bool contract(int n, const double* a, double b) {
     double sum = 0.0, size = size_of(b);
     for (int j = 0; j < n; ++j) sum += least(a[j] * low[j], a[j] * high[j]), size += size_of(a[j]);
@@ -48,7 +48,7 @@ struct Term {
   const double *power, *torque, *rate, weight;
 };
 
-// Powers of known sign, together: their form, least and greatest values.
+// Sum of the powers of known sign: its form, least and greatest values.
 struct Sums {
   Quadratic form;
   double least = 0.0, greatest = 0.0;
@@ -56,27 +56,27 @@ struct Sums {
 
 class Relaxation {
  public:
-  Relaxation(const PowerRows& rows, const Layout& layout) : G(rows), at(layout), n(rows.n) {}
+  Relaxation(const PowerRows& rows, const Layout& layout) : given(rows), at(layout), n(rows.n) {}
 
-  // `box` (n, 2) is replaced by what is left of it.
+  // Replaces `box` (n, 2) by its remaining part.
   Result prune(const double* forms, double* box, double target) {
     Box e;
     double score[MOST] = {};
-    if (!begin(forms, box, e) || !bounded(e, box, target, score) || !inner(e, box)) return Result{false, INFINITY, 0};
+    if (!start(forms, box, e) || !bound_cost(e, box, target, score) || !write_box(e, box)) return Result{false, INFINITY, 0};
     int cut = 0;
     for (int i = 1; i < n; ++i)
       if (score[i] > score[cut]) cut = i;
     return Result{true, lowest, cut};
   }
 
-  // By rows alone; false if nothing is left.
+  // The same by rows only; false if nothing is left.
   bool contract(const double* forms, double* box) {
     Box e;
-    return begin(forms, box, e) && inner(e, box);
+    return start(forms, box, e) && write_box(e, box);
   }
 
  private:
-  const PowerRows& G;
+  const PowerRows& given;
   const Layout& at;
   const int n;
   const double* F = nullptr;
@@ -89,18 +89,18 @@ class Relaxation {
   };
   std::vector<Row> open;
 
-  bool begin(const double* forms, const double* box, Box& e) {
+  bool start(const double* forms, const double* box, Box& e) {
     F = forms;
     for (int i = 0; i < n; ++i) {
       e.low[i] = -1.0, e.high[i] = 1.0;
       centre[i] = 0.5 * box[2 * i] + 0.5 * box[2 * i + 1];
       half[i] = up(most(box[2 * i + 1] - centre[i], centre[i] - box[2 * i]));
     }
-    return rows_leave(e);
+    return contract_by_rows(e);
   }
 
-  // The box in its own coordinates, outward rounded; false if it is empty.
-  bool inner(const Box& e, double* box) const {
+  // Write the remaining part in the coordinates of the box, rounded outward; false if it is empty.
+  bool write_box(const Box& e, double* box) const {
     for (int i = 0; i < n; ++i) {
       const double slack = SLACK * half[i] + 0x1p-50 * size_of(centre[i]);
       box[2 * i] = most(box[2 * i], centre[i] + half[i] * e.low[i] - slack);
@@ -112,10 +112,10 @@ class Relaxation {
 
   const double* form(int o) const { return F + (long long)o * at.size; }
 
-  // Bounds of sense * form over the box: least of what is not linear, its slopes from the middle of the symbols.
-  double constant_of(const double* f, double sense, const Box& e) const {
-    double low = sense * f[0] - f[at.d];
-    for (int j = 0, k = at.h; j < n; ++j)
+  // Lower bound of everything but the linear part of sense * form over the box.
+  double bound_rest(const double* f, double sense, const Box& e) const {
+    double low = sense * f[0] - f[at.error];
+    for (int j = 0, k = at.bends; j < n; ++j)
       for (int i = 0; i <= j; ++i, ++k) {
         const double h = sense * f[k];
         if (i == j) {
@@ -124,25 +124,25 @@ class Relaxation {
         } else
           low -= size_of(h) * most(-e.low[i], e.high[i]) * most(-e.low[j], e.high[j]);
       }
-    return low - SLACK * (size_of(f[0]) + f[at.G] + f[at.H] + f[at.d]);
+    return low - SLACK * (size_of(f[0]) + f[at.slope_sum] + f[at.bend_sum] + f[at.error]);
   }
 
-  bool rows_leave(Box& e) {
+  bool contract_by_rows(Box& e) {
     open.clear();
-    for (int r = 0; r < G.rows; ++r) {
-      const double* f = form(G.row[r]);
-      if (f[at.lo] > G.upper[r] || f[at.hi] < G.lower[r]) return false;
-      if (!(f[at.d] < INFINITY)) continue;
-      if (f[at.hi] > G.upper[r]) open.push_back(Row{r, 1.0, G.upper[r]});
-      if (f[at.lo] < G.lower[r]) open.push_back(Row{r, -1.0, -G.lower[r]});
+    for (int r = 0; r < given.rows; ++r) {
+      const double* f = form(given.row[r]);
+      if (f[at.lower] > given.upper[r] || f[at.upper] < given.lower[r]) return false;
+      if (!(f[at.error] < INFINITY)) continue;
+      if (f[at.upper] > given.upper[r]) open.push_back(Row{r, 1.0, given.upper[r]});
+      if (f[at.lower] < given.lower[r]) open.push_back(Row{r, -1.0, -given.lower[r]});
     }
     for (int sweep = 0; sweep < SWEEPS; ++sweep) {
       const Box before = e;
       for (const Row& row : open) {
-        const double* f = form(G.row[row.row]);
+        const double* f = form(given.row[row.row]);
         double a[MOST];
         for (int j = 0; j < n; ++j) a[j] = row.sense * f[1 + j];
-        if (!e.contract(n, a, row.bound - constant_of(f, row.sense, e))) return false;
+        if (!e.contract(n, a, row.bound - bound_rest(f, row.sense, e))) return false;
       }
       double change = 0.0;
       for (int j = 0; j < n; ++j) change = most(change, (before.high[j] - before.low[j]) - (e.high[j] - e.low[j]));
@@ -154,23 +154,23 @@ class Relaxation {
   void add_column(const Quadratic& q, double most_) {
     columns.emplace_back();
     Column& column = columns.back();
-    column.form = q.moved(n, middle, radius);
+    column.form = q.rescale(n, middle, radius);
     column.most_ = most_;
     column.p = column.form.c + column.form.rest(n);
     for (int j = 0; j < n; ++j) column.q[j] = column.form.g[j];
     double up_to = column.p;
     for (int j = 0; j < n; ++j) up_to += size_of(column.q[j]);
-    if (!(up_to > 0.0)) columns.pop_back();  // holds, or adds nothing, anywhere
+    if (!(up_to > 0.0)) columns.pop_back();  // satisfied, or zero, in the whole box
   }
 
-  // |torque rate| of a known sign: its form, or its least value and a column for what the form says beyond that.
+  // |torque rate| of a known sign: its form, or its least value and a column for the rest of the form.
   void add_known(const Term& t, double slowest, const Box& e, Sums& sums, double* score) {
-    const bool above = t.power[at.lo] >= 0.0;
+    const bool above = t.power[at.lower] >= 0.0;
     const double sense = above ? t.weight : -t.weight;
-    const double at_least = t.weight * (above ? t.power[at.lo] : -t.power[at.hi]);
+    const double at_least = t.weight * (above ? t.power[at.lower] : -t.power[at.upper]);
     sums.least += at_least;
-    sums.greatest += t.weight * (above ? t.power[at.hi] : -t.power[at.lo]);
-    if (t.power[at.d] > VAGUE * (t.power[at.hi] - t.power[at.lo])) {
+    sums.greatest += t.weight * (above ? t.power[at.upper] : -t.power[at.lower]);
+    if (t.power[at.error] > VAGUE * (t.power[at.upper] - t.power[at.lower])) {
       sums.form.c += at_least, sums.form.mag += at_least;
       Quadratic q;
       q.add(n, at, sense * slowest, t.power);
@@ -179,23 +179,23 @@ class Relaxation {
     } else
       sums.form.add(n, at, sense, t.power);
     for (int j = 0; j < n; ++j) {
-      const double share = size_of(t.rate[1 + j]) / (t.rate[at.G] + TINY) + size_of(t.torque[1 + j]) / (t.torque[at.G] + TINY);
-      score[j] += ERROR_SHARE * t.weight * slowest * t.power[at.d] * share * (e.high[j] - e.low[j]);
+      const double share = size_of(t.rate[1 + j]) / (t.rate[at.slope_sum] + TINY) + size_of(t.torque[1 + j]) / (t.torque[at.slope_sum] + TINY);
+      score[j] += ERROR_SHARE * t.weight * slowest * t.power[at.error] * share * (e.high[j] - e.low[j]);
     }
   }
 
-  // |torque rate| of an unknown sign: columns of both signs, of the one that is known to have a least size times the other.
+  // |torque rate| of an unknown sign: columns of both signs for the least size of one factor times the other.
   void add_unknown(const Term& t, double slowest, const Box& e, double* score) {
-    const double turning = most(0.0, most(t.rate[at.lo], -t.rate[at.hi]));
-    const double pulling = most(0.0, most(t.torque[at.lo], -t.torque[at.hi]));
+    const double turning = most(0.0, most(t.rate[at.lower], -t.rate[at.upper]));
+    const double pulling = most(0.0, most(t.torque[at.lower], -t.torque[at.upper]));
     const double* held = turning > 0.0 ? t.torque : pulling > 0.0 ? t.rate : t.power;
     const double size = t.weight * slowest * (turning > 0.0 ? turning : pulling > 0.0 ? pulling : 1.0) * (1.0 - SLACK);
-    if (t.torque[at.d] < INFINITY && t.rate[at.d] < INFINITY)
+    if (t.torque[at.error] < INFINITY && t.rate[at.error] < INFINITY)
       for (int j = 0; j < n; ++j) {
-        const double bend = size_of(t.rate[1 + j]) * t.torque[at.G] + size_of(t.torque[1 + j]) * t.rate[at.G];
+        const double bend = size_of(t.rate[1 + j]) * t.torque[at.slope_sum] + size_of(t.torque[1 + j]) * t.rate[at.slope_sum];
         score[j] += 0.25 * t.weight * slowest * bend * (e.high[j] - e.low[j]);
       }
-    if (!(held[at.d] < INFINITY)) return;
+    if (!(held[at.error] < INFINITY)) return;
     for (double sense : {1.0, -1.0}) {
       Quadratic q;
       q.add(n, at, sense * size, held);
@@ -203,17 +203,17 @@ class Relaxation {
     }
   }
 
-  // The cost's form, and columns.
+  // Build the form and the columns of the cost.
   Quadratic cost(const Box& e, const double* box, double* score) {
     columns.clear();
-    const int T = G.duration;
+    const int T = given.duration;
     const double latest = least(box[2 * T + 1], up(centre[T] + half[T] * e.high[T] + SLACK * half[T]));
     const double first = most(box[2 * T], down(centre[T] + half[T] * e.low[T] - SLACK * half[T]));
     const double slowest = (1.0 / latest) * (1.0 - SLACK), mid = 0.5 * (latest + first);
     Sums sums;
-    for (int k = 0; k < G.terms; ++k) {
-      const Term term{form(G.power[k]), form(G.torque[k]), form(G.rate[k]), G.weight[k]};
-      const bool known = term.power[at.d] < INFINITY && (term.power[at.lo] >= 0.0 || term.power[at.hi] <= 0.0);
+    for (int k = 0; k < given.terms; ++k) {
+      const Term term{form(given.power[k]), form(given.torque[k]), form(given.rate[k]), given.weight[k]};
+      const bool known = term.power[at.error] < INFINITY && (term.power[at.lower] >= 0.0 || term.power[at.upper] <= 0.0);
       if (known) add_known(term, slowest, e, sums, score);
       else add_unknown(term, slowest, e, score);
     }
@@ -226,11 +226,11 @@ class Relaxation {
     total.add(n, surely, u);
     score[T] += (1.0 / first - 1.0 / latest) * (sums.greatest - surely) * 0.25;
     double heat = 0.0;
-    for (int k = 0; k < G.heats; ++k) {
-      const double *f = form(G.heat[k]), least_ = most(0.0, f[at.lo]);
-      heat += G.loss[k] * least_;
-      if (f[at.d] < VAGUE * (f[at.hi] - f[at.lo])) total.add(n, at, G.loss[k], f);
-      else total.c += G.loss[k] * least_, total.mag += G.loss[k] * least_;
+    for (int k = 0; k < given.heats; ++k) {
+      const double *f = form(given.heat[k]), least_ = most(0.0, f[at.lower]);
+      heat += given.loss[k] * least_;
+      if (f[at.error] < VAGUE * (f[at.upper] - f[at.lower])) total.add(n, at, given.loss[k], f);
+      else total.c += given.loss[k] * least_, total.mag += given.loss[k] * least_;
     }
     lowest = most(lowest, (slowest * surely + heat) * (1.0 - SLACK));
     return total;
@@ -239,14 +239,14 @@ class Relaxation {
   void add_rows() {
     for (const Row& row : open) {
       Quadratic q;
-      q.add(n, at, row.sense, form(G.row[row.row]));
+      q.add(n, at, row.sense, form(given.row[row.row]));
       q.c -= row.bound;
       q.mag += size_of(row.bound);
       add_column(q, INFINITY);
     }
   }
 
-  // Columns from their values and slopes at a point: for the multipliers, not for the bound.
+  // Linearise the columns at a point, for the multipliers only.
   void touch_columns(const double* point) {
     for (Column& column : columns) {
       column.form.slope(n, point, column.q);
@@ -255,8 +255,8 @@ class Relaxation {
     }
   }
 
-  // The cost's bound and the box that it leaves; false if nothing is.
-  bool bounded(Box& e, const double* box, double target, double* score) {
+  // Bound the cost and cut the box by it; false if nothing is left.
+  bool bound_cost(Box& e, const double* box, double target, double* score) {
     lowest = -INFINITY;
     double convexity[MOST] = {};
     for (int round = 0; round < ROUNDS; ++round) {
@@ -265,7 +265,7 @@ class Relaxation {
         radius[i] = most(e.high[i] - middle[i], middle[i] - e.low[i]) * (1.0 + SLACK) + SLACK;
         score[i] = 0.0;
       }
-      const Quadratic whole = cost(e, box, score).moved(n, middle, radius);
+      const Quadratic whole = cost(e, box, score).rescale(n, middle, radius);
       add_rows();
       double point[MOST] = {};
       Box within;
@@ -308,7 +308,7 @@ class Relaxation {
     for (int i = 0; i < n; ++i) {
       score[i] += convexity[i];
       gap += score[i];
-      wide[i] = half[i] * (e.high[i] - e.low[i]) / G.ranges[i];
+      wide[i] = half[i] * (e.high[i] - e.low[i]) / given.ranges[i];
       width = most(width, wide[i]);
     }
     for (int i = 0; i < n; ++i) score[i] = (gap > 0.0 && gap < INFINITY ? score[i] / gap : 0.0) + WIDTH_SHARE * wide[i] / width;
