@@ -1,7 +1,7 @@
-"""One instant of NAO's single or double support for narrow bounds: torques, rates and ZMP of a motion in unit time.
+"""One instant of NAO's single or double support, for narrow bounds: torques, rates and ZMP of a motion in unit time.
 
-At a given phase the upper body's pose is made of numbers, so that what it asks for is linear in the hip's acceleration; legs are
-summed link by link in the world. Equal to the recursion's torques up to rounding.
+At a given phase the upper body's pose consists of numbers, so that its wrench is linear in the hip's acceleration; legs are
+summed link by link in the world. The torques equal those of the recursion up to rounding.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.double_support import Division, Point2, support_box, t
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.gaits.nao.body import ARM_JOINTS, GRAVITY, arm_joints
 from nlp_gait.gaits.nao.least_power.world_frame import (
-    PartedWrench,
+    SplitWrench,
     chain_frames,
     leg_frames,
     leg_rates,
@@ -42,6 +42,7 @@ class PowerInstant:
     """One sample.
 
     Attributes:
+        rate_squared: 1 / T^2 for the time T.
         torques: by joint, in the time T.
         rates: of the joints that turn, in unit time.
         zmp: (2,) [m].
@@ -56,8 +57,8 @@ class PowerInstant:
     reaches: dict[str, SX] = field(default_factory=dict)
     sideways: dict[str, tuple[SX, SX]] = field(default_factory=dict)
 
-    def torque(self, name: str, axis: SX | DM, carried: PartedWrench, direction: int) -> None:
-        """About a joint, of what it carries, about a point of its axis."""
+    def add_torque(self, name: str, axis: SX | DM, carried: SplitWrench, direction: int) -> None:
+        """Add the torque of a joint from the wrench that it carries, about a point of its axis."""
         gravity, inertia = (ca.dot(axis, part.moment) for part in carried)
         self.torques[name] = direction * (gravity + self.rate_squared * inertia)
 
@@ -66,8 +67,8 @@ class PowerPhase(NamedTuple):
     """A phase.
 
     Attributes:
-        instant: one sample of z at a phase.
-        sides: of the rectangle in which the ZMP has to be, in x and in y [m].
+        instant: makes the sample of z at a phase.
+        sides: of the rectangle that must contain the ZMP, in x and in y [m].
         margins: balance margins from the ZMP, by axis [m].
     """
 
@@ -76,18 +77,17 @@ class PowerPhase(NamedTuple):
     margins: Mapping[str, Callable[[SX], SX]]
 
 
-def _to_nearer(low: float, high: float) -> Callable[[SX], SX]:
-    """Distance to the nearer of two sides."""
+def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
+    """Return the distance to the nearer of two sides."""
     return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
 
 
-def _to_side_of_ankle(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
-    """Distance to the side that is on the same side of the ankle; see ``single_support.single_support_margins``."""
+def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
+    """Return the distance to the side beyond the ankle, see ``single_support.single_support_margins``."""
     return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
 
 
 def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
-    """Motion of the torso's origin in unit time."""
     s = SX(phase)
     up = cubic_of_sums(z[0], z[0], z[1], z[2], s)
     return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
@@ -101,7 +101,7 @@ def double_support_phase(
     rule: Division,
     cosine: float,
 ) -> PowerPhase:
-    """Each leg on its own foot.
+    """Return double support: each leg stands on its own foot.
 
     Args:
         robot: of the phase.
@@ -124,9 +124,9 @@ def double_support_phase(
         torso = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
         moments, loads = [], []
         for side, foot in (("L", robot.feet["left"]), ("R", robot.feet["right"])):
-            upper = _arms(robot, side, arms, hip.acceleration, found).plus(torso.times(shares[side]))
+            upper = _add_arm(robot, side, arms, hip.acceleration, found).plus(torso.times(shares[side]))
             ankle = Motion(ankles[side], SX(3, 1), SX(3, 1))
-            ground = _stance(robot, side, hip, ankle, upper, cosine, found).in_time(found.rate_squared)
+            ground = _add_stance_leg(robot, side, hip, ankle, upper, cosine, found).in_time(found.rate_squared)
             load = ground_load(ground, weight)
             moments.append(ankles[side][:2] * load + _tilt(ground, foot.ankle_height_m))
             loads.append(load)
@@ -135,7 +135,7 @@ def double_support_phase(
 
     box = support_box(robot, soles)
     sides = ((box.back, box.front), (box.right, box.left))
-    return PowerPhase(instant, sides, {axis: _to_nearer(*pair) for axis, pair in zip("xy", sides, strict=True)})
+    return PowerPhase(instant, sides, {axis: _nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)})
 
 
 def single_support_phase(
@@ -148,7 +148,7 @@ def single_support_phase(
     arm_swing: Mapping[str, Point2],
     cosine: float,
 ) -> PowerPhase:
-    """The left leg carries everything.
+    """Return single support: the left leg carries everything.
 
     Args:
         robot: of the phase.
@@ -171,28 +171,28 @@ def single_support_phase(
         path = swing_foot(begin, end, swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
         upper = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
         for side in "LR":
-            upper = upper.plus(_arms(robot, side, arms, hip.acceleration, found))
-        upper = upper.plus(_swing(robot, "R", hip, path, cosine, found))
+            upper = upper.plus(_add_arm(robot, side, arms, hip.acceleration, found))
+        upper = upper.plus(_add_swing_leg(robot, "R", hip, path, cosine, found))
         ankle = Motion(support, SX(3, 1), SX(3, 1))
-        ground = _stance(robot, "L", hip, ankle, upper, cosine, found).in_time(found.rate_squared)
+        ground = _add_stance_leg(robot, "L", hip, ankle, upper, cosine, found).in_time(found.rate_squared)
         found.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
         return found
 
     x, y = support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))
-    return PowerPhase(instant, sides, {"x": _to_side_of_ankle(x, *sides[0]), "y": _to_nearer(*sides[1])})
+    return PowerPhase(instant, sides, {"x": _ankle_side_margin(x, *sides[0]), "y": _nearer_margin(*sides[1])})
 
 
 def _tilt(ground: Wrench, height: float) -> SX:
-    """(2,) the ZMP's offset from a foot times its load [Nm], see ``balance.zmp_of_wrench``."""
+    """Return (2,) the ZMP's offset from a foot times its load [Nm], see ``balance.zmp_of_wrench``."""
     (fx, fy, _), (nx, ny, _) = ca.vertsplit(ground.force), ca.vertsplit(ground.moment)
     return ca.vertcat(-(ny + height * fx), nx - height * fy)
 
 
-def _arms(robot: Robot, side: str, arms: Mapping[str, Motion], acceleration: SX, found: PowerInstant) -> PartedWrench:
-    """Torques of an arm, and its wrench about the torso's origin.
+def _add_arm(robot: Robot, side: str, arms: Mapping[str, Motion], acceleration: SX, found: PowerInstant) -> SplitWrench:
+    """Add the torques of an arm; returns its wrench about the torso's origin.
 
-    At one phase the arm's pose is made of numbers, so that all is linear in the torso's acceleration.
+    At one phase the arm's pose consists of numbers, so that everything is linear in the torso's acceleration.
     """
     joints, a = [f"{side}{name}" for name in ARM_JOINTS], SX.sym("a", 3)
     base = Motion(SX(3, 1), SX(3, 1), a)
@@ -203,17 +203,17 @@ def _arms(robot: Robot, side: str, arms: Mapping[str, Motion], acceleration: SX,
     both, all_both = world_frame_dynamics(tree, frames, {}, GRAVITY, without_torso)
     parts = ([moved[name] for name in joints], all_moved), ([both[name] for name in joints], all_both)
     columns = ca.horzcat(*(ca.vertcat(*torques, *wrench) for torques, wrench in parts))
-    still, moving = (_linear(part, a, acceleration) for part in (columns[:, 1] - columns[:, 0], columns[:, 0]))
+    still, moving = (_evaluate_linear(part, a, acceleration) for part in (columns[:, 1] - columns[:, 0], columns[:, 0]))
     for i, name in enumerate(joints):
         found.torques[name] = still[i] + found.rate_squared * moving[i]
         if not arms[name].velocity.is_zero():
             found.rates[name] = arms[name].velocity
     n = len(joints)
-    return PartedWrench(*(Wrench(part[n : n + 3], part[n + 3 :]) for part in (still, moving)))
+    return SplitWrench(*(Wrench(part[n : n + 3], part[n + 3 :]) for part in (still, moving)))
 
 
-def _linear(expression: SX, symbol: SX, value: SX) -> SX:
-    """An expression that is linear in a symbol, at a value: with one number in place of each coefficient."""
+def _evaluate_linear(expression: SX, symbol: SX, value: SX) -> SX:
+    """Return a linear expression at a value of its symbol, with numbers as coefficients."""
     slopes = ca.jacobian(expression, symbol)
     at_zero = ca.substitute(expression, symbol, SX.zeros(*symbol.shape))
     constant, slope = ca.Function("coefficients", [], [at_zero, slopes]).call([])
@@ -221,23 +221,23 @@ def _linear(expression: SX, symbol: SX, value: SX) -> SX:
 
 
 class LegParts(NamedTuple):
-    """A leg's links by what they ask for, and where its joints are.
+    """Wrenches of a leg's links, and positions of its joints.
 
     Attributes:
-        links: wrenches of pelvis about the hip's yaw-pitch joint, hip link and thigh about the hip, tibia, link above the sole
-            and sole about the ankle: no wrench needs the knee, which is known worst, where the leg is almost straight.
+        links: of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the
+            sole and sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight.
         joints: (3,) hip, knee and ankle [m].
         yaw: (3,) the hip's yaw-pitch joint [m].
         across: (3,) axis of the pitching joints.
     """
 
-    links: tuple[PartedWrench, ...]
+    links: tuple[SplitWrench, ...]
     joints: tuple[SX, SX, SX]
     yaw: SX
     across: SX
 
 
-def _leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant) -> LegParts:
+def _split_leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant) -> LegParts:
     geometry, yaw = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
     at_hip = add_motions(hip, resting_point(geometry.hip_m))
     frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, cosine)
@@ -261,42 +261,44 @@ def _leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, fou
     return LegParts(tuple(wrenches), joints, hip.position + DM(yaw.origin_m), frames.hip.axes.position[:, 1])
 
 
-def _stance(
-    robot: Robot, side: str, hip: Motion, ankle: Motion, upper: PartedWrench, cosine: float, found: PowerInstant
-) -> PartedWrench:
-    """Torques of a leg that carries ``upper``, which is about the torso's origin; the ground's wrench about its ankle."""
-    leg = _leg(robot, side, hip, ankle, cosine, found)
+def _add_stance_leg(
+    robot: Robot, side: str, hip: Motion, ankle: Motion, upper: SplitWrench, cosine: float, found: PowerInstant
+) -> SplitWrench:
+    """Add the torques of a leg that carries ``upper`` (about the torso's origin); returns the ground's wrench about its ankle."""
+    leg = _split_leg(robot, side, hip, ankle, cosine, found)
     at_hip, at_knee, at_ankle = leg.joints
     pelvis, hip_link, thigh, tibia, above, sole = leg.links
     carried = upper.about(hip.position - leg.yaw)
-    found.torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, -1)
+    found.add_torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, -1)
     carried = carried.plus(pelvis).about(leg.yaw - at_hip)
-    found.torque(f"{side}HipRoll", FORWARD, carried, -1)
+    found.add_torque(f"{side}HipRoll", FORWARD, carried, -1)
     carried = carried.plus(hip_link)
-    found.torque(f"{side}HipPitch", leg.across, carried, -1)
+    found.add_torque(f"{side}HipPitch", leg.across, carried, -1)
     carried = carried.plus(thigh)
-    found.torque(f"{side}KneePitch", leg.across, carried.about(at_hip - at_knee), -1)
+    found.add_torque(f"{side}KneePitch", leg.across, carried.about(at_hip - at_knee), -1)
     carried = carried.about(at_hip - at_ankle).plus(tibia)
-    found.torque(f"{side}AnklePitch", leg.across, carried, -1)
+    found.add_torque(f"{side}AnklePitch", leg.across, carried, -1)
     carried = carried.plus(above)
-    found.torque(f"{side}AnkleRoll", FORWARD, carried, -1)
+    found.add_torque(f"{side}AnkleRoll", FORWARD, carried, -1)
     return carried.plus(sole)
 
 
-def _swing(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant) -> PartedWrench:
-    """Torques of a leg that hangs; its wrench about the torso's origin."""
-    leg = _leg(robot, side, hip, ankle, cosine, found)
+def _add_swing_leg(
+    robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant
+) -> SplitWrench:
+    """Add the torques of a hanging leg; returns its wrench about the torso's origin."""
+    leg = _split_leg(robot, side, hip, ankle, cosine, found)
     at_hip, at_knee, at_ankle = leg.joints
     pelvis, hip_link, thigh, tibia, above, carried = leg.links
-    found.torque(f"{side}AnkleRoll", FORWARD, carried, 1)
+    found.add_torque(f"{side}AnkleRoll", FORWARD, carried, 1)
     carried = carried.plus(above)
-    found.torque(f"{side}AnklePitch", leg.across, carried, 1)
+    found.add_torque(f"{side}AnklePitch", leg.across, carried, 1)
     carried = carried.plus(tibia)
-    found.torque(f"{side}KneePitch", leg.across, carried.about(at_ankle - at_knee), 1)
+    found.add_torque(f"{side}KneePitch", leg.across, carried.about(at_ankle - at_knee), 1)
     carried = carried.about(at_ankle - at_hip).plus(thigh)
-    found.torque(f"{side}HipPitch", leg.across, carried, 1)
+    found.add_torque(f"{side}HipPitch", leg.across, carried, 1)
     carried = carried.plus(hip_link)
-    found.torque(f"{side}HipRoll", FORWARD, carried, 1)
+    found.add_torque(f"{side}HipRoll", FORWARD, carried, 1)
     carried = carried.about(at_hip - leg.yaw).plus(pelvis)
-    found.torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, 1)
+    found.add_torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, 1)
     return carried.about(leg.yaw - hip.position)

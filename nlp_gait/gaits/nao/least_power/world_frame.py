@@ -1,8 +1,8 @@
-"""Inverse dynamics of an upright biped in world coordinates: the same torques as the recursion, from far fewer nested turns.
+"""Inverse dynamics of an upright biped in world coordinates: the torques of the recursion, with narrow bounds over boxes.
 
-Axes and centres of all links are functions of where hips and ankles are, and moments are sums of arms times forces. The
-recursion carries forces through one joint after the other; over a box of gaits that multiplies what is unknown, and bounds of
-torques are many times wider. Here the knee follows from the squared distance of hip and ankle, without an angle.
+Axes and centres of all links are functions of the positions of hips and ankles, and moments are sums of arms times forces. The
+recursion passes forces from joint to joint, which multiplies errors over a box. Here the knee follows from the squared distance
+of hip and ankle, without an angle.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
 class Frame(NamedTuple):
-    """A link's axes and a point of it, in the world.
+    """Pose of a link in the world.
 
     Attributes:
         axes: (3, 3) motion of the rotation from link axes to world axes.
-        origin: (3,) motion of the origin of the link's own frame [m].
+        origin: (3,) motion of the origin of the link's frame [m].
     """
 
     axes: Motion
@@ -35,7 +35,7 @@ class Frame(NamedTuple):
 
 
 class LegFrames(NamedTuple):
-    """Links of a leg under an upright pelvis and over a flat sole: rolled ones at hip and ankle, thigh and tibia."""
+    """Frames of a leg under an upright pelvis and over a flat sole: rolled links at hip and ankle, thigh and tibia."""
 
     hip: Frame
     thigh: Frame
@@ -44,15 +44,15 @@ class LegFrames(NamedTuple):
 
 
 def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_cosine: float = 1.0) -> LegFrames:
-    """Frames of a leg's links from its hip joint and its ankle.
+    """Return the frames of a leg's links for the motions of its hip joint and its ankle.
 
     Args:
         hip: (3,) motion of the hip joint [m].
         ankle: (3,) of the ankle [m].
         thigh: hip to knee [m].
         tibia: knee to ankle [m].
-        largest_cosine: of the knee's angle. A distance beyond is taken as the one there, so that nothing is undefined; what
-            comes out is then right for no gait.
+        largest_cosine: of the knee's angle. Larger distances are replaced by the one at this angle, so that nothing is
+            undefined; the result is then wrong.
 
     Source:
         The pose of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); this form is the package's own.
@@ -60,7 +60,7 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
     farthest = thigh**2 + tibia**2 + 2 * thigh * tibia * largest_cosine
 
     def columns(v: SX) -> SX:
-        """Rolled axes, axes of thigh and tibia, and the knee from the hip, side by side (3, 10)."""
+        """Return the rolled axes, the axes of thigh and tibia, and the knee from the hip, side by side (3, 10)."""
         x, y, z = ca.vertsplit(v)
         length_squared = y * y + z * z
         length = ca.sqrt(length_squared)
@@ -70,8 +70,8 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
         along = 0.5 + (thigh**2 - tibia**2) / 2 * inverse
         across = thigh * tibia * ca.sqrt(1 - cosine * cosine) * inverse
         out, down = along * x + across * length, along * length - across * x  # of the knee from the hip
-        upper = _pitched(-out / thigh, down / thigh, forward, left, upward)
-        lower = _pitched((out - x) / tibia, (length - down) / tibia, forward, left, upward)
+        upper = _pitch(-out / thigh, down / thigh, forward, left, upward)
+        lower = _pitch((out - x) / tibia, (length - down) / tibia, forward, left, upward)
         return ca.horzcat(forward, left, upward, upper, lower, out * forward - down * upward)
 
     moved = map_motion(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
@@ -80,13 +80,13 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
     return LegFrames(Frame(rolled, hip), Frame(upper, hip), Frame(lower, knee), Frame(rolled, ankle))
 
 
-def _pitched(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
-    """(3, 3) axes turned about the second one."""
+def _pitch(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
+    """Return (3, 3) axes turned about the second one."""
     return ca.horzcat(cosine * forward - sine * upward, left, sine * forward + cosine * upward)
 
 
 def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
-    """Frames of the links of a chain on a link that does not turn.
+    """Return the frames of the links of a chain on a link that does not turn.
 
     Args:
         joints: of the chain, from the base outwards.
@@ -114,7 +114,7 @@ def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Mo
 
 
 def upright(origin: Motion) -> Frame:
-    """Frame of a link that does not turn."""
+    """Return the frame of a link that does not turn."""
     return Frame(Motion(SX.eye(3), SX(3, 3), SX(3, 3)), origin)
 
 
@@ -125,7 +125,7 @@ def world_frame_dynamics(
     gravity: float,
     shares: Mapping[str, SX] | None = None,
 ) -> tuple[dict[str, SX], Wrench]:
-    """Joint torques of a tree whose first body stands still, as ``dynamics.newton_euler`` gives them.
+    """Compute the joint torques of a tree whose first body stands still, equal to those of ``dynamics.newton_euler``.
 
     Args:
         tree: bodies, parents first.
@@ -141,7 +141,7 @@ def world_frame_dynamics(
         Gupta, Pratihar, Deb (2023), eqs. (15)-(18): a joint's moment is the sum over the links that it carries.
     """
     shares = shares or {}
-    below = _carried(tree)
+    below = _find_carried(tree)
     centres, forces, spins = [], [], []
     for body in tree:
         frame, share = frames[body.link.name], shares.get(body.link.name, 1.0)
@@ -149,7 +149,7 @@ def world_frame_dynamics(
         centres.append(frame.origin.position + frame.axes.position @ com)
         acceleration = frame.origin.acceleration + frame.axes.acceleration @ com + SX(DM([0, 0, gravity]))
         forces.append(share * mass * acceleration)
-        spins.append(share * _spin(frame.axes, body.link.inertia_matrix))
+        spins.append(share * _spin_rate(frame.axes, body.link.inertia_matrix))
     references = [_reference(body, frames) for body in tree]
     torques: dict[str, SX] = {}
     for i, body in enumerate(tree):
@@ -166,34 +166,34 @@ def world_frame_dynamics(
     return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
 
 
-class PartedWrench(NamedTuple):
-    """Wrench that a moving body asks for: what gravity asks for, and what its motion in unit time does.
+class SplitWrench(NamedTuple):
+    """Wrench that moves a body, about one point: of gravity, and of its motion in unit time.
 
-    In a time T, the second part counts 1 / T^2 as much. Both are about one point.
+    In a time T, the second one is divided by T^2.
     """
 
     gravity: Wrench
     inertia: Wrench
 
-    def plus(self, other: PartedWrench) -> PartedWrench:
-        """Sum of two about one point."""
-        return PartedWrench(*(Wrench(a.force + b.force, a.moment + b.moment) for a, b in zip(self, other, strict=True)))
+    def plus(self, other: SplitWrench) -> SplitWrench:
+        """Return the sum of two about one point."""
+        return SplitWrench(*(Wrench(a.force + b.force, a.moment + b.moment) for a, b in zip(self, other, strict=True)))
 
-    def times(self, share: SX) -> PartedWrench:
-        """A share of it."""
-        return PartedWrench(*(Wrench(share * part.force, share * part.moment) for part in self))
+    def times(self, share: SX) -> SplitWrench:
+        """Return a share of it."""
+        return SplitWrench(*(Wrench(share * part.force, share * part.moment) for part in self))
 
-    def about(self, arm: SX) -> PartedWrench:
-        """The same about another point, from which ``arm`` (3,) leads to its own [m]."""
-        return PartedWrench(*(Wrench(part.force, part.moment + ca.cross(arm, part.force)) for part in self))
+    def about(self, arm: SX) -> SplitWrench:
+        """Return the wrench about another point, from which ``arm`` (3,) leads to this one's [m]."""
+        return SplitWrench(*(Wrench(part.force, part.moment + ca.cross(arm, part.force)) for part in self))
 
     def in_time(self, rate_squared: SX) -> Wrench:
-        """The whole wrench, of a motion 1 / sqrt(rate_squared) as long as unit time."""
+        """Return the total wrench of a motion that takes 1 / sqrt(rate_squared)."""
         return Wrench(*(g + rate_squared * i for g, i in zip(*self, strict=True)))
 
 
-def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> PartedWrench:
-    """Wrench that a link asks for, about the origin of its frame.
+def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> SplitWrench:
+    """Return the wrench that moves a link, about the origin of its frame.
 
     Args:
         link: its mass and inertia.
@@ -210,18 +210,18 @@ def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> P
     force = mass * acceleration + axes.acceleration @ DM(mass * com)
     moment = sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), ca.cross(arm, acceleration))
     weight = Wrench(SX(DM([0, 0, mass * gravity])), ca.vertcat(gravity * arm[1], -gravity * arm[0], 0))
-    return PartedWrench(weight, Wrench(force, moment))
+    return SplitWrench(weight, Wrench(force, moment))
 
 
 class LegRates(NamedTuple):
-    """Rates of a leg's joints from the hip downwards, and the squared distance of hip and ankle [m^2]."""
+    """Rates of a leg's joints from the hip down, and the squared distance of hip and ankle [m^2]."""
 
     joints: tuple[SX, SX, SX, SX, SX]
     distance_squared: SX
 
 
 def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> LegRates:
-    """Rates of roll, pitch, knee, ankle pitch and ankle roll, without their angles.
+    """Compute the rates of roll, pitch, knee, ankle pitch and ankle roll, without their angles.
 
     Args:
         hip_to_ankle: (3,) motion of the ankle seen from the hip joint [m].
@@ -241,12 +241,12 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     cosine = knee_cosine(bent, thigh, tibia)
     knee = -(x * xd + y * yd + z * zd) / (thigh * tibia) / ca.sqrt(1 - cosine * cosine)
     roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
-    turn, excess = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
-    return LegRates((roll, turn - (0.5 - excess) * knee, knee, -turn - (0.5 + excess) * knee, -roll), distance_squared)
+    turn, offset = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
+    return LegRates((roll, turn - (0.5 - offset) * knee, knee, -turn - (0.5 + offset) * knee, -roll), distance_squared)
 
 
-def _carried(tree: Sequence[Body]) -> list[list[int]]:
-    """Bodies that each body carries, itself included."""
+def _find_carried(tree: Sequence[Body]) -> list[list[int]]:
+    """Return the bodies that each body carries, itself included."""
     found: list[list[int]] = [[] for _ in tree]
     for k in range(len(tree)):
         at = k
@@ -257,14 +257,14 @@ def _carried(tree: Sequence[Body]) -> list[list[int]]:
 
 
 def _reference(body: Body, frames: Mapping[str, Frame]) -> SX:
-    """(3,) joint through which a body is reached: as far from its centre of mass as the tree says [m]."""
+    """Return (3,) the joint through which the tree reaches a body [m]."""
     frame = frames[body.link.name]
     offset = np.array(body.link.com_m) - np.array(body.com_offset_m)
     return frame.origin.position + frame.axes.position @ DM(offset)
 
 
-def _spin(axes: Motion, inertia: Any) -> SX:
-    """(3,) rate of a link's angular momentum about its centre of mass: sum of r x r'' over its matter [Nm]."""
+def _spin_rate(axes: Motion, inertia: Any) -> SX:
+    """Return (3,) the rate of a link's angular momentum about its centre of mass: sum of r x r'' over its matter [Nm]."""
     second = np.trace(inertia) / 2 * np.eye(3) - inertia
     bent = axes.acceleration @ DM(second)
     return sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), SX(3, 1))
