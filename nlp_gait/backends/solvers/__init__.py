@@ -1,1 +1,1 @@
-"""The lifted NLP given to IPOPT and to the other solvers of the CasADi wheel."""
+"""IPOPT and other NLP solvers."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -13,19 +15,28 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.solvers.derivatives import compilation_pays, get_derivatives
-from nlp_gait.backends.solvers.ipopt_installation import LINEAR_SOLVERS, QUIET, linear_solver
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.solvers.stages import StagedSolver
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.files import temporary_folder
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.interrupts import defer_interrupts, never
 
 LOG = logging.getLogger("nlp_gait")
 
+# Options of every IPOPT here: it prints nothing, and ignores an ``ipopt.opt`` in the working folder.
+QUIET: Mapping[str, Any] = {
+    "print_time": False,
+    "show_eval_warnings": False,  # the status says that a function returned NaN
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.option_file_name": "",
+}
+# Linear solvers that IPOPT knows; all but the last two load a library that the user must have.
+LINEAR_SOLVERS = ("ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "mumps", "spral")
 STATUS_WORDS = {
     "Solve_Succeeded": "converged",
     "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
@@ -43,6 +54,9 @@ PIVOT_ORDER = 2
 # Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
 # Over the 50 points of nao-ssp's swing heights 1e-5 takes 574 iterations, 1e-8 takes 138; over its durations 584 and 332.
 WARM_BARRIER = 1e-8
+# Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
+# against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.
+WORTHWHILE_SIZE = 1500
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,14 +65,14 @@ class IpoptSettings(Solver):
 
     Attributes:
         tolerance: IPOPT's ``tol``.
-        iterations: limit of iterations for each stage, and in the first for each set of rows.
+        iterations: limit of iterations for each stage, in the first stage for each set of rows.
         time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
         hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
-        compiled: compile the NLP's functions and derivatives; None does where the number of solves pays for it and there
+        compiled: whether the NLP's functions and derivatives are compiled; None if that pays for the number of solves and there
             is a compiler.
-        linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is refused: IPOPT
-            never takes another one in its place.
-        few_rows: begin with the rows that matter, see ``working_set``; False for all of them from the start.
+        linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never
+            replaced by another one.
+        few_rows: begin with the rows that matter, see ``working_set``; False begins with all rows.
     """
 
     name: ClassVar[str] = "ipopt"
@@ -72,7 +86,6 @@ class IpoptSettings(Solver):
     few_rows: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what IPOPT would refuse late."""
         if not 0.0 < self.tolerance < 1.0:
             raise InputError(f"tolerance must be within (0, 1), got {self.tolerance}")
         if self.iterations < 1 or not self.time_limit_s > 0.0:
@@ -86,18 +99,21 @@ class IpoptSettings(Solver):
 
     def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
         """See ``Solver``."""
-        compiled = compilation_pays(problem, solves) if self.compiled is None else self.compiled
+        # The cache folder has no influence: compiled and interpreted functions differ in the last bits, and the same call must
+        # give the same result.
+        pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
+        compiled = pays if self.compiled is None else self.compiled
         return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled)
 
     def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
-        """IPOPT for a problem, made once for all its copies.
+        """Return IPOPT for a problem, built once for all its copies.
 
         Args:
             problem: any copy.
-            solves: how many are planned, which decides whether compiling pays if the settings leave it open.
+            solves: planned number of solves, which decides whether compilation pays if the settings do not.
 
         Raises:
-            CompilerError: compiled functions are demanded, and there is no compiler or it fails.
+            CompilerError: compiled functions are required, and there is no compiler or it fails.
         """
         chosen = self.choose_settings(problem, solves)
         try:
@@ -118,7 +134,7 @@ class IpoptSettings(Solver):
 
 
 class Ipopt(StagedSolver):
-    """IPOPT made for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only."""
+    """IPOPT for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only."""
 
     name: ClassVar[str] = IpoptSettings.name
     words = STATUS_WORDS
@@ -127,14 +143,14 @@ class Ipopt(StagedSolver):
     def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
         self.model = model = build_nlp(problem)
         started = time.perf_counter()
-        self.linear_solver = linear_solver(settings.linear_solver)
+        self.linear_solver = find_linear_solver(settings.linear_solver)
         self.time_limit_s = settings.time_limit_s
         self.watch = IterationWatch(model.nlp)
         general: dict[str, Any] = {
             **QUIET,
             "ipopt.mu_strategy": "adaptive",
             "ipopt.tol": settings.tolerance,
-            "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits by what IPOPT relaxes them
+            "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits
             "ipopt.max_iter": settings.iterations,
             "ipopt.max_wall_time": settings.time_limit_s,
             "ipopt.hessian_approximation": settings.hessian,
@@ -148,10 +164,14 @@ class Ipopt(StagedSolver):
             at = np.append(problem.p, model.widths[0])
             self._native = CompiledNlp(model.nlp, at, second=settings.hessian == "exact")
             nlp, options = self._native.nlp, options | self._native.options
-        self._of_ipopt = ca.nlpsol("cold", "ipopt", nlp, options)
+        self._all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
         warm_options: dict[str, Any] = {
             **options,
-            **get_derivatives(self._of_ipopt),
+            **{
+                option: self._all_rows.get_function(name)
+                for option, name in DERIVATIVES.items()
+                if self._all_rows.has_function(name)
+            },
             "ipopt.mu_strategy": "monotone",
             "ipopt.mu_init": WARM_BARRIER,
             "ipopt.warm_start_init_point": "yes",
@@ -161,31 +181,64 @@ class Ipopt(StagedSolver):
         }
         self.warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
         few = settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS
-        self.cold = self._on_few_rows(problem, general) if few else self._of_ipopt
+        self.cold = self._make_working_set(problem, general) if few else self._all_rows
         self.create_s = time.perf_counter() - started
 
-    def _on_few_rows(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:
-        """A first stage that begins with few rows: what ties lifted variables, equations, and what one run shows to matter.
+    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:
+        """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows that one run needs.
 
-        That run is by the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
+        That run uses the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
         """
         model = self.model
         usual = problem.with_values(**{parameter.name: parameter.default for parameter in problem.parameters})
         bounds, width = model.bounds(usual), model.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
-        cold = WorkingSet(model.nlp, self.functions(), options, self._of_ipopt, self.watch, always)
+        cold = WorkingSet(model.nlp, self.functions(), options, self._all_rows, self.watch, always)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
-        with defer_interrupts() as asked:
-            self.watch.begin(asked, time.perf_counter() + self.time_limit_s)
+        with defer_interrupts() as pressed:
+            self.watch.begin(pressed, time.perf_counter() + self.time_limit_s)
             cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
-        if asked():
+        if pressed():
             raise KeyboardInterrupt
         return cold
 
     def functions(self) -> dict[str, ca.Function]:
-        """Functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""
+        """Return the functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""
         if self._native is not None:
             return dict(self._native.functions)
         names = (*VALUES, *DERIVATIVES.values())
-        return {name: self._of_ipopt.get_function(name) for name in names if self._of_ipopt.has_function(name)}
+        return {name: self._all_rows.get_function(name) for name in names if self._all_rows.has_function(name)}
+
+
+@cache
+def find_linear_solver(wanted: str | None = None) -> str:
+    """Return the linear solver that IPOPT uses in this installation, read from its log.
+
+    Args:
+        wanted: one of ``LINEAR_SOLVERS``; None for IPOPT's default.
+
+    Raises:
+        InputError: the wanted one does not run here.
+        OutputError: there is no disk space for the log.
+    """
+    x = ca.MX.sym("x")
+    with temporary_folder("nlp-gait-ipopt-") as folder:
+        log = folder / "ipopt.log"
+        options: dict[str, Any] = {
+            **QUIET,
+            "ipopt.output_file": str(log),
+            "ipopt.file_print_level": 5,
+            **({} if wanted is None else {"ipopt.linear_solver": wanted}),
+        }
+        probe = ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)
+        probe(x0=1.0)
+        found = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")
+    used = found.group(1) if found else "unknown"
+    status = str(probe.stats()["return_status"])
+    if wanted is not None and (status != "Solve_Succeeded" or used.lower() != wanted):
+        raise InputError(
+            f"IPOPT's linear solver {wanted!r} does not run in this installation ({status.replace('_', ' ').lower()}; its "
+            f"library may be missing); leave linear_solver out for {find_linear_solver()}"
+        )
+    return used

@@ -39,9 +39,9 @@ sys.exit(0 if abs(float(result["x"][0]) - 0.5) < 1e-4 else "wrong optimum")
 
 @cache
 def probe(name: str) -> str | None:
-    """Why a solver does not run in this installation, or None if it does.
+    """Return why a solver does not run in this installation, or None if it does.
 
-    It is tried in a process of its own on a small problem: a solver may be listed and still fail to load, or crash.
+    It solves a small problem in a separate process: a solver may be listed and still fail to load, or crash.
     """
     try:
         done = subprocess.run(
@@ -52,20 +52,20 @@ def probe(name: str) -> str | None:
             timeout=PROBE_TIME_LIMIT_S,
         )
     except subprocess.TimeoutExpired:
-        return f"it does not end within {PROBE_TIME_LIMIT_S:g} s"
+        return f"it does not return within {PROBE_TIME_LIMIT_S:g} s"
     if done.returncode == 0:
         return None
-    said = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-    return said[-1] if said else f"it ends with status {done.returncode}"
+    messages = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+    return messages[-1] if messages else f"it exits with status {done.returncode}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class CasadiSolver(Solver):
-    """A solver of the wheel with its own default settings, in IPOPT's stages of sigmoid width, each started from x alone.
+    """A solver of the wheel with its default settings, in IPOPT's stages of sigmoid width, each started from x alone.
 
     Attributes:
         quiet: options that keep it from printing.
-        watched: it asks between iterations whether to end, at a time limit or on Ctrl-C.
+        watched: whether it can be ended between iterations, at a time limit or on Ctrl-C.
     """
 
     quiet: ClassVar[Mapping[str, Any]]
@@ -96,10 +96,10 @@ class CasadiSolver(Solver):
         iterations, evaluations, stats = 0, Evaluations(), {}
         started = time.perf_counter()
         alone = stop is never and self.watched
-        with defer_interrupts() if alone else contextlib.nullcontext(stop) as asked:
-            watch.begin(asked, math.inf if self.time_limit_s is None else started + self.time_limit_s)
+        with defer_interrupts() if alone else contextlib.nullcontext(stop) as pressed:
+            watch.begin(pressed, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
-                with _silent():
+                with _silence_stdout():
                     result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
                 primal = np.array(result["x"]).ravel()
                 stats = solver.stats()
@@ -107,10 +107,10 @@ class CasadiSolver(Solver):
                 evaluations += count_evaluations(stats)
                 if watch.reason:
                     break
-        if stop is never and (watch.reason == INTERRUPTED or asked()):
+        if stop is never and (watch.reason == INTERRUPTED or pressed()):
             raise KeyboardInterrupt
         finite = bool(np.isfinite(primal).all())
-        status = REASONS.get(watch.reason, f"{self.name} says {stats.get('return_status')!r}")
+        status = REASONS.get(watch.reason, f"{self.name} returned {stats.get('return_status')!r}")
         return judge_point(
             self.name,
             problem,
@@ -133,7 +133,7 @@ def _build_solver(problem: GaitProblem, settings: CasadiSolver) -> tuple[ca.Func
     nlp = build_nlp(problem).nlp
     watch = IterationWatch(nlp)
     options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **settings.quiet}
-    with _silent():
+    with _silence_stdout():
         return ca.nlpsol(settings.name, settings.name, nlp, options), watch, time.perf_counter() - started
 
 
@@ -147,15 +147,15 @@ class Fatrop(CasadiSolver):
 
 @dataclass(frozen=True, kw_only=True)
 class WatchedSolver(CasadiSolver):
-    """A solver that heeds a limit of wall time for all stages, checked after each iteration; None for no limit.
+    """A solver that can be ended between iterations.
 
     Attributes:
-        time_limit_s: limit of wall time, checked between iterations [s]; None for no limit.
+        time_limit_s: limit of wall time for all stages, checked after each iteration [s]; None for no limit.
     """
 
     watched: ClassVar[bool] = True
 
-    time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of those that are not watched
+    time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of other solvers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,16 +180,16 @@ class Uno(WatchedSolver):
 
 
 @contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """Nothing written to stdout inside, not by C code either: qpOASES prints its licence whatever the options."""
+def _silence_stdout() -> Iterator[None]:
+    """Discard everything written to stdout inside, also by C code: qpOASES always prints its licence."""
     sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    stdout, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 1)
         yield
     finally:
         if os.name == "posix":
             ctypes.CDLL(None).fflush(None)  # else what C has buffered appears later
-        os.dup2(kept, 1)
-        os.close(kept)
+        os.dup2(stdout, 1)
+        os.close(stdout)
         os.close(nowhere)

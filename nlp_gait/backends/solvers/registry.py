@@ -14,16 +14,15 @@ from nlp_gait.decoding import decoded
 from nlp_gait.errors import InputError, check_name, unknown
 from nlp_gait.files import refusing
 
-# A solver joins by a line here.
 SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
 
 
 def make_solver(name: str, /, **settings: Any) -> Solver:
-    """An NLP solver by name, with settings where they differ from the defaults.
+    """Make an NLP solver by its name, with settings that differ from the defaults.
 
     Raises:
-        UnknownNameError: no such solver or setting.
-        InputError: a setting of another type, or a value that is not allowed.
+        UnknownNameError: there is no such solver or setting.
+        InputError: a setting has a wrong type or value.
     """
     known = list_settings(name)
     for setting in settings:
@@ -37,7 +36,7 @@ def make_solver(name: str, /, **settings: Any) -> Solver:
 
 
 def list_settings(name: str) -> tuple[str, ...]:
-    """Names of a solver's settings; raises UnknownNameError."""
+    """Return the names of a solver's settings; raises UnknownNameError."""
     check_name("solver", name)
     if name not in SOLVERS:
         raise unknown("NLP solver", name, SOLVERS)

@@ -1,4 +1,4 @@
-"""SLSQP with finite differences on the compiled objective: what somebody without symbolic derivatives does."""
+"""SLSQP with finite differences on the compiled objective: a baseline without symbolic derivatives."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ TOLERANCE = 1e-10
 
 
 class _Ended(Exception):
-    """The budget or the time is used up, or somebody asked to stop."""
+    """The budget or the time is used up, or the caller stops the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slsqp(Solver):
-    """SciPy's SLSQP with forward differences; its outcome is the best point that it saw.
+    """SciPy's SLSQP with forward differences; its outcome is the best point that it evaluated.
 
     Attributes:
         evaluations: budget, each finite difference included.
@@ -62,13 +62,17 @@ class Slsqp(Solver):
         functions = _Functions(problem, self, stop)
         try:
             result = minimize(
-                lambda z: functions.at(z)[0],
+                lambda z: functions.evaluate(z)[0],
                 (x0 - functions.offset) / functions.scale,
-                jac=lambda z: functions.slope(z)[0],
+                jac=lambda z: functions.differentiate(z)[0],
                 method="SLSQP",
                 bounds=list(zip(functions.lower, functions.upper, strict=True)),
                 constraints=[
-                    {"type": "ineq", "fun": lambda z: functions.at(z)[1], "jac": lambda z: functions.slope(z)[1]}
+                    {
+                        "type": "ineq",
+                        "fun": lambda z: functions.evaluate(z)[1],
+                        "jac": lambda z: functions.differentiate(z)[1],
+                    }
                 ],
                 options={"maxiter": self.evaluations, "ftol": TOLERANCE},
             )
@@ -107,9 +111,9 @@ class _Functions:
         self.backend = self._objective.backend
         model = build_exact_model(problem)
         values = model.at(problem.lower, problem.p)
-        own = slice(0, len(model.row_names) - len(problem.names))  # bounds are SLSQP's own
-        self._row_lower, self._row_upper = values.lower[own], values.upper[own]
-        self._row_scale = model.row_scales[own]
+        rows = slice(0, len(model.row_names) - len(problem.names))  # SLSQP takes the bounds of the variables separately
+        self._row_lower, self._row_upper = values.lower[rows], values.upper[rows]
+        self._row_scale = model.row_scales[rows]
         self.offset = np.array([variable.lower for variable in problem.variables])
         self.scale = problem.scale
         self.lower = (problem.lower - self.offset) / self.scale
@@ -119,31 +123,31 @@ class _Functions:
         self.objective_s = 0.0
         self.best: tuple[float, float, Array] = (math.inf, math.inf, problem.lower)
         self.history: list[Best] = []
-        # SLSQP asks for the cost and the rows of a point one after the other; they are evaluated together.
-        self._at = lru_cache(maxsize=1)(lambda key: self._evaluate(np.atleast_2d(np.frombuffer(key))))
-        self._slope = lru_cache(maxsize=1)(self._forward_differences)
+        # SLSQP evaluates the cost and the rows of a point one after the other; here they are evaluated together.
+        self._evaluate_once = lru_cache(maxsize=1)(lambda key: self._evaluate(np.atleast_2d(np.frombuffer(key))))
+        self._differentiate_once = lru_cache(maxsize=1)(self._differentiate)
         self.started = time.perf_counter()
 
-    def at(self, z: Array) -> tuple[float, Array]:
-        """Cost and rows (m,) at z (n,)."""
-        f, rows = self._at(z.tobytes())
+    def evaluate(self, z: Array) -> tuple[float, Array]:
+        """Return cost and rows (m,) at z (n,)."""
+        f, rows = self._evaluate_once(z.tobytes())
         return float(f[0]), rows[0]
 
-    def slope(self, z: Array) -> tuple[Array, Array]:
-        """Gradient (n,) of the cost and Jacobian (m, n) of the rows at z (n,)."""
-        return self._slope(z.tobytes())
+    def differentiate(self, z: Array) -> tuple[Array, Array]:
+        """Return gradient (n,) of the cost and Jacobian (m, n) of the rows at z (n,)."""
+        return self._differentiate_once(z.tobytes())
 
-    def _forward_differences(self, key: bytes) -> tuple[Array, Array]:
+    def _differentiate(self, key: bytes) -> tuple[Array, Array]:
         z = np.frombuffer(key)
-        f, rows = self._at(key)
+        f, rows = self._evaluate_once(key)
         step = np.where(z + STEP <= self.upper, STEP, -STEP)
-        step[self.upper - self.lower < STEP] = STEP  # a fixed variable moves nowhere; its slope is not used
+        step[self.upper - self.lower < STEP] = STEP  # a fixed variable; its slope is not used
         shifted_f, shifted_rows = self._evaluate(z + np.diag(step))
         self.gradients += 1
         return (shifted_f - f) / step, ((shifted_rows - rows) / step[:, None]).T
 
     def _evaluate(self, Z: Array) -> tuple[Array, Array]:
-        """Costs (P,) and rows (P, m) of points Z (P, n); the best point within the bounds is kept."""
+        """Return costs (P,) and rows (P, m) of points Z (P, n), and remember the best point."""
         limits = self._limits
         if self.calls + len(Z) > limits.evaluations:
             raise _Ended("evaluation budget used")
@@ -157,15 +161,15 @@ class _Functions:
         g = self._objective.constraints(X)[:, : len(self._row_scale)]
         self.objective_s += time.perf_counter() - before
         self.calls += len(Z)
-        self._keep_best(X, f, violation)
+        self._remember_best(X, f, violation)
         sides = [(g - self._row_lower) / self._row_scale, (self._row_upper - g) / self._row_scale]
         finite = [np.isfinite(self._row_lower), np.isfinite(self._row_upper)]
         return f, np.hstack([side[:, known] for side, known in zip(sides, finite, strict=True)])
 
-    def _keep_best(self, X: Array, f: Array, violation: Array) -> None:
-        allowed = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
-        leader = int(np.lexsort((f, allowed))[0])
-        found = (float(allowed[leader]), float(f[leader]), X[leader].copy())
+    def _remember_best(self, X: Array, f: Array, violation: Array) -> None:
+        violations = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
+        leader = int(np.lexsort((f, violations))[0])
+        found = (float(violations[leader]), float(f[leader]), X[leader].copy())
         if found[:2] < self.best[:2]:
             self.best = found
         objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None

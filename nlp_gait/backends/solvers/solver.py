@@ -1,4 +1,4 @@
-"""What an NLP solver is: one run of a problem from one start point."""
+"""The interface of an NLP solver: one run of a problem from one start point."""
 
 from __future__ import annotations
 
@@ -18,48 +18,46 @@ from nlp_gait.interrupts import never
 class Solver(Protocol):
     """An NLP solver with its settings, for any problem: a frozen dataclass, whose fields are the settings.
 
-    A new one derives from this class in a file of its own and is entered in ``registry.SOLVERS``. It needs ``name`` and ``run``;
-    the other methods are for solvers that can do more. Fields named ``evaluations`` and ``time_limit_s`` are limits that a
-    study sets.
+    A new solver derives from this class and is added to ``registry.SOLVERS``. It needs ``name`` and ``run``; the other methods
+    are optional. Fields named ``evaluations`` and ``time_limit_s`` are limits that a study sets.
     """
 
     name: ClassVar[str]
 
     @abstractmethod
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """One run.
+        """Run the solver once.
 
         Args:
             problem: with its current parameter values.
             x0: (n,) start point within the bounds.
-            stop: asked between iterations whether to end at once. A run that nobody can stop raises KeyboardInterrupt on
-                Ctrl-C.
+            stop: called between iterations; returns whether to end at once. Without it Ctrl-C raises KeyboardInterrupt.
         """
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
-        """A run that starts warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
+        """Run warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
         return None
 
     def choose_settings(self, problem: GaitProblem, solves: int = 1) -> Solver:
-        """The same solver with every setting that ``prepare`` would choose by the problem and the number of runs."""
+        """Return this solver with all settings that ``prepare`` would choose by the problem and the number of runs."""
         return self
 
     def prepare(self, problem: GaitProblem, solves: int = 1) -> Solver:
-        """The same solver, checked and made ready for a number of runs of a problem and its copies."""
+        """Return this solver, checked and prepared for a number of runs of a problem and its copies."""
         self.check(problem)
         return self
 
     def check(self, problem: GaitProblem) -> None:
-        """Raise InputError where a run would fail: the solver is not installed, or does not suit the problem."""
+        """Raise InputError if a run would fail: the solver is not installed, or does not suit the problem."""
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        """Settings as a record keeps them."""
+        """Return the settings for a record."""
         return {"kind": type(self).__name__, **(asdict(self) if is_dataclass(self) else {})}
 
 
 def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any) -> Outcome:
-    """Outcome at x (n,), which is pushed to the bounds, with the exact functions' values there."""
+    """Return the outcome at x (n,), clipped to the bounds, with the values of the exact functions."""
     x = np.clip(x, problem.lower, problem.upper)
     exact = build_exact_model(problem).at(x, problem.p)
     return Outcome(
@@ -74,7 +72,7 @@ def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others
 
 
 def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
-    """Calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
+    """Count calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
 
     def calls(*names: str) -> int:
         return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)

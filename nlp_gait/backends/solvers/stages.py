@@ -19,18 +19,18 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Gu
 from nlp_gait.interrupts import defer_interrupts, never
 
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-# Sigmoid widths of further stages, which are tried only if the exact functions find the point infeasible.
+# Sigmoid widths of further stages, used only if the exact functions find the point infeasible.
 NARROWER_WIDTHS = (1e-4, 2e-5)
 
 
 class Method(Protocol):
-    """What minimises an NLP: an ``nlpsol`` of CasADi, or what is called like one."""
+    """A method that minimises an NLP: an ``nlpsol`` of CasADi, or an object with the same interface."""
 
     def __call__(self, **arguments: Any) -> Mapping[str, Any]:
-        """From x0, p, bounds lbx, ubx, lbg, ubg and, to start warm, multipliers lam_x0, lam_g0, to x, lam_x, lam_g."""
+        """Return x, lam_x, lam_g from x0, p, bounds lbx, ubx, lbg, ubg and, to start warm, multipliers lam_x0, lam_g0."""
 
     def stats(self) -> Mapping[str, Any]:
-        """Of the last call: return_status, iter_count, and n_call_... of each function."""
+        """Return return_status, iter_count, and n_call_... of each function of the last call."""
 
 
 class StagedSolver(Solver):
@@ -38,12 +38,12 @@ class StagedSolver(Solver):
 
     Attributes:
         model: the NLP.
-        cold: for the first stage.
-        warm: for the others, and for neighbouring problems.
-        watch: what both ask after each iteration.
-        words: what their statuses mean.
+        cold: method of the first stage.
+        warm: method of the other stages, and for neighbouring problems.
+        watch: called after each iteration of both.
+        words: messages for their statuses.
         time_limit_s: limit of wall time for all stages of a run [s].
-        linear_solver: the one that is really used.
+        linear_solver: the linear solver in use.
         compiled: whether compiled functions are called.
         create_s: time to generate derivatives and methods, and to compile them [s].
     """
@@ -60,21 +60,21 @@ class StagedSolver(Solver):
 
     @one_at_a_time
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """All stages from a start point (n,), unless ``stop`` says to end; it is asked after each iteration."""
+        """Run all stages from a start point (n,); ``stop`` is called after each iteration."""
         start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
-        return self._stages(problem, x0, start, self.model.widths, stop, cold=True)
+        return self._run_stages(problem, x0, start, self.model.widths, stop, cold=True)
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
-        """The last stage alone, from the outcome of a neighbouring problem; None if that has no multipliers."""
+        """Run the last stage alone from the outcome of a neighbouring problem; None if that has no multipliers."""
         guess = near.guess
         if guess is None:
             return None
         x0 = np.clip(near.x, problem.lower, problem.upper)
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
-        return self._stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
+        return self._run_stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
 
     @one_at_a_time
-    def _stages(
+    def _run_stages(
         self,
         problem: GaitProblem,
         x0: Array,
@@ -83,13 +83,13 @@ class StagedSolver(Solver):
         stop: Callable[[], bool],
         cold: bool,
     ) -> Outcome:
-        """Stages of a run. Where the caller does not ask to stop, Ctrl-C ends the iterations and is raised after them."""
+        """Run the stages. If the caller gives no ``stop``, Ctrl-C ends the iterations and is raised after them."""
         model, p = self.model, problem.p
         bounds = model.bounds(problem)
         iterations, evaluations = 0, Evaluations()
         started = time.perf_counter()
-        with defer_interrupts() if stop is never else nullcontext(stop) as asked:
-            self.watch.begin(asked, started + self.time_limit_s)
+        with defer_interrupts() if stop is never else nullcontext(stop) as pressed:
+            self.watch.begin(pressed, started + self.time_limit_s)
             for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
                 method = self.cold if cold and stage == 0 else self.warm
                 result = method(p=np.append(p, width), **start, **bounds)
@@ -119,7 +119,7 @@ class StagedSolver(Solver):
                 )
                 if not outcome.claimed or outcome.violation <= FEASIBILITY_TOLERANCE:
                     break
-        if stop is never and asked():
+        if stop is never and pressed():
             raise KeyboardInterrupt
         if outcome.claimed and not outcome.feasible:
             refused = f"{outcome.status}, but the exact functions find it infeasible"

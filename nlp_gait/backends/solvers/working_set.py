@@ -1,9 +1,9 @@
-"""IPOPT on the few rows of an NLP that matter: most of a gait's limits are far away on the whole way to its optimum.
+"""IPOPT on the few rows of an NLP that matter: most limits of a gait are far away during the whole run.
 
-The time of an iteration grows with the rows, and limits stand at every sample. A run begins with few of them. Where it ends, all
-are looked at: those that are violated join, and it goes on from there, until none is. So what is returned keeps every row, and
-is a local optimum of the whole NLP; the multipliers of rows that never joined are zero. Where IPOPT does not converge on some of
-the rows, it begins again with all of them.
+The time of an iteration grows with the number of rows, and there are limits at every sample. A run begins with few rows. At its
+end all rows are checked: those that are violated are added, and the run continues, until no row is violated. So the result
+satisfies all rows, and is a local optimum of the whole NLP; the multipliers of rows that were never added are zero. If IPOPT does
+not converge on some of the rows, it starts again with all of them.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]
 
-ROUNDS = 8  # in which rows join, before all of them do
-VIOLATED = 1e-8  # IPOPT's own tolerance
-KEPT_SOLVERS = 16  # of different rows
-LEAST_ROWS = 100  # for fewer it does not pay
+ROUNDS = 8  # in which rows are added, before all rows are used
+VIOLATED = 1e-8  # IPOPT's tolerance
+CACHED_SOLVERS = 16  # on different rows
+LEAST_ROWS = 100  # of an NLP for which this pays
 
 
 class WorkingSet:
@@ -40,15 +40,15 @@ class WorkingSet:
         watch: IterationWatch,
         always: Rows,
     ) -> None:
-        """Keep what solvers of some rows are made of.
+        """Take what solvers of some rows are made from.
 
         Args:
             nlp: CasADi's dictionary of x, p, f, g.
             functions: of the NLP, and their derivatives, by the names that ``nlpsol`` gives them.
-            options: of ``nlpsol``, those that take over derivatives and the watch left out.
+            options: of ``nlpsol``, without derivatives and the watch.
             whole: IPOPT on all rows.
-            watch: of ``whole``; it ends runs on some of the rows too.
-            always: (m,) True for rows that every run begins with.
+            watch: of ``whole``; it also ends runs on some of the rows.
+            always: (m,) True for rows with which every run begins.
         """
         self._nlp, self._functions, self._options = nlp, functions, options
         self._whole, self._watch = whole, watch
@@ -57,31 +57,31 @@ class WorkingSet:
         self._stats: dict[str, Any] = {}
 
     def learn(self, **arguments: Any) -> None:
-        """Begin every later run with the rows, too, that are violated at a start point, and that join on the way from there."""
-        self._begin = self._begin | self._violated(arguments["x0"], arguments)
-        result, rows = self._joined(arguments)
+        """Add the rows that are violated at a start point, or added in a run from it, to those with which runs begin."""
+        self._begin = self._begin | self._find_violated(arguments["x0"], arguments)
+        result, rows = self._solve_on_few_rows(arguments)
         if result is not None:
             self._begin = rows
 
     def __call__(self, **arguments: Any) -> Mapping[str, Any]:
-        """See ``Method``; multipliers of a start are not taken."""
+        """See ``Method``; multipliers of the start are ignored."""
         self._stats = {}
-        result, _ = self._joined(arguments)
+        result, _ = self._solve_on_few_rows(arguments)
         if result is None:
             result = self._whole(**arguments)
             self._count(self._whole.stats())
         return result
 
     def stats(self) -> Mapping[str, Any]:
-        """Of all runs of the last call, see ``Method``."""
+        """See ``Method``; sums over all runs of the last call."""
         return self._stats
 
-    def _joined(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any] | None, Rows]:
-        """Result of a run on some of the rows that violates none, and these rows; None where all of them are needed."""
+    def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any] | None, Rows]:
+        """Return a result that violates no row, and the rows that it used; None if all rows are needed."""
         rows, start = self._begin, arguments["x0"]
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)
-            solver = self._solver(rows)
+            solver = self._get_solver(rows)
             sides = {side: np.asarray(arguments[side])[chosen] for side in ("lbg", "ubg")}
             found = solver(**{**arguments, **sides, "x0": start})
             stats = solver.stats()
@@ -93,34 +93,34 @@ class WorkingSet:
                 return result, rows
             if not stats["success"]:
                 break
-            violated = self._violated(found["x"], arguments) & ~rows
+            violated = self._find_violated(found["x"], arguments) & ~rows
             if not violated.any():
                 return result, rows
             rows, start = rows | violated, found["x"]
         return None, rows
 
-    def _violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
+    def _find_violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
         g = np.asarray(self._functions["nlp_g"](x, arguments["p"])).ravel()
-        excess: Array = np.maximum(arguments["lbg"] - g, g - arguments["ubg"])
-        return ~(excess <= VIOLATED)  # also what is not a number
+        violations: Array = np.maximum(arguments["lbg"] - g, g - arguments["ubg"])
+        return ~(violations <= VIOLATED)  # NaN counts as violated
 
     def _count(self, stats: Mapping[str, Any]) -> None:
-        """Add the calls and iterations of a run to those before it; the status is that of the last."""
+        """Add the calls and iterations of a run to those of earlier runs; the status is that of the last run."""
         self._stats = {
             name: value + self._stats.get(name, 0) if name.startswith(("n_call_", "iter_count")) else value
             for name, value in stats.items()
         }
 
-    def _solver(self, rows: Rows) -> ca.Function:
+    def _get_solver(self, rows: Rows) -> ca.Function:
         key = rows.tobytes()
         if key not in self._solvers:
-            if len(self._solvers) == KEPT_SOLVERS:
+            if len(self._solvers) == CACHED_SOLVERS:
                 del self._solvers[next(iter(self._solvers))]
-            self._solvers[key] = self._made(np.flatnonzero(rows).tolist())
+            self._solvers[key] = self._make_solver(np.flatnonzero(rows).tolist())
         return self._solvers[key][0]
 
-    def _made(self, rows: list[int]) -> tuple[ca.Function, IterationWatch]:
-        """IPOPT on some of the rows, made in milliseconds: it takes parts of what the functions of all rows give."""
+    def _make_solver(self, rows: list[int]) -> tuple[ca.Function, IterationWatch]:
+        """Make IPOPT on some of the rows, within milliseconds: it uses parts of the results of the functions of all rows."""
         functions, x, p = self._functions, self._nlp["x"], self._nlp["p"]
         nlp: dict[str, Any] = {"x": x, "p": p, "f": functions["nlp_f"](x, p), "g": functions["nlp_g"](x, p)[rows]}
         g, jacobian = functions["nlp_jac_g"](x, p)
@@ -130,10 +130,10 @@ class WorkingSet:
         }
         if "nlp_hess_l" in functions:
             weight, weights = MX.sym("lam_f"), MX.sym("lam_g", len(rows))
-            of_all = MX.zeros(self._nlp["g"].shape[0], 1)
-            of_all[rows] = weights
-            hessian = functions["nlp_hess_l"](x, p, weight, of_all)
+            all_weights = MX.zeros(self._nlp["g"].shape[0], 1)
+            all_weights[rows] = weights
+            hessian = functions["nlp_hess_l"](x, p, weight, all_weights)
             derivatives["hess_lag"] = ca.Function(DERIVATIVES["hess_lag"], [x, p, weight, weights], [hessian])
-        watch = IterationWatch(nlp, beside=self._watch)
+        watch = IterationWatch(nlp, shared=self._watch)
         options = {**self._options, **NO_OTHERS, **derivatives, "iteration_callback": watch}
         return ca.nlpsol("some_rows", "ipopt", nlp, options), watch

@@ -12,8 +12,7 @@ from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings
-from nlp_gait.backends.solvers.ipopt_installation import linear_solver
+from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings, find_linear_solver
 from nlp_gait.backends.solvers.stages import CONVERGED
 from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.solution import Evaluations, Outcome
@@ -166,7 +165,7 @@ def test_options_that_lie_in_the_working_folder_change_nothing(
     expected = solve(toy(corner))
     (tmp_path / "ipopt.opt").write_text("acceptable_tol 1e10\nacceptable_iter 1\noutput_file left.txt\n")
     monkeypatch.chdir(tmp_path)
-    linear_solver.cache_clear()
+    find_linear_solver.cache_clear()
     solution = solve(toy(corner))
     assert (solution.x, solution.iterations) == (expected.x, expected.iterations)
     assert solution.linear_solver == expected.linear_solver
@@ -178,5 +177,5 @@ def test_the_linear_solver_is_the_one_that_ipopt_names(capfd: pytest.CaptureFixt
     x = MX.sym("x")
     ca.nlpsol("loud", "ipopt", {"x": x, "f": x**2}, {"ipopt.option_file_name": ""})(x0=1.0)
     banner = capfd.readouterr().out
-    assert f"running with linear solver {linear_solver()}" in banner
-    assert IpoptSettings().prepare(toy(corner)).linear_solver == linear_solver()
+    assert f"running with linear solver {find_linear_solver()}" in banner
+    assert IpoptSettings().prepare(toy(corner)).linear_solver == find_linear_solver()

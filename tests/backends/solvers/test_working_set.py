@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.solvers.ipopt_installation import QUIET
+from nlp_gait.backends.solvers.ipopt import QUIET, IpoptSettings
 from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
 from nlp_gait.backends.solvers.working_set import WorkingSet
 from nlp_gait.formulation import load

@@ -76,7 +76,7 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
     monkeypatch.setattr(nlpsol, "PROBE", "import os; os.kill(os.getpid(), 9)")
     nlpsol.probe.cache_clear()
     try:
-        assert nlpsol.probe("fatrop") == "it ends with status -9"
+        assert nlpsol.probe("fatrop") == "it exits with status -9"
         with pytest.raises(InputError, match="'fatrop' does not run in this installation"):
             make_solver("fatrop").run(nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
     finally:
