@@ -11,7 +11,7 @@ import nlp_gait
 from nlp_gait.backends.kernel import compiler as compiler_module
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.solvers import derivatives
+from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import CompilerError
 from tests.backends.toys import corner, toy
@@ -74,7 +74,7 @@ def test_ipopt_goes_on_with_interpreted_functions_and_that_is_said(
 ) -> None:
     monkeypatch.setenv("CXX", fake_compiler(tmp_path, FAULTS[fault][0]))
     monkeypatch.setattr(compiler_module, "TIME_LIMIT_S", 0.5)
-    monkeypatch.setattr(derivatives, "WORTHWHILE_SIZE", 2)
+    monkeypatch.setattr(ipopt, "WORTHWHILE_SIZE", 2)
     solution = nlp_gait.solve(toy(corner), starts=2)
     assert solution.success and solution.functions == "interpreted"
     assert len(caplog.messages) == 1 and "IPOPT's functions are interpreted: " in caplog.messages[0]
