@@ -1,4 +1,4 @@
-"""A problem and two algorithms of your own. They take part wherever a name is asked for, as ``FILE.py:NAME``.
+"""Your own problem and two algorithms, accepted wherever a name is, as ``FILE.py:NAME``.
 
 ``nlp-gait compare bring_your_own.py:two_link --algorithms pso,bring_your_own.py:Shrinking,bring_your_own.py:annealing --runs 5``
 """
@@ -103,17 +103,17 @@ def two_link(*, intervals: int = 20, lift_m: float = 0.05) -> GaitProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class Shrinking:
-    """Random points around the best one, nearer and nearer: an algorithm that is asked and told."""
+    """Random points around the best one in a shrinking box: an algorithm with ask and tell."""
 
     population: int = 20
     shrink: float = 0.95
     name = "shrinking"
 
     def start(self, start):
-        return Shrunk(self, start)
+        return ShrinkingSearch(self, start)
 
 
-class Shrunk:
+class ShrinkingSearch:
     def __init__(self, settings, start):
         self.settings, self.s, self.X, self.best, self.width = settings, start, start.initial, None, 0.5
 
@@ -146,7 +146,7 @@ def annealing(f, lower, upper, evaluations, seed):
 
 
 def main() -> None:
-    """What ``nlp-gait compare`` does with all three, in short."""
+    """Run all three, as ``nlp-gait compare`` does."""
     problem = two_link()
     optimum = nlp_gait.solve(problem, starts=5)
     print(f"IPOPT: power {optimum.objective:.4f} W")

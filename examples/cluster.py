@@ -2,8 +2,8 @@
 A study on a cluster
 ====================
 
-The runs of a study go to the workers of a Dask scheduler, wherever these are; records come back as each run ends, and a study
-that was stopped goes on. Here two workers on this machine stand for a cluster. Needs the extra `cluster`. From the command line:
+The runs of a study are distributed to the workers of a Dask scheduler; records come back as each run ends, and an interrupted
+study continues. Here two workers on this machine replace a cluster. Needs the extra `cluster`. From the command line:
 `nlp-gait compare nao-ssp --scheduler tcp://HOST:8786 --out study`.
 """
 

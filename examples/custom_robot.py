@@ -1,9 +1,9 @@
 """
-A robot of your own
-===================
+Your own robot
+==============
 
-A robot is a file: JSON that may extend a robot of the package, or URDF or MJCF for any biped with two legs of six turning joints.
-Here NAO carries more and more at its torso, and the cheapest step changes with it.
+A robot is a file: JSON that may extend a robot of the package, or URDF or MJCF for any biped with six-joint legs.
+Here NAO carries an increasing load at its torso, which changes the cheapest step.
 """
 
 import json

@@ -1,9 +1,9 @@
 """
-Judge a point of your own
-=========================
+Judge your own point
+====================
 
-The exact functions say what any candidate is worth: here the point that a paper reports for NAO's single support. They are
-evaluated on the problem's own samples, and again on a dense grid, which shows what happens between them.
+The exact functions evaluate any candidate, here the point that a paper reports for NAO's single support: at the problem's
+samples, and on a dense grid, which shows violations between them.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +20,7 @@ for name, value in verdict.indexes.items():
     print(f"  {name}: {value:.6f} on its samples, {verdict.dense[name]:.6f} on {verdict.dense_intervals} intervals")
 
 # %%
-# A hip that is too high is infeasible; the rows in the way are named, worst first.
+# A hip that is too high is infeasible; the violated rows are named, worst first.
 
 too_high = evaluate(problem, [0.36, *x[1:]])
 print("with the hip at 0.36 m:", *(f"\n  {row.name} by {row.violation:.3g}" for row in too_high.violations[:3]))

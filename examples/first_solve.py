@@ -2,7 +2,7 @@
 First solve
 ===========
 
-IPOPT finds the cheapest step of NAO from three random starts. What holds the optimum back is listed with its price, and the
+IPOPT finds the cheapest step of NAO from three random starts. The active constraints are listed with their prices, and the
 gait is drawn: stick figures from the side, the mechanical power, and the distance of the zero-moment point from the sole's edge.
 """
 
@@ -14,7 +14,7 @@ import nlp_gait
 solution = nlp_gait.solve("nao-ssp", starts=3, seed=0)
 print(f"{solution.objective_name} {solution.objective:.6f} {solution.objective_unit}, {solution.status}")
 for bound in solution.active_constraints:
-    print(f"  held back by {bound.name} at {bound.bound:g} {bound.unit}: {bound.price:.4g} {bound.price_unit}")
+    print(f"  limited by {bound.name} at {bound.bound:g} {bound.unit}: {bound.price:.4g} {bound.price_unit}")
 
 figure = solution.plot()
 figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "gait.png", dpi=150)

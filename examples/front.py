@@ -2,8 +2,8 @@
 Power against stability: a front
 ================================
 
-The true front between mean power and the mean balance margin to the side. Each point is an optimum with its price, which is the
-front's slope there; NSGA-II and CMOPSO stand beside it in `nlp-gait pareto`.
+The true front between mean power and the mean balance margin to the side. Each point is an optimum with its price, the
+front's slope at this point; `nlp-gait pareto` adds NSGA-II and CMOPSO.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,7 @@
 In a notebook
 =============
 
-Results show themselves: the last value of a cell is a table, time histories and runs become data frames, gaits become figures.
+Results are displayed: the last value of a cell is a table, time histories and runs become data frames, gaits become figures.
 This page can be downloaded as a notebook.
 """
 
@@ -12,7 +12,7 @@ from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 
 # %%
-# A solution is a table of its variables, with the prices of the bounds that hold it back.
+# A solution is a table of its variables, with the prices of its active bounds.
 
 solution = nlp_gait.solve("nao-dsp", starts=2)
 solution

@@ -2,8 +2,8 @@
 A gait in the physics engine
 ============================
 
-The optimum of the model, played in open loop in MuJoCo with NAO's servos: does the robot stay up, where is the centre of
-pressure, and what do the servos draw? Needs the extra `sim`; `nlp-gait simulate` makes films, too.
+The optimum of the model, simulated open loop in MuJoCo with NAO's drives: does the robot fall, where is the centre of
+pressure, and how much power do the drives need? Needs the extra `sim`; `nlp-gait simulate` makes films, too.
 """
 
 import matplotlib.pyplot as plt

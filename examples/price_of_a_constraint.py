@@ -2,8 +2,8 @@
 The price of a constraint
 =========================
 
-An optimum by gradients comes with prices: what the least power would change for each unit by which a limit is raised. Here the
-price of the demanded balance margin at one limit, as the slope beside the optima that were really solved at others.
+A gradient-based optimum has prices: the change of the least power per unit by which a limit is raised. Here the price of the
+required balance margin at one limit is drawn as a slope, together with optima solved at other limits.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ problem = nlp_gait.load("nao-ssp")
 here = problem.value("dbm_y_mean_limit_m")
 optimum = nlp_gait.solve(problem, starts=3)
 (price,) = (a.price for a in optimum.active_constraints if a.name == "dbm_y_mean")
-print(f"at {1000 * here:g} mm: {optimum.objective:.6f} W, and {price / 1000:.5f} W for each further millimetre")
+print(f"at {1000 * here:g} mm: {optimum.objective:.6f} W, and {price / 1000:.5f} W per millimetre")
 
 limits = np.linspace(0.016, 0.024, 9)
 powers = [

@@ -2,8 +2,8 @@
 Results from MATLAB in the report
 =================================
 
-Final points of any other program become records of a study: a CSV file with one row a run, the variables by name in any order.
-Each point is judged like every other. From the command line: `nlp-gait import nao-dsp finals.csv --as "GA (MATLAB)"`.
+Final points of any other program become records of a study: a CSV file with one row per run, the variables by name in any order.
+Each point is judged like all others. From the command line: `nlp-gait import nao-dsp finals.csv --as "GA (MATLAB)"`.
 """
 
 import csv
@@ -20,7 +20,7 @@ from compare.study.task import ProblemSpec, Task
 folder, spec = Path(sys.argv[1] if len(sys.argv) > 1 else "."), ProblemSpec(name="nao-dsp")
 
 # %%
-# A file as MATLAB's `writetable` leaves it: here the two points that Gupta, Pratihar and Deb (2023) print for double support,
+# A file as MATLAB's `writetable` writes it: here the two points that Gupta, Pratihar and Deb (2023) print for double support,
 # with the power that they report for them (Table 8).
 
 header = [*spec.load().names, "run", "objective", "evaluations"]
@@ -32,7 +32,7 @@ with (folder / "finals.csv").open("w", newline="") as file:
     csv.writer(file).writerows([header, *rows])
 
 # %%
-# The records stand beside those of solvers that run here.
+# The records are compared with those of solvers that run here.
 
 records = imported(spec, folder / "finals.csv", "paper (MATLAB)")
 tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]

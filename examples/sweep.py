@@ -2,7 +2,7 @@
 The price of lifting the foot
 =============================
 
-IPOPT follows the optimum over a variable that is held at one value after another; each solve begins where the last one ended.
+IPOPT follows the optimum over a variable fixed at one value after another; each solve starts from the previous solution.
 `nlp-gait sweep` does the same from the command line, over one or two variables or limits.
 """
 

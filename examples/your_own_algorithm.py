@@ -2,8 +2,8 @@
 Your own algorithm in the report
 ================================
 
-Anything that is asked for candidates and told their values takes part in a study beside PSO and IPOPT, is judged as they are, and
-stands in the same tables and figures. From the command line: `nlp-gait compare nao-ssp --algorithms pso,FILE.py:ShrinkingBox`.
+Any object with ask and tell can take part in a study with PSO and IPOPT. It is judged like them and appears in the same tables
+and figures. From the command line: `nlp-gait compare nao-ssp --algorithms pso,FILE.py:ShrinkingBox`.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
 """
-An objective of your own
-========================
+Your own objective
+==================
 
-The same gait with another objective: power, and a price on the time that the step takes. It is written once; IPOPT gets it with
-every derivative, PSO as compiled code.
+The same gait with another objective: power plus a price on the duration of the step. It is written once; IPOPT uses it with
+exact derivatives, PSO as compiled code.
 """
 
 from dataclasses import replace
@@ -15,8 +15,8 @@ import nlp_gait
 from nlp_gait.formulation import Objective, Parameter
 
 
-def cost(gait, point, ops):
-    """What the gait costs, and what waiting for it costs."""
+def add_price_of_time(gait, point, ops):
+    """Return the gait with the price of time added to its objective."""
     return replace(gait, objective=gait.objective + point["price_of_time_W_s"] * point["single_support_time_s"])
 
 
@@ -26,7 +26,7 @@ problem = nlp_gait.load("nao-ssp").derive(
     parameters=[
         Parameter(name="price_of_time_W_s", unit="W/s", default=0.3, description="price of a second", minimum=0.0)
     ],
-    change=cost,
+    change=add_price_of_time,
 )
 prices, times = (0.0, 0.1, 0.2, 0.3, 0.6, 1.0), []
 for price in prices:

@@ -1,9 +1,9 @@
 """
-A walker of your own
-====================
+Your own walker
+===============
 
 A problem is a function that makes a `GaitProblem`: here two legs with a hip mass and foot masses, the swinging leg shortened by a
-slider, from Lagrange's equations. It takes part wherever a shipped problem does: `nlp-gait compare FILE.py:walker`.
+slider, from Lagrange's equations. It can be used like any shipped problem: `nlp-gait compare FILE.py:walker`.
 """
 
 import casadi as ca

@@ -1,4 +1,4 @@
-"""One page of all algorithms and solvers: what they can be told, and where they come from."""
+"""One page of all algorithms and solvers with their settings and sources."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ best known point stands on the [page of each problem](problems/index.md)."""
 PARTS = {
     "Searches": ("They see the compiled objective in batches, and no derivatives.", metaheuristics.ALGORITHMS),
     "Searches of other packages": (
-        "With the extra `algorithms`; `bayes` with the extra of its name.",
+        "With the extra `algorithms`; `bayes` with the extra `bayes`.",
         metaheuristics.ADAPTERS,
     ),
     "For several objectives": ("For `nlp-gait pareto` only, with the extra `algorithms`.", FRONT_ALGORITHMS),

@@ -1,4 +1,4 @@
-"""Reference of every public name: what the packages' front doors offer, each described once, from its docstring and types."""
+"""Reference of every public name, each described once, from its docstring and types."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from docs.pages.markdown import write_all
 
-# Front doors, and the modules of which scripts and notebooks take names; a name is described where it stands first.
+# Packages and modules with public names; a name is described at its first occurrence.
 DOORS = {
     "nlp_gait": (),
     "nlp_gait.formulation": (),
@@ -49,12 +49,12 @@ SPECIAL = re.compile(r"([*|`]|(?<=\w)_(?!\w))")
 
 
 def names_of(door: str) -> tuple[str, ...]:
-    """Public names of a front door."""
+    """Return the public names of a module."""
     return tuple(DOORS[door] or importlib.import_module(door).__all__)
 
 
 def write(folder: Path) -> None:
-    """Write an index and a page for each front door."""
+    """Write an index and a page for each module."""
     pages: dict[str, str] = {}
     described: dict[int, str] = {}
     for door in DOORS:
@@ -71,7 +71,7 @@ def write(folder: Path) -> None:
             blocks.append(_directive(value, full))
         pages[f"{door}.rst"] = "\n\n".join(blocks) + "\n"
     tree = [".. toctree::", "   :maxdepth: 1", "", *(f"   {door}" for door in DOORS)]
-    words = "Every public name, by the module that it is imported from. Whatever is not here may change without notice."
+    words = "Every public name, by the module that it is imported from. Other names may change without notice."
     pages["index.rst"] = "\n\n".join([_heading("Names in Python", "="), words, "\n".join(tree)]) + "\n"
     write_all(folder / "api", pages)
 
@@ -96,12 +96,12 @@ def _directive(value: Any, full: str) -> str:
 
 
 def _alias(value: Any) -> str:
-    """A constant, or what a name of a type stands for, without the modules of the package."""
+    """Return a constant, or the meaning of a type alias, without module names."""
     return re.sub(r"\b(?:\w+\.)+(?=\w)", "", str(value))
 
 
 def linked(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
-    """Docstrings are plain text in which double backticks hold code: keep reStructuredText from reading more into them."""
+    """Escape docstrings, plain text with code in double backticks, for reStructuredText."""
     lines[:] = _escaped(lines)
 
 

@@ -1,4 +1,4 @@
-"""Pages of the command line, made from the commands' own parsers."""
+"""Pages of the command line, generated from the commands' parsers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def write(folder: Path) -> None:
     ]
     for panel, listed in names.items():
         rows = [(f"[`{name}`]({name}.md)", literal(_first_sentence(group.commands[name]))) for name in listed]
-        blocks += [f"## {panel}", table(("command", "what it does"), rows)]
+        blocks += [f"## {panel}", table(("command", "description"), rows)]
     blocks.append(toctree(name for listed in names.values() for name in listed))
     write_all(folder / "commands", {"index.md": page(*blocks), **pages})
 
@@ -74,7 +74,7 @@ def _flags(option: Any, kind: str) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """What an option takes, from the annotation of its parameter: ``Annotated[int | None, ...]``."""
+    """Return the type of an option from the annotation of its parameter: ``Annotated[int | None, ...]``."""
     hint = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
     return next((KINDS[kind] for kind in (hint, *get_args(hint)) if kind in KINDS), "")
 

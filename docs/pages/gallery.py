@@ -1,4 +1,4 @@
-"""Gallery of examples: their order, how they run, and how their figures are kept."""
+"""Gallery of examples: order, execution, and figures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ORDER = (
 
 
 def configuration(root: Path) -> dict[str, Any]:
-    """Of sphinx-gallery."""
+    """Return the settings of sphinx-gallery."""
     return {
         "examples_dirs": str(root / "examples"),
         "gallery_dirs": "generated/gallery",
@@ -52,28 +52,28 @@ class Graded:
     """Order of the examples."""
 
     def __call__(self, name: str) -> int:
-        """Place of a file."""
+        """Return the position of a file."""
         return ORDER.index(Path(name).name)
 
     def __repr__(self) -> str:
-        """Always the same, so that a page is made anew only when its example has changed."""
+        """Return a constant, so that a page is rebuilt only when its example has changed."""
         return "graded"
 
 
 class OwnFolder:
-    """An example writes to the folder that its first argument names: here an empty one."""
+    """Pass an empty folder as the first argument of an example, to which it writes."""
 
     def __call__(self, configuration: Any, variables: Any) -> list[str]:
-        """Arguments of an example."""
+        """Return the arguments of an example."""
         return [tempfile.mkdtemp(prefix="nlp-gait-example-")]
 
     def __repr__(self) -> str:
-        """Always the same."""
+        """Return a constant."""
         return "own folder"
 
 
 def figures(block: Any, variables: dict[str, Any], configuration: dict[str, Any]) -> str:
-    """Keep every Matplotlib figure that a block of an example has made, and show it there."""
+    """Save every Matplotlib figure of a block of an example, and show it there."""
     from matplotlib.figure import Figure
     from sphinx_gallery.scrapers import figure_rst
 

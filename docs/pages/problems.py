@@ -1,4 +1,4 @@
-"""A page for each problem, made from the problem itself and from what was measured of it (``docs/difficulty.json``)."""
+"""A page for each problem, generated from the problem and from measurements (``docs/difficulty.json``)."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
 SOURCE = re.compile(r"^Source:\n((?: {4}.+\n?)+)", re.MULTILINE)
 INTRODUCTION = """# Problems
 
-Each page is made from the problem itself; what is said of solvers was measured by `python -m benchmarks.difficulty` with default
-options and values. Near: within 0.1 % of the best point known. [GaitBench](../../gaitbench.md) freezes variants of them, and
-[your own](../../bring-your-own.md) takes part as `FILE.py:NAME`."""
-PICTURE = "Best known gait: six poses of equal distance in time, later ones darker (left blue, right orange), and what they need."
+Each page is generated from the problem; figures of solvers were measured by `python -m benchmarks.difficulty` with default
+options and values. Near: within 0.1 % of the best known point. [GaitBench](../../gaitbench.md) freezes variants of them, and
+[your own](../../bring-your-own.md) is used as `FILE.py:NAME`."""
+PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
 
 def names() -> list[str]:
-    """Problems that have a page."""
+    """Return the problems that have a page."""
     return [name for name in problem_names() if name not in LEFT_OUT]
 
 
 def write(folder: Path) -> None:
-    """Write an index, and a page and a picture for each problem."""
+    """Write an index, and a page and a figure for each problem."""
     folder, measured = folder / "problems", difficulties()
     folder.mkdir(parents=True, exist_ok=True)
     problems = {name: load(name) for name in names()}
@@ -103,7 +103,7 @@ def _page(problem: GaitProblem, found: Difficulty | None, folder: Path) -> str:
 
 
 def _words(problem: GaitProblem) -> str:
-    """The first paragraph that its module says beyond the title, or else what its maker says."""
+    """Return the first paragraph of its module's docstring after the title, or else of its maker's."""
     module = inspect.getdoc(importlib.import_module(PROBLEMS[problem.name].partition(":")[0])) or ""
     return " ".join(" ".join(module.split("\n\n")[:2]).split())
 
@@ -124,18 +124,18 @@ def _best(problem: GaitProblem, found: Difficulty | None) -> str:
     value = objective.sign * exact.at(problem.check_x(best.x), problem.p).cost
     if not math.isclose(value, best.objective, rel_tol=SAME):
         raise ValueError(
-            f"docs/difficulty.json holds {best.objective} as the best of {problem.name!r}, but the judge finds {value} there: "
+            f"docs/difficulty.json has {best.objective} as the best of {problem.name!r}, but the judge finds {value} there: "
             f"the problem has changed; measure it again by python -m benchmarks.difficulty {problem.name}"
         )
-    said = [
+    text = [
         f"**{with_unit(best.objective, objective.unit, '.8g')}**, to {objective.sense}; found by {best.solver}.",
         *(f"{_share(r)} runs of {solver} end within 0.1 % of it." for solver, r in found.solvers.items()),
     ]
     for definition in DEFINITIONS:
         same = definition.problem == problem.name and not definition.values and not definition.held
         if same and definition.options.items() <= problem.options.items():
-            said.append(f"As instance `{definition.id}` of GaitBench: {load_facts()[definition.id].evidence}.")
-    return f"{title}\n\n{' '.join(said)}"
+            text.append(f"As instance `{definition.id}` of GaitBench: {load_facts()[definition.id].evidence}.")
+    return f"{title}\n\n{' '.join(text)}"
 
 
 def _variables(problem: GaitProblem, best: Best | None) -> str:
@@ -161,8 +161,8 @@ def _binding(problem: GaitProblem, best: Best | None) -> str:
         for a in best.active_constraints[:SHOWN]
     ]
     left = len(best.active_constraints) - len(rows)
-    words = f"The price is the change of the best {problem.objective.name} for each unit by which the bound is raised."
-    words += f" {left} cheaper ones are left out." if left else ""
+    words = f"The price is the change of the best {problem.objective.name} per unit by which the bound is raised."
+    words += f" {left} lower prices are omitted." if left else ""
     return page("## What binds it", words, table(("bound", "side", "at", "price"), rows)).strip()
 
 
@@ -210,12 +210,12 @@ def _options(problem: GaitProblem) -> str:
         hint = hints.get(name)
         choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is not None else ""
         rows.append((code(name), code(str(parameter.default)), choices, literal(words.get(name, ""))))
-    said = "What it is built with: `--option NAME=VALUE`, or keywords of `nlp_gait.load`."
-    return page("## Options", said, table(("option", "default", "one of", "what"), rows)).strip()
+    text = "Options of the problem: `--option NAME=VALUE`, or keywords of `nlp_gait.load`."
+    return page("## Options", text, table(("option", "default", "one of", "what"), rows)).strip()
 
 
 def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
-    """What options mean: as the family says it, and as the maker itself does."""
+    """Return the meaning of options, from the docstrings of the family and of the maker."""
     module = PROBLEMS[problem.name].partition(":")[0]
     family = importlib.import_module(".".join(module.split(".")[:3])).__doc__ or ""
     for pattern, text in ((OPTION, family), (ARGUMENT, inspect.getdoc(problem_maker(problem.name)) or "")):
@@ -242,19 +242,17 @@ def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:
         words += f"; an evaluation takes {found.evaluation_us:.3g} µs of one core, in a batch. "
         words += f"Each run of a search has {found.evaluations} evaluations, each run of IPOPT one random start."
     else:
-        words = (
-            "Its variables are tied by equations, so that no candidate of a search is feasible: gradient methods only."
-        )
+        words = "Its variables satisfy equations, so no candidate of a search is feasible: gradient methods only."
     header = ("solver", "runs", "feasible", "within 0.1 %", "median distance")
     return page("## Difficulty", words, table(header, rows)).strip()
 
 
 def _source(problem: GaitProblem) -> str:
-    """The section of that name in what its maker says."""
-    said = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name))}\n")
-    if said is None:
+    """Return the section ``Source:`` of its maker's docstring."""
+    text = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name))}\n")
+    if text is None:
         raise ValueError(f"the docstring of the maker of {problem.name!r} has no section 'Source:'")
-    return " ".join(said[1].split())
+    return " ".join(text[1].split())
 
 
 def _published(problem: GaitProblem) -> str:

@@ -17,9 +17,9 @@ from compare.study.study import Study, check_study
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 60  # of code
 EXPECTED = {
-    "first_solve.py": "held back by dbm_y_mean",
+    "first_solve.py": "limited by dbm_y_mean",
     "evaluate_your_own_x.py": "power 0.866844 W, feasible: True",
-    "price_of_a_constraint.py": "0.845869 W, and 0.02373 W for each further millimetre",
+    "price_of_a_constraint.py": "0.845869 W, and 0.02373 W per millimetre",
     "sweep.py": "15.0 mm: 0.84587 W, converged",
     "front.py": "the next millimetre for",
     "your_own_objective.py": "0.0 W/s: 0.845869 W",
