@@ -108,7 +108,7 @@ def starts(files: dict[str, str]) -> Iterator[str]:
         lifted = float(cost(nlp.start(problem, x, width), np.append(problem.p, width)))
         yield cells(
             name,
-            f"{sum(start.success for start in solution.starts)} of {STARTS}",
+            f"{sum(start.converged for start in solution.starts)} of {STARTS}",
             f"{np.median([start.iterations for start in solution.starts]):.0f}",
             f"{solution.objective:.6g}",
             f"{values.g[rows].max():.1e}",
@@ -179,7 +179,7 @@ def steps(files: dict[str, str]) -> Iterator[str]:
             f"{robot.mass_kg:.1f}",
             f"{time_s:.2f}",
             f"{step:.3f}",
-            f"{indexes['power_W']:.3f}" if solution.success else "not feasible",
+            f"{indexes['power_W']:.3f}" if solution.converged else "not feasible",
             f"{indexes['power_W'] * time_s / (robot.mass_kg * GRAVITY * step):.3f}",
             ", ".join(f"{1e3 * indexes[f'dbm_{axis}_min_m']:.0f}" for axis in "xy"),
             ", ".join(active.name for active in solution.active_constraints[:3]),
@@ -213,7 +213,7 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         indexes = build_exact_model(problem).at(x, problem.p).indexes
         robot, played = problem.display.robot, "-"
         assert robot is not None
-        if solution.success:
+        if solution.converged:
             plan = plan_of(Result(problem=problem, x=x), STEPS)
             walked = measure_walk(plan, play(plan), Drive(), STEPS)
             m = walked.measurements
@@ -228,7 +228,7 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
             f"{robot.mass_kg:.1f}",
             f"{indexes['speed_m_s']:.4f}",
             f"{indexes['step_length_m']:.3f}",
-            f"{indexes['power_W']:.3f}" if solution.success else "not feasible",
+            f"{indexes['power_W']:.3f}" if solution.converged else "not feasible",
             f"{indexes['cost_of_transport']:.3f}",
             ", ".join(f"{margin:.0f}" for margin in margins),
             ", ".join(active.name for active in solution.active_constraints[:3]),

@@ -59,7 +59,7 @@ def formulations(starts: int) -> list[Row]:
     return [
         Row(
             name="starts that converge, lifted",
-            value=sum(start.success for start in solution.starts) / starts,
+            value=sum(start.converged for start in solution.starts) / starts,
             unit="",
             note=f"{starts} starts, median {np.median(lifted):g} iterations",
         ),

@@ -33,9 +33,9 @@ def few_rows(starts: int, name: str = "nao-ssp", required: float | None = None) 
             started = time.process_time()
             ends[few].append(solver.run(problem, x0))
             times[few].append(time.process_time() - started)
-    best = min(end.cost for outcomes in ends.values() for end in outcomes if end.success)
+    best = min(end.cost for outcomes in ends.values() for end in outcomes if end.converged)
     reached = {
-        few: sum(end.success and end.cost <= best + SAME_OPTIMUM * abs(best) for end in outcomes)
+        few: sum(end.converged and end.cost <= best + SAME_OPTIMUM * abs(best) for end in outcomes)
         for few, outcomes in ends.items()
     }
     return [
@@ -59,8 +59,8 @@ def few_rows(starts: int, name: str = "nao-ssp", required: float | None = None) 
 def stairs_plan(starts: int) -> list[Row]:
     """Starts of the planned step."""
     solution = nlp_gait.solve("stairs-plan", starts=starts, seed=0, solver=IpoptSettings(compiled=True))
-    best = min(start.cost for start in solution.starts if start.success)
-    converged = [start for start in solution.starts if start.success]
+    best = min(start.cost for start in solution.starts if start.converged)
+    converged = [start for start in solution.starts if start.converged]
     reached = sum(start.cost <= best + SAME_OPTIMUM * abs(best) for start in converged)
     share = starts / 20
     return [

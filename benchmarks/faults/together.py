@@ -27,7 +27,7 @@ from nlp_gait.formulation import GaitProblem
 class Found(NamedTuple):
     """Of one solve: verdict and point, with the compiled objective and the time histories there, as they were computed."""
 
-    success: bool
+    converged: bool
     status: str
     objective: float
     x: tuple[float, ...]
@@ -42,7 +42,7 @@ def solved(problem: GaitProblem, objective: nlp_gait.CompiledObjective, start: i
     f, violation = objective(solution.x)
     history = problem.signals(solution.x)
     return Found(
-        solution.success,
+        solution.converged,
         solution.status,
         solution.objective,
         tuple(solution.x.values()),

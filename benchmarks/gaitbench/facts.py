@@ -104,7 +104,7 @@ def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None)
     problem, n = instance.gait_problem, len(instance.names)
     starts = next(count for most, count in effort.starts if n <= most)
     solution = nlp_gait.solve(problem, starts=starts, seed=0)
-    ends = [outcome for outcome in solution.starts if outcome.success]
+    ends = [outcome for outcome in solution.starts if outcome.converged]
     if not ends:
         raise NothingFound("no start of IPOPT converged to a feasible point")
     ends.sort(key=lambda outcome: outcome.cost)

@@ -99,18 +99,18 @@ def solve(
     if stopped:
         where = "printed" if target is None else f"in {target}"
         end_interrupted(f"{stopped}; the best point until then is {where}")
-    if not solution.success:
+    if not solution.converged:
         fail(solution.status)
 
 
 def _print(solution: Solution) -> None:
     value = with_unit(solution.objective, solution.objective_unit)
-    converged = sum(start.success for start in solution.starts)
+    converged = sum(start.converged for start in solution.starts)
     if solution.feasible:
         stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
     else:
         stdout.print(f"{solution.problem}: no feasible point was found ({solution.status})")
-    kind = "Optimum" if solution.success else "Best feasible point" if solution.feasible else "Least infeasible point"
+    kind = "Optimum" if solution.converged else "Best feasible point" if solution.feasible else "Least infeasible point"
     print_table(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
         print_rows(

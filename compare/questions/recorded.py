@@ -98,7 +98,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
 def _optimum(gait: RecordedGait, seed: int) -> Evaluation:
     problem = gait.make_planned()
     solution = solve(problem, starts=STARTS, seed=seed)
-    if not solution.success:
+    if not solution.converged:
         raise GaitError(solution.status)
     return evaluate(problem, solution.x)
 

@@ -108,7 +108,7 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
     values = exact.at(best.x, problem.p)
     violations = find_violated_rows(exact.rows(values))
     status = best.status
-    if not best.success:
+    if not best.converged:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
         status = f"no start converged; the best feasible one {best.status}"
         if not best.feasible:
@@ -119,7 +119,7 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         problem=problem.address,
         options=dict(problem.options),
         parameters=dict(problem.values),
-        success=best.success,
+        claimed=best.claimed,
         status=status,
         objective=best.objective,
         objective_name=problem.objective.name,
@@ -133,7 +133,7 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         solver=best.solver,
         linear_solver=best.linear_solver,
         functions=best.functions,
-        active_constraints=_active(problem, values, best.guess) if best.success and best.guess is not None else (),
+        active_constraints=_active(problem, values, best.guess) if best.converged and best.guess is not None else (),
         starts=tuple(outcomes),
         seed=seed,
     )

@@ -112,7 +112,7 @@ class Outcome:
         solver: its name.
         x0: (n,) start point.
         x: (n,) end point, within the bounds.
-        claimed: the solver claims success.
+        claimed: the solver claims a solution.
         status: how it ended, in words.
         objective: exact value at x, in the problem's sense.
         cost: the same as it is minimised: negated if the problem maximises it.
@@ -154,15 +154,15 @@ class Outcome:
         return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
 
     @property
-    def success(self) -> bool:
-        """Success is claimed, and the exact functions find it feasible."""
+    def converged(self) -> bool:
+        """Whether the solver claims a solution and the exact functions find it feasible."""
         return self.claimed and self.feasible
 
     @property
     def rank(self) -> tuple[float, float]:
         """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
         if self.feasible:
-            return (0.0 if self.success else 1.0), self.cost
+            return (0.0 if self.converged else 1.0), self.cost
         return 2.0, math.inf if math.isnan(self.violation) else self.violation
 
 
@@ -174,7 +174,7 @@ class Solution:
         problem: name.
         options: what the problem was built with.
         parameters: values that differ from the defaults.
-        success: at least one start converged to a point that is feasible for the exact functions.
+        claimed: the solver claims that x is a solution.
         status: in words; if nothing converged, what stands in the way.
         objective: exact value, in the problem's sense; name and unit beside it.
         x: by variable name.
@@ -194,7 +194,7 @@ class Solution:
     problem: str
     options: dict[str, Any]
     parameters: dict[str, float]
-    success: bool
+    claimed: bool
     status: str
     objective: float
     objective_name: str
@@ -214,13 +214,18 @@ class Solution:
 
     @property
     def feasible(self) -> bool:
-        """Whether the exact functions find x feasible."""
-        return self.violation <= FEASIBILITY_TOLERANCE
+        """Whether the exact functions find x feasible, with a finite objective."""
+        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.objective)
+
+    @property
+    def converged(self) -> bool:
+        """Whether a start converged to a feasible point: claimed by the solver, and feasible for the exact functions."""
+        return self.claimed and self.feasible
 
     def __repr__(self) -> str:
         """One line: what was found, and from how many starts."""
         found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
-        converged = sum(start.success for start in self.starts)
+        converged = sum(start.converged for start in self.starts)
         return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
 
     def _repr_html_(self) -> str:
@@ -269,7 +274,8 @@ class Solution:
         starts = [
             {
                 "index": index,
-                "success": start.success,
+                "claimed": start.claimed,
+                "feasible": start.feasible,
                 "status": start.status,
                 "objective": start.objective,
                 "violation": start.violation,
@@ -280,4 +286,4 @@ class Solution:
             }
             for index, start in enumerate(self.starts)
         ]
-        return {"schema": 1, **asdict(replace(self, starts=())), "starts": starts}
+        return {"schema": 1, **asdict(replace(self, starts=())), "feasible": self.feasible, "starts": starts}

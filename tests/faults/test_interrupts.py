@@ -72,8 +72,8 @@ def test_solve_within_a_later_start_keeps_the_best_of_the_earlier_ones(
     done = run("solve", "walk12", "--starts", "50", "--jobs", "1", "--out", str(out))
     kept = json.loads(out.read_text())
     starts = len(kept["starts"])
-    assert 2 <= starts < 50 and kept["success"] and kept["objective"] >= whole.objective - 1e-6
-    assert kept["starts"][-1]["status"] == "was interrupted" or kept["starts"][-1]["success"]
+    assert 2 <= starts < 50 and kept["feasible"] and kept["objective"] >= whole.objective - 1e-6
+    assert kept["starts"][-1]["status"] == "was interrupted" or kept["starts"][-1]["claimed"]
     assert kept["status"].startswith(f"interrupted in start {starts} of 50; ")
     assert f"interrupted in start {starts} of 50; the best point until then is in {out}" in done.stderr
     assert "walk12: f " in done.stdout
@@ -85,7 +85,7 @@ def test_solve_within_the_first_start_keeps_where_it_was(monkeypatch: pytest.Mon
         nlp_gait.solve(nlp_gait.load("walk12"), starts=2)
     solution = caught.value.partial
     assert isinstance(solution, nlp_gait.Solution)
-    assert not solution.success and solution.iterations == 3 and "was interrupted" in solution.status
+    assert not solution.converged and solution.iterations == 3 and "was interrupted" in solution.status
     assert isinstance(caught.value, KeyboardInterrupt)
     assert str(pickle.loads(pickle.dumps(caught.value))) == "interrupted in start 1 of 2"
 

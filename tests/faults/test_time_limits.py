@@ -42,7 +42,7 @@ def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -
     clock = iter(range(10_000))
     monkeypatch.setattr(iteration_watch.time, "perf_counter", lambda: float(next(clock)))
     solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=4.0))
-    assert not solution.success and "stopped at the time limit" in solution.status
+    assert not solution.converged and "stopped at the time limit" in solution.status
     assert 1 <= solution.iterations <= 4
     x = np.array(list(solution.x.values()))
     assert (x >= problem.lower).all() and (x <= problem.upper).all() and np.isfinite(solution.objective)
@@ -66,7 +66,7 @@ def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     problem = nlp_gait.load("walk12")
     slow_iterations(monkeypatch, 0.02)
     end = make_solver(name, time_limit_s=0.03).run(problem, problem.start_point(np.random.default_rng(0)))
-    assert (end.success, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
+    assert (end.converged, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
     record = attempt(Task(problem=WALK, solver=name, stop=Stop(time_limit_s=0.03)))
     assert record.status == "stopped at the time limit" and not record.claimed and record.x
 

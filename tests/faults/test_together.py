@@ -71,7 +71,7 @@ def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
         solution = nlp_gait.solve(problem, x0=points[k])
         history = problem.signals(solution.x)
         judged = float(evaluate(problem, solution.x).objective["value"])
-        return solution.success, solution.objective, history.arrays["q"].tobytes(), judged
+        return solution.converged, solution.objective, history.arrays["q"].tobytes(), judged
 
     with ThreadPoolExecutor(8) as pool:
         shared = list(pool.map(solved, range(8)))
@@ -149,7 +149,7 @@ child = os.fork()
 if child == 0:
     found = []
     for where in (lambda work: work(), lambda work: (alone := threading.Thread(target=work), alone.start(), alone.join(60))):
-        where(lambda: found.append(nlp_gait.solve(problem).success))
+        where(lambda: found.append(nlp_gait.solve(problem).converged))
     os._exit(0 if found == [True, True] else 1)
 print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 busy.join()

@@ -133,7 +133,7 @@ def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
 def test_ipopt_solves_it() -> None:
     """The slack costs, so that the least that is allowed is best; the rest is the problem below."""
     solution = nlp_gait.solve(with_slack(toy(corner, limit=2.0)), starts=2)
-    assert solution.success
+    assert solution.converged
     assert solution.x == pytest.approx({"x": 2.0, "y": 2.0, "slack_m": LEAST_SLACK}, abs=1e-6)
     assert solution.objective == pytest.approx(3.0 + 2.0 * LEAST_SLACK, abs=1e-6)
 

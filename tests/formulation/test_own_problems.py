@@ -31,7 +31,7 @@ def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
     problem = load(f"{EXAMPLE}:two_link", intervals=10)
     assert problem.name == "two-link" and problem.address == f"{EXAMPLE}:two_link"
     assert problem.options == {"intervals": 10, "lift_m": 0.05}
-    assert solve(problem, starts=2).success
+    assert solve(problem, starts=2).converged
     with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
         load(f"{EXAMPLE}:two_link", interval=10)
 

@@ -122,7 +122,7 @@ def solved(name: str) -> tuple[GaitProblem, Outcome]:
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solved(name)
-    assert end.success and end.guess is not None
+    assert end.converged and end.guess is not None
     model = build_nlp(problem)
     lifted = ca.Function("lifted", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"]])
     cost = float(lifted(end.guess.primal, np.append(problem.p, WIDTHS[-1])))

@@ -139,7 +139,7 @@ def sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int
     problem = spec.load()
     solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
     return [
-        {"at": value, "power_W": solution.objective, "feasible": solution.success}
+        {"at": value, "power_W": solution.objective, "feasible": solution.converged}
         for value, solution in zip(values, solutions, strict=True)
     ]
 

@@ -139,7 +139,7 @@ def free_height(spec: ProblemSpec, starts: int) -> dict[str, Any]:
         solution = solve(problem, starts=starts, seed=0)
         result = Result(problem=problem, x=problem.check_x(solution.x))
         found[name] = {
-            "success": solution.success,
+            "success": solution.converged,
             "power_W": solution.objective,
             "hip_m": float(finely_sampled(result).arrays["hip"][:, 2].mean()),
             "knee_deg": knee_deg(result),

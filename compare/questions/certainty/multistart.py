@@ -89,5 +89,5 @@ def _batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: i
     rows: list[list[Any]] = []
     for _ in range(count):
         end = solver.run(problem, problem.start_point(rng))
-        rows.append([end.x.tolist(), end.objective, bool(end.success), end.status])
+        rows.append([end.x.tolist(), end.objective, bool(end.converged), end.status])
     return list(without_nan(rows))

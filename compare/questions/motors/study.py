@@ -121,7 +121,7 @@ def motor_variants(
                 Variant(
                     name=name,
                     features=features,
-                    success=solution.success,
+                    success=solution.converged,
                     status=solution.status,
                     power_W=solution.objective,
                     unchanged_power_W=unchanged.cost,

@@ -143,13 +143,13 @@ def front_ends(
 ) -> tuple[FrontPoint, FrontPoint]:
     """Least power, and the point beyond which the criterion costs too much."""
     solution = solve(free, starts=2 * starts, seed=seed, solver=solver)
-    if not solution.success:
+    if not solution.converged:
         raise InputError(f"{free.name} has no front: {solution.status}")
     low = _reached(free, criterion, solution)
     reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
     ending = rewarding(free, criterion).with_values(**{REWARD: reward})
     solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
-    if not solution.success:
+    if not solution.converged:
         raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
     return low, _reached(free, criterion, solution)
 

@@ -99,7 +99,7 @@ def pareto_surface(
     solutions = solve_both_ways(limited, starts=starts, seed=seed, solver=solver, progress=lambda: progress("surface"))
     found, infeasible = [], []
     for at, solution in zip(walk, solutions, strict=True):
-        if not solution.success:
+        if not solution.converged:
             infeasible.append(at)
             continue
         x = free.check_x(solution.x)

@@ -238,6 +238,6 @@ def _neighbour(base: Solved, problem: GaitProblem | None) -> Outcome | None:
     if problem is None:
         return None
     end = SHARP.run_from(problem, base.near)
-    if end is None or not end.success:
+    if end is None or not end.converged:
         end = SHARP.run(problem, np.clip(base.near.x, problem.lower, problem.upper))
-    return end if end.success else None
+    return end if end.converged else None

@@ -162,5 +162,5 @@ def _found(
 
 
 def _require(solution: Solution, what: str) -> None:
-    if not solution.success:
+    if not solution.converged:
         raise InputError(f"{what}: {solution.status}; a smaller uncertainty or more --starts may help")

@@ -200,7 +200,7 @@ def _point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
         return SweepPoint(
             at=at,
             objective=end.objective,
-            feasible=end.success,
+            feasible=end.converged,
             status=end.status,
             x=end.x,
             violation=end.violation,

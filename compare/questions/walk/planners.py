@@ -175,7 +175,7 @@ def least_torque(spec: ProblemSpec, gait: Gait, starts: int, seed: int, store: S
     problem = replace(spec, options={**spec.options, "objective": "torque"}).load().with_values(**own.values)
     same = {name: gait.found.x[name] for name in (*own.display.durations, LIFT)}
     solution = solve(problem, starts=starts, seed=seed, fix=same, solver=store_runs(store))
-    if not solution.success:
+    if not solution.converged:
         return None, solution.status
     return Result(problem=problem, x=problem.check_x(solution.x)), ""
 

@@ -68,7 +68,7 @@ class Continuation:
 
 def find_cheapest_feasible(outcomes: Sequence[Outcome]) -> Outcome | None:
     """Cheapest outcome that succeeded, if there is one."""
-    return min((outcome for outcome in outcomes if outcome.success), key=lambda found: found.cost, default=None)
+    return min((outcome for outcome in outcomes if outcome.converged), key=lambda found: found.cost, default=None)
 
 
 def solve_both_ways(

@@ -115,7 +115,7 @@ def optimum(problem: GaitProblem, near: Outcome) -> Optimum:
             "fewer intervals may help"
         )
     sharper = SHARP.run_from(problem, near)
-    guess = near.guess if sharper is None or sharper.guess is None or not sharper.success else sharper.guess
+    guess = near.guess if sharper is None or sharper.guess is None or not sharper.converged else sharper.guess
     return _with_flat_lifts_held(_converged(problem, functions, guess))
 
 

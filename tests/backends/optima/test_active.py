@@ -24,5 +24,5 @@ def on_a_line(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constr
 @pytest.mark.parametrize(("fix", "expected"), [({}, "most"), ({"x": 0.1}, "bounds[x]")])
 def test_equations_are_left_out(fix: dict[str, float], expected: str) -> None:
     solution = solve(toy(on_a_line), x0=[0.1, 0.1], fix=fix)
-    assert solution.success, solution.status
+    assert solution.converged, solution.status
     assert [(bound.name, bound.side) for bound in solution.active_constraints] == [(expected, "upper")]

@@ -47,7 +47,7 @@ def test_infeasible_problems_are_named_and_the_path_goes_on() -> None:
     calls: list[None] = []
     found = solve_both_ways(path(toy(corner), limits), starts=2, progress=lambda: calls.append(None))
     assert len(calls) == 2 * len(limits)
-    assert [solution.success for solution in found] == [True, True, False, True, True]
+    assert [solution.converged for solution in found] == [True, True, False, True, True]
     assert "in the way: row" in found[2].status
     costs = [found[k].objective for k in (0, 1, 3, 4)]
     assert costs == pytest.approx([0.0, 0.6, 1.5, 3.0], abs=TOLERANCE)
@@ -57,7 +57,7 @@ def test_infeasible_problems_are_named_and_the_path_goes_on() -> None:
 
 def test_one_problem_alone() -> None:
     (solution,) = solve_both_ways(path(toy(corner), [1.5]), starts=1)
-    assert solution.success and solution.objective == pytest.approx(1.5, abs=TOLERANCE)
+    assert solution.converged and solution.objective == pytest.approx(1.5, abs=TOLERANCE)
 
 
 def test_nothing_is_rebuilt_along_the_path(monkeypatch: pytest.MonkeyPatch) -> None:

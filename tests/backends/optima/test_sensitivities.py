@@ -37,7 +37,7 @@ def solved(problem: GaitProblem) -> tuple[Outcome, Optimum]:
 
 def sharp(problem: GaitProblem, near: Outcome) -> Outcome:
     end = SHARP.run_from(problem, near)
-    assert end is not None and end.success
+    assert end is not None and end.converged
     return end
 
 

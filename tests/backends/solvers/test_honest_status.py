@@ -27,23 +27,23 @@ def rough(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> Result:
     return 1e6 * (x - 0.3) ** 2 + (y - 0.2) ** 4 + 1e-9 * ca.sin(1e7 * x), ()
 
 
-def test_an_acceptable_level_is_a_success_that_says_so() -> None:
+def test_an_acceptable_level_counts_as_converged_and_says_so() -> None:
     solution = solve(toy(rough), solver=IpoptSettings(tolerance=1e-14))
-    assert solution.success
+    assert solution.converged
     assert solution.status == "converged to IPOPT's acceptable level only"
     assert solution.starts[0].status == solution.status
 
 
 def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
     solution = solve(toy(corner), solver=IpoptSettings(tolerance=1e-30))
-    assert not solution.success
+    assert not solution.converged
     assert solution.violation == 0.0
     assert solution.status == "no start converged; the best feasible one search direction became too small"
 
 
 def test_contradicting_limits_are_called_local_infeasibility() -> None:
     solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(x**2 + y**2, upper=-2 * limit),))))
-    assert not solution.success
+    assert not solution.converged
     assert (
         "the least infeasible one converged to a point of local infeasibility; in the way: row (by 1 m)"
         in solution.status
@@ -65,11 +65,11 @@ def test_too_many_equations_are_called_that(capfd: pytest.CaptureFixture[str]) -
     ],
     ids=["nan", "inf"],
 )
-def test_an_objective_without_a_value_is_no_success_and_no_noise(
+def test_an_objective_without_a_value_is_not_converged_and_not_noisy(
     mathematics: Mathematics, objective: float, capfd: pytest.CaptureFixture[str]
 ) -> None:
     solution = solve(toy(mathematics), starts=2)
-    assert not solution.success
+    assert not solution.converged
     assert "a function returned NaN or inf" in solution.status
     assert solution.status.endswith(f"; cost is {objective} there")
     assert "".join(capfd.readouterr()) == ""  # CasADi would warn at every call
@@ -77,9 +77,9 @@ def test_an_objective_without_a_value_is_no_success_and_no_noise(
 
 def test_starts_from_where_a_row_has_no_value_do_not_hide_the_others() -> None:
     solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit),))), starts=4)
-    assert solution.success
+    assert solution.converged
     assert solution.objective == pytest.approx(-0.75, abs=1e-6)  # sqrt(x) >= 0.5, y >= -1
-    assert {start.success for start in solution.starts} == {True, False}
+    assert {start.converged for start in solution.starts} == {True, False}
 
 
 def test_a_row_without_a_value_is_violated_and_named() -> None:
@@ -110,7 +110,7 @@ def end(claimed: bool, cost: float, violation: float) -> Outcome:
     )
 
 
-def test_outcomes_rank_by_success_then_feasibility_then_violation() -> None:
+def test_outcomes_rank_by_convergence_then_feasibility_then_violation() -> None:
     ranked = [
         end(True, 2.0, 0.0),
         end(True, 3.0, 1e-7),
@@ -123,8 +123,8 @@ def test_outcomes_rank_by_success_then_feasibility_then_violation() -> None:
     ranks = [item.rank for item in ranked]
     assert ranks == sorted(ranks)
     assert len(set(ranks)) == len(ranks)
-    assert [item.success for item in ranked] == [True, True, *[False] * 5]
-    assert not end(True, math.nan, 0.0).success
+    assert [item.converged for item in ranked] == [True, True, *[False] * 5]
+    assert not end(True, math.nan, 0.0).converged
     assert set(CONVERGED) < set(STATUS_WORDS)
 
 
@@ -142,7 +142,7 @@ def test_what_ipopt_returns_is_said_in_words(returned: str, words: str) -> None:
     ready = IpoptSettings(iterations=1).prepare(problem)
     ready.cold = Returning(ready.cold, returned)  # type: ignore[assignment]
     outcome = ready.run(problem, np.array([-2.0, -1.0]))
-    assert (outcome.success, outcome.claimed, outcome.status) == (False, False, words)
+    assert (outcome.converged, outcome.claimed, outcome.status) == (False, False, words)
 
 
 class Returning:

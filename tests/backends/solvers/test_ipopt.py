@@ -45,7 +45,7 @@ def point(solution: Solution) -> np.ndarray:
 def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pytest.FixtureRequest) -> None:
     problem, solution = request.getfixturevalue(phase)
     cost, violation, *_ = build_exact_model(problem).at(point(solution), problem.p)
-    assert solution.success
+    assert solution.converged
     assert solution.status == "converged"
     assert violation <= FEASIBILITY_TOLERANCE
     assert (solution.violation, solution.objective) == (violation, cost)
@@ -69,7 +69,7 @@ def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.Fixtu
         assert bound.price_unit == "W per m"
         moved = problem.with_values(**{parameter: bound.bound + PRICE_STEP})
         again = solve(moved, x0=point(solution))
-        assert again.success
+        assert again.converged
         assert (again.objective - solution.objective) / PRICE_STEP == pytest.approx(bound.price, rel=PRICE_TOLERANCE)
 
 
@@ -112,7 +112,7 @@ def test_compiled_functions_in_the_cache_folder_do_not_change_a_solve() -> None:
 def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Solution]) -> None:
     problem, free = double_support
     held = solve(problem, x0=point(free), fix={"double_support_time_s": 1.0})
-    assert held.success
+    assert held.converged
     assert held.x["double_support_time_s"] == 1.0
     assert held.objective > free.objective
     assert held.parameters == {"double_support_time_s.lower": 1.0, "double_support_time_s.upper": 1.0}
@@ -122,7 +122,7 @@ def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Sol
 def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
     problem = load("nao-dsp").with_values(dbm_y_mean_limit_m=0.2)  # the box of both soles is 0.18 m wide
     solution = solve(problem, starts=1, solver=IpoptSettings(iterations=60))
-    assert not solution.success
+    assert not solution.converged
     assert solution.status.startswith("no start converged to a feasible point; the least infeasible one ")
     assert "in the way: " in solution.status
     assert "dbm_y_mean" in [row.name for row in solution.worst_violations]
@@ -133,7 +133,7 @@ def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
 @pytest.mark.parametrize(("limit", "objective", "price"), [(0.5, 0.0, None), (1.5, 1.5, 3.0)])
 def test_a_corner_by_hand(limit: float, objective: float, price: float | None) -> None:
     solution = solve(toy(corner).with_values(limit=limit), starts=2)
-    assert solution.success
+    assert solution.converged
     assert solution.objective == pytest.approx(objective, abs=TOY_TOLERANCE)
     assert list(solution.x.values()) == pytest.approx([max(limit, 1.0)] * 2, abs=TOY_TOLERANCE)
     prices = {bound.name: (bound.side, bound.bound, bound.price_unit) for bound in solution.active_constraints}
@@ -143,7 +143,7 @@ def test_a_corner_by_hand(limit: float, objective: float, price: float | None) -
 
 def test_a_corner_out_of_reach_is_missed_by_what_it_is_out_of_reach() -> None:
     solution = solve(toy(corner).with_values(limit=2.5), starts=2)
-    assert not solution.success
+    assert not solution.converged
     (violation,) = solution.worst_violations
     assert (violation.name, violation.lower, violation.unit) == ("row", 2.5, "m")
     assert violation.violation == pytest.approx(0.5, abs=1e-4)  # x ends at 2, its upper bound
@@ -185,7 +185,7 @@ def test_start_points_come_from_the_bounds_and_x0_goes_first() -> None:
 
 def test_an_iteration_limit_is_reported_as_such() -> None:
     solution = solve(load("nao-dsp"), solver=IpoptSettings(iterations=2))
-    assert not solution.success
+    assert not solution.converged
     assert "stopped at the iteration limit" in solution.status
     assert solution.starts[0].iterations == 2 * 2  # on few rows, and on all
 

@@ -76,7 +76,7 @@ def test_a_path_of_problems_is_followed_by_any_solver(chosen: str) -> None:
 def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
     problem = toy(corner, limit=1.5)
     solution = solve(problem, starts=2, solver=Corners())
-    assert solution.success and solution.status == "tried" and solution.objective == pytest.approx(1.5)
+    assert solution.converged and solution.status == "tried" and solution.objective == pytest.approx(1.5)
     assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
     ends = multistart(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
     assert ends.success.all() and ends.objective == pytest.approx([1.5] * 3)

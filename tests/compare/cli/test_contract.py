@@ -44,7 +44,7 @@ def test_solve_search_and_compare(tmp_path):
     solution = as_json("solve", "nao-ssp", "--starts", "1", "--seed", "0")
     for key in (
         "status",
-        "success",
+        "claimed",
         "objective",
         "x",
         "iterations",
@@ -54,7 +54,7 @@ def test_solve_search_and_compare(tmp_path):
         "starts",
     ):
         assert key in solution
-    assert solution["success"] and solution["objective"] == pytest.approx(0.845868, rel=1e-5)
+    assert solution["claimed"] and solution["feasible"] and solution["objective"] == pytest.approx(0.845868, rel=1e-5)
     runs = as_json("search", "nao-ssp", "--algorithm", "pso", "--runs", "2", "--seed", "3", "--evaluations", "1000")[
         "runs"
     ]

@@ -63,7 +63,7 @@ def test_they_take_part_and_an_edit_runs_again_just_what_it_changes(mine: Path) 
 
 def test_every_command_takes_them(mine: Path) -> None:
     best = as_json("solve", "my.py:two_link", "--starts", "3", "--out", "best.json", "--option", "intervals=10")
-    assert best["problem"] == "my.py:two_link" and best["success"]
+    assert best["problem"] == "my.py:two_link" and best["claimed"] and best["feasible"]
     x = ",".join(map(repr, best["x"].values()))
     verdict = as_json("evaluate", "my.py:two_link", "--option", "intervals=10", "--x", x)
     assert verdict["objective"]["value"] == pytest.approx(best["objective"])

@@ -103,7 +103,7 @@ def test_solve_takes_any_nlp_solver_by_name(tmp_path: Path) -> None:
     shown = nlp_gait("solve", "walk12", "--starts", "1", "--solver", "slsqp", "--out", out).stdout
     written = json.loads(out.read_text())
     assert "; slsqp\n" in shown and written["solver"] == "slsqp" and written["linear_solver"] == ""
-    assert written["success"] and written["active_constraints"] == []
+    assert written["claimed"] and written["active_constraints"] == []
     assert "unknown NLP solver 'simplex'" in one_sentence("solve", "walk12", "--solver", "simplex")
 
 

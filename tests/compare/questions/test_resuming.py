@@ -171,7 +171,7 @@ def test_a_solve_that_was_stopped_is_not_finished(tmp_path: Path) -> None:
     stopped = solver.run(problem, x0, lambda: True)
     assert stopped.status == "was interrupted" and not list((tmp_path / "store").iterdir())
     whole = solver.run(problem, x0)
-    assert whole.success and len(list((tmp_path / "store").iterdir())) == 1
+    assert whole.converged and len(list((tmp_path / "store").iterdir())) == 1
     warm = solver.run_from(problem, whole)
     later = store_runs(Store(tmp_path))
     kept = later.run(problem, x0)

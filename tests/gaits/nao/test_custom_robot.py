@@ -47,7 +47,7 @@ def test_another_humanoid_is_solved_without_any_setting(
     gaits: dict[str, tuple[GaitProblem, Solution]], name: str
 ) -> None:
     _, solution = gaits[name]
-    assert [start.success for start in solution.starts] == [True, True]
+    assert [start.converged for start in solution.starts] == [True, True]
     # In double support there are two optima, 0.71137 and 0.71158 W: eight starts on all rows end in the second.
     assert solution.starts[0].objective == pytest.approx(solution.starts[1].objective, rel=5e-4)
 

@@ -41,7 +41,7 @@ def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
 @pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
 def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> None:
     solution = solve(load(optimum["problem"], **optimum["options"]), starts=2, seed=1)
-    assert [start.success for start in solution.starts] == [True, True]
+    assert [start.converged for start in solution.starts] == [True, True]
     for start in solution.starts:
         assert start.objective == pytest.approx(optimum["power_W"], rel=1e-5)
 

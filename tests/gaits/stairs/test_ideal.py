@@ -30,7 +30,7 @@ def solution(problem: GaitProblem) -> nlp_gait.Solution:
 
 @pytest.mark.slow
 def test_case_2_meets_the_known_optimum(solution: nlp_gait.Solution) -> None:
-    assert solution.success, solution.status
+    assert solution.converged, solution.status
     assert solution.objective == pytest.approx(KNOWN[2], rel=KNOWN_TOLERANCE)
     assert solution.iterations < 100
 

@@ -62,7 +62,7 @@ def test_limits_and_scales_of_rows(problem: GaitProblem) -> None:
 
 @pytest.mark.slow
 def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
-    assert solution.success, solution.status
+    assert solution.converged, solution.status
     assert solution.objective == pytest.approx(BEST_ENERGY_J, rel=1e-4)
     judged = evaluate(problem, list(solution.x.values()))
     assert judged.feasible
@@ -82,7 +82,7 @@ def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait
 def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
     steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
     refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=nlp_gait.IpoptSettings(iterations=40))
-    assert not refused.success
+    assert not refused.converged
     assert "in the way: " in refused.status
     assert refused.worst_violations[0].name.startswith(("reach", "link_", "knee_angle"))
 

@@ -72,7 +72,7 @@ def test_multiple_shooting_meets_the_ants() -> None:
     """On the first 0.08 s, which solve in seconds."""
     short = nlp_gait.load("stairs-track", duration_s=0.08)
     solution = nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED)
-    assert solution.success, solution.status
+    assert solution.converged, solution.status
     found = minimize(nlp_gait.compile_objective(short), AntColony(), evaluations=2_000, seed=0)
     assert found.feasible
     assert found.objective == pytest.approx(solution.objective, rel=AGREEMENT)
@@ -102,7 +102,7 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
 @pytest.mark.slow
 def test_ipopt_solves_with_the_network() -> None:
     short = nlp_gait.load("stairs-track", duration_s=0.04, inverse_kinematics="network")
-    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).success
+    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).converged
 
 
 def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -> None:
