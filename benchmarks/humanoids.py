@@ -156,8 +156,8 @@ def steps(files: dict[str, str]) -> Iterator[str]:
     """Cheapest single supports of NAO's 2 s times the root of lambda, in the model and played: equal Froude numbers."""
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.plan import plan_of
-    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.simulate import simulate_plan
 
     yield header("robot", "leg m", "mass kg", "time s", "step m", "power W", "CoT", "margins mm", "binding", "engine")
     for name, file in files.items():
@@ -169,8 +169,8 @@ def steps(files: dict[str, str]) -> Iterator[str]:
         solution = nlp_gait.solve(problem, starts=2, seed=0)
         x = np.array(list(solution.x.values()))
         indexes, hip = build_exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
-        plan = plan_of(Result(problem=problem, x=x))
-        m = measure(plan, play(plan), Drive())
+        plan = make_plan(Result(problem=problem, x=x))
+        m = measure(plan, simulate_plan(plan), Drive())
         fate = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"upright, tilt {m.largest_tilt_deg:.1f} deg"
         step = float(hip[0, 0])
         yield cells(
@@ -190,9 +190,9 @@ def steps(files: dict[str, str]) -> Iterator[str]:
 def cycles(files: dict[str, str]) -> Iterator[str]:
     """Cheapest cycles at NAO's 0.03 m/s times the root of lambda, in the model and over some steps in the engine."""
     from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.plan import plan_of
-    from nlp_gait.simulation.playback import play
-    from nlp_gait.simulation.walking import measure_walk
+    from nlp_gait.simulation.measurements import measure_walk
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.simulate import simulate_plan
 
     yield header(
         "robot",
@@ -214,8 +214,8 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         robot, played = problem.display.robot, "-"
         assert robot is not None
         if solution.converged:
-            plan = plan_of(Result(problem=problem, x=x), STEPS)
-            walked = measure_walk(plan, play(plan), Drive(), STEPS)
+            plan = make_plan(Result(problem=problem, x=x), STEPS)
+            walked = measure_walk(plan, simulate_plan(plan), Drive(), STEPS)
             m = walked.measurements
             played = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"{walked.steps_done} steps"
             if walked.engine_J_per_planned_m is not None:

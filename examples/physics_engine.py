@@ -11,21 +11,21 @@ import matplotlib.pyplot as plt
 import nlp_gait
 from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import averaged_pressure, measure
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.measurements import average_pressure, measure
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 problem = nlp_gait.load("nao-ssp")
 solution = nlp_gait.solve(problem, starts=2)
-plan, drive = plan_of(Result(problem=problem, x=problem.check_x(solution.x))), Drive()
-trace = play(plan, drive=drive)
+plan, drive = make_plan(Result(problem=problem, x=problem.check_x(solution.x))), Drive()
+trace = simulate_plan(plan, drive=drive)
 found = measure(plan, trace, drive)
 print("it fell" if found.fallen else f"it stayed up, tilting by {found.largest_tilt_deg:.2f} degrees at most")
 print(f"power: {found.predicted.total_W:.3f} W by the model, {found.measured.total_W:.3f} W in the engine")
 print(f"centre of pressure: {1000 * found.pressure_rms_m:.1f} mm from the planned ZMP (root mean square)")
 
 during = trace.t <= plan.duration_s
-t, pressure = trace.t[during], averaged_pressure(trace, drive.period_s)[during]
+t, pressure = trace.t[during], average_pressure(trace, drive.period_s)[during]
 figure, both = plt.subplots(2, 1, figsize=(6, 4), sharex=True, layout="constrained")
 for axes, k, name in zip(both, (0, 1), "xy", strict=True):
     axes.plot(t, 1000 * pressure[:, k], label="centre of pressure, engine")

@@ -14,10 +14,9 @@ from benchmarks.engine.gaits import PAPER, optimal_cycles, phase_gaits, random_g
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import DRIVES, Drive
-from nlp_gait.simulation.measurements import Measurements, measure
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import Walk, measure_walk
+from nlp_gait.simulation.measurements import Measurements, Walk, measure, measure_walk
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 STEPS, MANY_STEPS = 10, 30
 RANDOM = 30
@@ -50,8 +49,8 @@ KINDS: dict[str, dict[str, str]] = {
 
 def walked(result: Result, steps: int, drive: Drive | None = None, sole: str = "rectangle") -> Walk:
     """A cycle played for so many steps."""
-    drive, plan = drive or Drive(), plan_of(result, steps)
-    return measure_walk(plan, play(plan, drive=drive, sole=sole), drive, steps)
+    drive, plan = drive or Drive(), make_plan(result, steps)
+    return measure_walk(plan, simulate_plan(plan, drive=drive, sole=sole), drive, steps)
 
 
 def waterfall() -> Iterator[str]:
@@ -166,5 +165,5 @@ def load_published() -> Iterator[str]:
 
 
 def _played(result: Result, drive: Drive) -> Measurements:
-    plan = plan_of(result)
-    return measure(plan, play(plan, drive=drive), drive)
+    plan = make_plan(result)
+    return measure(plan, simulate_plan(plan, drive=drive), drive)

@@ -10,13 +10,12 @@ from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.gaits import optimal_cycles
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import SPEED
-from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.measurements import Walk, measure_walk
+from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.robustness import DIRECTIONS
-from nlp_gait.simulation.walking import Walk, measure_walk
+from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
 SLOPE = math.radians(3.0)
 IMPULSE = 1.0  # [N s]
@@ -54,8 +53,8 @@ HARD = ("as planned", "floor rises 3 degrees backward", "servo stiffness -30 %",
 
 def walked(steps: int, conditions: Conditions, feedback: Feedback | None) -> Walk:
     """So many steps of the cheapest cycle at ``SPEED``."""
-    plan, drive = plan_of(optimal_cycles((SPEED,))[SPEED], steps), Drive(feedback=feedback)
-    return measure_walk(plan, play(plan, conditions, drive), drive, steps)
+    plan, drive = make_plan(optimal_cycles((SPEED,))[SPEED], steps), Drive(feedback=feedback)
+    return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, steps)
 
 
 def told(walk: Walk) -> tuple[str, str, str]:

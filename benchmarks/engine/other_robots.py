@@ -17,12 +17,10 @@ from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
 from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, row_of
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.walk12 import simulation_model as walk12_model
-from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import Measurements, measure
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import Walk, measure_walk
+from nlp_gait.simulation.measurements import Measurements, Walk, measure, measure_walk
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import Conditions, simulate_plan
 
 CASE = 2  # of Table IV, the problems' default
 # What the ideal step keeps in reserve: ZMP 4 cm inside the foot, 100 N on it, friction that exists.
@@ -45,8 +43,8 @@ def walk12() -> Iterator[str]:
         "gait", "ZMP in the sole, share", "fate", "steps", "way", "tilt, first step", "CoP mm", "model J/m", "engine"
     )
     for label, result in walks().items():
-        plan = plan_of(result, STEPS)
-        trace = play(plan)
+        plan = make_plan(result, STEPS)
+        trace = simulate_plan(plan)
         found = measure_walk(plan, trace, Drive(), STEPS)
         m = found.measurements
         first = trace.t <= plan.duration_s / STEPS
@@ -67,8 +65,8 @@ def stairs() -> Iterator[str]:
     """One step up: plans, tracked steps and the ideal; energies in J, |torque x rate|."""
     yield header("gait", "fate", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
     for label, result in climbs():
-        plan = plan_of(result)
-        m = measure(plan, play(plan), Drive())
+        plan = make_plan(result)
+        m = measure(plan, simulate_plan(plan), Drive())
         landing = 1e3 * m.landings["right"].error_m
         yield cells(
             label,
@@ -84,7 +82,7 @@ def stairs() -> Iterator[str]:
 
 def other_gains() -> Iterator[str]:
     """How both fare with other gains, feed-forward, friction and steps of the engine."""
-    climb = plan_of(optimal_climb(nlp_gait.load("stairs-plan")))
+    climb = make_plan(optimal_climb(nlp_gait.load("stairs-plan")))
     fast, slow = row_of(0.15), TABLE_4[0]
     yield header(
         "variant",
@@ -97,7 +95,7 @@ def other_gains() -> Iterator[str]:
     )
 
     def row(label: str, drive: Drive, conditions: Conditions | None = None) -> str:
-        m = measure(climb, play(climb, conditions, drive), drive)
+        m = measure(climb, simulate_plan(climb, conditions, drive), drive)
         first, second = (_walked(printed, drive, conditions) for printed in (fast, slow))
         return cells(
             label,
@@ -141,8 +139,8 @@ def fate(m: Measurements) -> str:
 
 def _walked(printed: PaperRow, drive: Drive, conditions: Conditions | None) -> Walk:
     problem = nlp_gait.load("walk12").with_values(step_time_s=printed.step_time_s)
-    plan = plan_of(_at(problem, printed.x), STEPS)
-    return measure_walk(plan, play(plan, conditions, drive), drive, STEPS)
+    plan = make_plan(_at(problem, printed.x), STEPS)
+    return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, STEPS)
 
 
 def walks() -> dict[str, Result]:
@@ -190,7 +188,7 @@ def _at(problem: GaitProblem, x: object) -> Result:
 
 def _stable_share(result: Result) -> float:
     """Share of the step's time in which the planned ZMP is within the standing sole."""
-    plan = plan_of(result, 1)
+    plan = make_plan(result, 1)
     foot, x, y = plan.robot.feet["left"], *plan.signals.arrays["zmp"].T
     within = (x >= -foot.back_m) & (x <= foot.front_m) & (y >= -foot.right_m) & (y <= foot.left_m)
     return float(within.mean())

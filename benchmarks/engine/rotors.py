@@ -9,9 +9,9 @@ from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.gaits import optimal_cycles
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import Plan, plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import measure_walk
+from nlp_gait.simulation.measurements import measure_walk
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 SPEEDS = (0.05, 0.1)  # [m/s]
 
@@ -21,7 +21,7 @@ def rotors() -> Iterator[str]:
     yield header("planned", "m/s", "single support s", "model", "engine without rotors", "engine with rotors")
     for label, options in (("without rotors", {}), ("with rotors", {"motors": "rotor"})):
         for speed, result in optimal_cycles(SPEEDS, **options).items():
-            plan = plan_of(result, STEPS)
+            plan = make_plan(result, STEPS)
             heavy = optimal_cycles(SPEEDS, motors="rotor")[speed].problem.display.simulation_model
             assert heavy is not None  # a cycle has one; for the type checker
             model, light = energies(plan, {})
@@ -33,6 +33,6 @@ def rotors() -> Iterator[str]:
 def energies(plan: Plan, armatures_kgm2: dict[str, float]) -> tuple[str, str]:
     """The model's and the engine's, whose robot has these rotors whatever was planned [J per planned metre]."""
     played = replace(plan, robot=replace(plan.robot, armatures_kgm2=armatures_kgm2))
-    walk = measure_walk(played, play(played), Drive(), STEPS)
+    walk = measure_walk(played, simulate_plan(played), Drive(), STEPS)
     energy = walk.engine_J_per_planned_m
     return f"{walk.model_J_per_m:.2f}", "falls" if energy is None else f"{energy:.2f}"

@@ -12,9 +12,9 @@ from nlp_gait.simulation import measurements, mjcf
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.film import recording
 from nlp_gait.simulation.measurements import measure
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.robustness import DIRECTIONS, robustness
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.robustness import DIRECTIONS, measure_robustness
+from nlp_gait.simulation.simulate import simulate_plan
 
 SPEED = 0.05  # [m/s]
 VARIANTS = {
@@ -51,10 +51,10 @@ def gains() -> Iterator[str]:
         "way",
     )
     cycle = optimal_cycles()[SPEED]
-    plans = [plan_of(optimum(name)) for name in PAPER]
+    plans = [make_plan(optimum(name)) for name in PAPER]
 
     def row(label: str, drive: Drive, sole: str = "rectangle") -> str:
-        powers = [measure(plan, play(plan, drive=drive, sole=sole), drive) for plan in plans]
+        powers = [measure(plan, simulate_plan(plan, drive=drive, sole=sole), drive) for plan in plans]
         phases = [f"{m.measured.total_W:.4f}{', falls' if m.fallen else ''}" for m in powers]
         return cells(label, *phases, *energies(walked(cycle, STEPS, drive, sole)))
 
@@ -72,7 +72,7 @@ def survival() -> Iterator[str]:
     yield header("gait", f"push N s {ways}", f"slope deg, rising {ways}", "friction 0.3 to 1.0", "mass -10 % / +10 %")
     for name in PAPER:
         for label, gait in phase_gaits(name).items():
-            r = robustness(plan_of(gait))
+            r = measure_robustness(make_plan(gait))
             pushes, slopes = (" / ".join(f"{v:g}" for v in values.values()) for values in (r.push_Ns, r.slope_deg))
             falls = [f"{value:g}" for value, survived in r.friction.items() if not survived]
             masses = " / ".join("stays up" if survived else "falls" for survived in r.mass_factor.values())

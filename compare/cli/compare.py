@@ -86,10 +86,10 @@ def compare(
     from compare.study.study import Study, check_study, run_study
     from nlp_gait.backends.kernel.compiled import available_cores
     from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.engine import mujoco
+    from nlp_gait.simulation.engine import load_mujoco
 
     if engine:
-        mujoco()  # if it is missing, say so before the work
+        load_mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
         _refuse_others(context, "--config" if config is not None else "--resume")
     name_all(code)

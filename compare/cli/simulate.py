@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.film.recording import Player
     from nlp_gait.simulation.film.video import Frame
-    from nlp_gait.simulation.measurements import Measurements
+    from nlp_gait.simulation.measurements import Measurements, Walk
     from nlp_gait.simulation.plan import Plan
-    from nlp_gait.simulation.playback import Trace
     from nlp_gait.simulation.robustness import Robustness
-    from nlp_gait.simulation.walking import Walk
+    from nlp_gait.simulation.simulate import Simulation
 
 
 @command
@@ -68,40 +67,40 @@ def simulate(
     from nlp_gait.export.tables import write_npz
     from nlp_gait.files import without_nan, writable_folder, write_json, write_text
     from nlp_gait.formulation.result import load_result
-    from nlp_gait.simulation.engine import mujoco
-    from nlp_gait.simulation.film.film import picture_size
+    from nlp_gait.simulation.engine import load_mujoco
+    from nlp_gait.simulation.film.film import parse_picture_size
     from nlp_gait.simulation.film.video import check_frames, check_video_path
-    from nlp_gait.simulation.film.viewer import shown
+    from nlp_gait.simulation.film.viewer import show_in_window
     from nlp_gait.simulation.load_sharing import Sharing
     from nlp_gait.simulation.load_sharing import share_loads as anew
-    from nlp_gait.simulation.mjcf import plan_model
-    from nlp_gait.simulation.plan import plan_of
-    from nlp_gait.simulation.playback import SETTLE_TIME, play
-    from nlp_gait.simulation.robustness import robustness as sweep
+    from nlp_gait.simulation.mjcf import make_plan_model
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.robustness import measure_robustness as sweep
+    from nlp_gait.simulation.simulate import SETTLE_TIME, simulate_plan
 
-    mujoco(pictures=film.video is not None)
+    load_mujoco(pictures=film.video is not None)
     if viewer and film.video is not None:
         fail("--viewer and --video exclude each other; film it in a second run")
     if film.beside is not None and film.video is None:
         fail("--beside puts a second gait into a film; name the film with --video FILE.mp4 or FILE.gif")
-    size = picture_size(film.size)
+    size = parse_picture_size(film.size)
     target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else writable_folder(out)
     drive, conditions = servos.make(), world.make()
     gaits = [(stored.result, stored.load())]
     gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
-    plans = [plan_of(gait, steps) for _, gait in gaits]
+    plans = [make_plan(gait, steps) for _, gait in gaits]
     if share_loads:
         plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
     if film.video is not None:
         for each in plans:
             check_frames((each.duration_s + SETTLE_TIME) / film.speed, film.frames_per_s)
-    plan, players = plans[0], [partial(play, plan, conditions, drive, sole) for plan in plans]
+    plan, players = plans[0], [partial(simulate_plan, plan, conditions, drive, sole) for plan in plans]
     if target is not None:
         titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]
         traces = _filmed(film, target, size, list(zip(titles, plans, players, strict=True)))
     else:
-        traces = [shown(players[0]) if viewer else players[0]()]
+        traces = [show_in_window(players[0]) if viewer else players[0]()]
     measured = [_measured(plan, trace, drive, steps) for plan, trace in zip(plans, traces, strict=True)]
     survival = None
     data = {"schema": 1, **_plain(*measured[0])}
@@ -111,7 +110,7 @@ def simulate(
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "playback.npz")]
         write_json(folder / "report.json", without_nan(data))
-        write_text(folder / "model.xml", plan_model(plan, drive, sole, conditions.friction))
+        write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
         written += plot_simulation(plan, traces[0], drive, folder / "playback")
     if robustness:
@@ -138,18 +137,18 @@ def simulate(
 
 def _filmed(
     film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Player]]
-) -> list[Trace]:
+) -> list[Simulation]:
     """Play the gaits and write the film."""
-    from nlp_gait.simulation.film.film import pictures
-    from nlp_gait.simulation.film.recording import recorded
+    from nlp_gait.simulation.film.film import draw_pictures
+    from nlp_gait.simulation.film.recording import record_film
     from nlp_gait.simulation.film.video import write_video
 
     interval_s = film.speed / film.frames_per_s
-    recordings = [recorded(title, plan, player, interval_s) for title, plan, player in gaits]
+    recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
 
     def watched() -> Iterator[Frame]:
         with progress_bar("pictures", max(len(recording.t) for recording in recordings)) as advance:
-            for picture in pictures(recordings, size, film.note):
+            for picture in draw_pictures(recordings, size, film.note):
                 yield picture
                 advance("")
 
@@ -157,9 +156,8 @@ def _filmed(
     return [recording.trace for recording in recordings]
 
 
-def _measured(plan: Plan, trace: Trace, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
-    from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.walking import measure_walk
+def _measured(plan: Plan, trace: Simulation, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
+    from nlp_gait.simulation.measurements import measure, measure_walk
 
     if steps is None:
         return measure(plan, trace, drive), None

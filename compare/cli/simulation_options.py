@@ -13,8 +13,8 @@ from compare.cli.options import parse_number
 from nlp_gait.errors import InputError, unknown
 
 if TYPE_CHECKING:
-    from nlp_gait.simulation.conditions import Conditions
     from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.simulate import Conditions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +88,7 @@ class ConditionOptions:
         Raises:
             InputError: a value is not allowed.
         """
-        from nlp_gait.simulation.conditions import Conditions, Push
+        from nlp_gait.simulation.simulate import Conditions, Push
 
         slope, impulse = (
             _parse_pair(text, flag) for text, flag in ((self.slope_deg, "--slope-deg"), (self.push, "--push"))

@@ -8,23 +8,23 @@ import numpy as np
 
 from compare.drawing.figures import new_figure, save, style
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import averaged_pressure
+from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.playback import Trace
+from nlp_gait.simulation.simulate import Simulation
 
 EVERY = 4  # steps of the engine; more points than a page can show make the files large
 ENGINE, MODEL = "#56B4E9", "#000000"
 SIDE_COLOURS = dict(zip(SIDES, ("#0072B2", "#D55E00"), strict=True))
 
 
-def plot_simulation(plan: Plan, trace: Trace, drive: Drive, stem: Path) -> tuple[Path, Path]:
+def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``.svg``; raises OutputError."""
     planned, shown = plan.signals.arrays, slice(None, None, EVERY)
     t = trace.t[shown]
     with style():
         figure = new_figure(6.3, 6.0)
         axes = figure.subplots(4, 1, sharex=True)
-        smooth, zmp = averaged_pressure(trace, drive.period_s)[shown], plan.at("zmp", t)
+        smooth, zmp = average_pressure(trace, drive.period_s)[shown], plan.at("zmp", t)
         for axis, name, k in ((axes[0], "x", 0), (axes[1], "y", 1)):
             axis.plot(t, trace.pressure[shown, k], color=ENGINE, lw=0.3, alpha=0.6, label="centre of pressure")
             axis.plot(t, smooth[:, k], color=SIDE_COLOURS["left"], label=f"mean over {1000 * drive.period_s:g} ms")

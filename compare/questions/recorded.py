@@ -16,8 +16,8 @@ from nlp_gait.formulation import Result
 from nlp_gait.gaits.biped.recorded.motion import RecordedGait
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 STARTS = 5  # of the optimum
 LARGEST_LEAN_DEG = 1.0  # the engine starts a gait with an upright torso
@@ -108,5 +108,5 @@ def _simulate(gait: RecordedGait) -> Measurements:
         raise GaitError(
             f"the torso leans by {gait.lean_deg:.1f} degrees at the beginning, and the engine starts upright"
         )
-    plan, drive = plan_of(Result(problem=gait.problem, x=np.array(gait.x))), Drive()
-    return measure(plan, play(plan, drive=drive), drive)
+    plan, drive = make_plan(Result(problem=gait.problem, x=np.array(gait.x))), Drive()
+    return measure(plan, simulate_plan(plan, drive=drive), drive)

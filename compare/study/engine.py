@@ -17,12 +17,11 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import refusing
 from nlp_gait.progress import ignore_progress
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.measurements import measure
-from nlp_gait.simulation.mjcf import plan_model
-from nlp_gait.simulation.plan import Plan, plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import measure_walk
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.measurements import measure, measure_walk
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 STEPS = 10  # of a cycle
 REMEDY = "delete it and rerun with --engine"
@@ -74,14 +73,14 @@ def play_records(
         MissingExtraError: MuJoCo is not installed.
         OutputError: the folder is not writable.
     """
-    version = f"mujoco {mujoco().__version__}"
+    version = f"mujoco {load_mujoco().__version__}"
     store = Store(folder, ignore_progress)
     found = []
     for record in records:
         result = gait_of(record)
         if (model := result.problem.display.simulation_model) is not None:
             steps = STEPS if model.repeats else None
-            plan = plan_of(result, steps)
+            plan = make_plan(result, steps)
             inputs = {**_gait(record), "drive": asdict(drive), "model": f"{_digest(plan, drive)}, {version}"}
             played = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
             found.append(decoded(Played, played))
@@ -108,7 +107,7 @@ def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
 
 
 def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) -> dict[str, Any]:
-    trace = play(plan, drive=drive)
+    trace = simulate_plan(plan, drive=drive)
     if steps is None:
         measured, way = measure(plan, trace, drive), None
         model, engine = measured.predicted.total_W, None if measured.fallen else measured.measured.total_W
@@ -142,7 +141,7 @@ def _gait(record: RunRecord) -> dict[str, Any]:
 
 def _digest(plan: Plan, drive: Drive) -> str:
     """Of all that is simulated but the drive's set-points, which follow from it and the drive."""
-    text = plan_model(plan, drive)
+    text = make_plan_model(plan, drive)
     digest = hashlib.sha256(text.encode())
     for name in ("t", "q", "tau"):
         digest.update(plan.signals.arrays[name].tobytes())

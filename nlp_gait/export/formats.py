@@ -12,8 +12,8 @@ from nlp_gait.export.webots import write_motion
 from nlp_gait.files import write_text
 from nlp_gait.formulation import Result, sampled
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import plan_model
-from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import make_plan
 
 # Usual ending of a file by format.
 FORMATS = {"webots": ".motion", "csv": ".csv", "json": ".signals.json", "mjcf": ".xml", "naoqi": ".naoqi.json"}
@@ -50,8 +50,8 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
             )
         write_naoqi(path, points)
     elif name == "mjcf":
-        plan = plan_of(result)
-        write_text(path, plan_model(plan, Drive()))
+        plan = make_plan(result)
+        write_text(path, make_plan_model(plan, Drive()))
     elif name == "csv":
         write_csv(path, sampled(result, period_ms / 1000.0))
     else:

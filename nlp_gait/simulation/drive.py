@@ -1,4 +1,4 @@
-"""How the simulated robot is driven: position servos with limited torque, set-points, and what is fed forward."""
+"""Position drives of the simulated robot: stiffness, torque limits, set-points, and feed-forward."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from nlp_gait.robots import Joint
 from nlp_gait.simulation.feedback import Balance, Feedback, check_period
 from nlp_gait.simulation.plan import Plan
 
-# Published limits of NAO's joints differ by a factor of four: those of the robot's file (the maker's URDF), or of the motor at
-# stall or in continuous service, times the gear ratio.
+# Published limits of NAO's joints differ by a factor of four: from the robot's file (the manufacturer's URDF), or from the motor
+# at stall or in continuous service, times the gear ratio.
 TORQUE_LIMITS = ("urdf", "stall", "continuous")
-ROUNDING = 1e-9  # in periods: a set-point's own time belongs to it
+ROUNDING = 1e-9  # in periods: a set-point is valid from its own time
 INTERPOLATIONS = ("linear", "held")  # between two set-points
-FEED_FORWARD = ("torque", "velocity", "none")  # each with those after it
+FEED_FORWARD = ("torque", "velocity", "none")  # torque includes velocity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """Servo of every joint: torque = stiffness (set-point - angle) - damping rate, within the limits.
+    """Position drive of every joint: torque = stiffness (set-point - angle) - damping rate, within the limits.
 
-    The stiffness is proportional to what the joint's motor gives at stall: each reaches it at the same error.
-    A position servo follows a planned velocity and torque as well if its set-point is shifted by
-    damping / stiffness times the velocity, and by the torque / stiffness (``set_points``).
+    The stiffness is proportional to the stall torque of the joint's motor: all motors reach it at the same error. The drive
+    also follows a planned velocity and torque if its set-point is shifted by damping / stiffness times the velocity, and by
+    the torque / stiffness (``set_points``).
 
     Attributes:
-        full_error_rad: error at which a motor would give its stall torque.
+        full_error_rad: error at which a motor reaches its stall torque.
         time_constant_s: damping / stiffness.
         period_s: time between set-points; NAO's own controller works in cycles of 10 ms.
         interpolation: ``linear`` between set-points, as NAO's controller does between timed commands, or each ``held``.
         feed_forward: ``torque`` (and velocity), ``velocity``, or ``none``.
-        torque_limits: which of the published limits holds.
-        feedback: what the set-points are corrected by; None plays in open loop.
+        torque_limits: source of the limits.
+        feedback: corrects the set-points; None for open loop.
     """
 
     full_error_rad: float = 0.08
@@ -50,7 +50,6 @@ class Drive:
     feedback: Feedback | None = None
 
     def __post_init__(self) -> None:
-        """Positive numbers, known names."""
         for name in ("full_error_rad", "time_constant_s", "period_s"):
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
@@ -59,34 +58,34 @@ class Drive:
         allowed = {"interpolation": INTERPOLATIONS, "feed_forward": FEED_FORWARD, "torque_limits": TORQUE_LIMITS}
         for name, names in allowed.items():
             if getattr(self, name) not in names:
-                said = name.replace("_", " ")
-                raise InputError(f"{said} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
+                words = name.replace("_", " ")
+                raise InputError(f"{words} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
 
     def stiffness(self, joint: Joint) -> float:
-        """[Nm/rad]."""
+        """Return the stiffness of a joint's drive [Nm/rad]."""
         return stall_torque(joint) / self.full_error_rad
 
     def damping(self, joint: Joint) -> float:
-        """[Nm s/rad]."""
+        """Return the damping of a joint's drive [Nm s/rad]."""
         return self.stiffness(joint) * self.time_constant_s
 
     def set_points(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
-        """What the servos are told at given times (T, J) [rad]: planned angles, shifted by what is fed forward.
+        """Return the set-points at given times (T, J) [rad]: planned angles, shifted by the feed-forward.
 
         Args:
             at: planned ``q`` [rad], ``qd`` [rad/s] and ``tau`` [Nm] at any times (N,), each (N, J).
             times: (T,) [s].
-            joints: as in the columns.
+            joints: of the columns.
         """
         before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
         last = int(before[-1]) + 1
-        sent = self._sent(at, self.period_s * np.arange(last + 1.0), joints)
+        sent = self._shift(at, self.period_s * np.arange(last + 1.0), joints)
         k = before.astype(int)
         if self.interpolation == "held":
             return sent[k]
         return np.asarray(sent[k] + np.maximum(share - ROUNDING, 0.0)[:, None] * (sent[k + 1] - sent[k]))
 
-    def _sent(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
+    def _shift(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
         angles = at("q", times)
         if self.feed_forward == "none":
             return angles
@@ -96,14 +95,14 @@ class Drive:
         return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
 
     def balance(self, plan: Plan, model: Any) -> Balance | None:
-        """The feedback, if there is one, ready for one simulation of a plan by the engine's model."""
+        """Return the controller of one simulation, if the drive has a feedback."""
         if self.feedback is None:
             return None
         stiffness = np.array([self.stiffness(plan.robot.joint(name)) for name in plan.joints])
         return Balance(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
-        """[Nm]."""
+        """Return the torque limit of a joint [Nm]."""
         if self.torque_limits == "urdf" or joint.motor is None:
             return joint.torque_limit_Nm
         if self.torque_limits == "stall":
@@ -112,13 +111,11 @@ class Drive:
 
 
 def stall_torque(joint: Joint) -> float:
-    """Torque of a joint with its motor at stall and a gear without loss [Nm]; the stated limit if no motor is known."""
-    if joint.motor is None:
-        return joint.torque_limit_Nm
-    return joint.motor.stall_torque_Nm
+    """Return the torque of a joint at stall with a lossless gear [Nm]; the stated limit if the motor is unknown."""
+    return joint.torque_limit_Nm if joint.motor is None else joint.motor.stall_torque_Nm
 
 
-# By name: NAO's own way of moving, and set-points each held for 40 ms as the paper's gaits were sampled.
+# By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {
     "feed-forward": Drive(),
     "held": Drive(period_s=0.04, interpolation="held", feed_forward="none"),

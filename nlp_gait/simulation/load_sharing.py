@@ -1,6 +1,6 @@
-"""Load shared anew in every double support of a given motion: the cheapest wrenches on both feet, by one convex QP each.
+"""Optimal division of the load in every double support of a given motion: the cheapest wrenches on both feet, by one convex QP.
 
-The motion stays; so do torques in single support. Between two instants of the controller wrenches are linear in time.
+The motion and the torques in single support stay. Between two instants of the controller, wrenches are linear in time.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ from scipy import sparse
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.locking import one_at_a_time
-from nlp_gait.gaits.biped.foot_loads import FRICTION_COEFFICIENT, planned_loads
-from nlp_gait.gaits.biped.instant import BOTH_FEET
 from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
 from nlp_gait.simulation.feedback import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
-from nlp_gait.symbolic.balance import sole_limits
-from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.symbolic.balance import SOLE_FRICTION, above, below, sole_limits
+from nlp_gait.symbolic.dynamics import newton_euler
 
 MOVED = ("q", "qd", "qdd")
 WRENCH = 6  # its components
@@ -32,21 +31,20 @@ WRENCH = 6  # its components
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sharing:
-    """What sharing may do.
+    """Limits of the load sharing.
 
     Attributes:
         friction: coefficient of both soles on the ground.
-        load_rate_1_s: fastest change of a foot's load, in weights a second, from zero where it lands and to zero where it
-            lifts; infinite for a load that may jump.
-        period_s: between instants at which a wrench is chosen; NAO's own controller works in cycles of 10 ms.
+        load_rate_1_s: fastest change of a foot's load, in weights per second, from zero at landing and to zero at lifting;
+            infinite for a load that may jump.
+        period_s: between two instants with a chosen wrench; NAO's own controller has cycles of 10 ms.
     """
 
-    friction: float = FRICTION_COEFFICIENT
+    friction: float = SOLE_FRICTION
     load_rate_1_s: float = math.inf
     period_s: float = 0.01
 
     def __post_init__(self) -> None:
-        """Positive numbers."""
         for name in ("friction", "load_rate_1_s", "period_s"):
             value = getattr(self, name)
             if not value > 0.0:  # NaN fails too
@@ -55,7 +53,7 @@ class Sharing:
 
 
 class Support(NamedTuple):
-    """Samples of one double support, the last one included, and the sides that land before and lift after it, if any do."""
+    """Samples of one double support, including the last one, and the sides that land before and lift after it, if any."""
 
     first: int
     last: int
@@ -80,7 +78,7 @@ class Instants(NamedTuple):
 
 
 def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
-    """The same motion with the torques of double support that need the least power, |torque rate| + K torque^2.
+    """Return the same motion with the torques in double support of least power, |torque rate| + K torque^2.
 
     Args:
         plan: of a gait with double support.
@@ -88,16 +86,16 @@ def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
 
     Raises:
         MissingExtraError: Clarabel is not installed.
-        InputError: there is no double support, or no division that soles, friction and rate allow, with its time.
+        InputError: there is no double support, or soles, friction and rate allow no division; with its time.
     """
     sharing, arrays = sharing or Sharing(), {name: array.copy() for name, array in plan.signals.arrays.items()}
-    supports = list(double_supports(plan.signals))
+    supports = list(find_double_supports(plan.signals))
     if not supports:
-        raise InputError("this gait has no double support in which load could be shared")
+        raise InputError("this gait has no double support, so there is no load to share")
     for support in supports:
         samples = slice(support.first, support.last + 1)
-        instants = instants_of(plan, samples)
-        right = _cheapest(plan, support, instants, sharing)
+        instants = compute_instants(plan, samples)
+        right = _solve_cheapest(plan, support, instants, sharing)
         arrays["tau"][samples] = instants.torque - np.einsum("njk,nk->nj", instants.gain, right)
         left = instants.left - np.einsum("njk,nk->nj", instants.carried, right)
         for side, wrench in zip(SIDES, (left, right), strict=True):
@@ -105,8 +103,8 @@ def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
     return replace(plan, signals=replace(plan.signals, arrays=arrays))
 
 
-def double_supports(signals: Signals) -> Iterator[Support]:
-    """Where both soles stand still; the sample at which a foot lands still belongs to what was before."""
+def find_double_supports(signals: Signals) -> Iterator[Support]:
+    """Yield the supports with both soles at rest; the sample at which a foot lands still belongs to the phase before."""
     moves = {side: np.abs(np.diff(signals.arrays[f"{side}_foot"], axis=0)).max(axis=1) > STANDING for side in SIDES}
     still = ~np.any(list(moves.values()), axis=0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
@@ -118,32 +116,32 @@ def double_supports(signals: Signals) -> Iterator[Support]:
 
 
 @one_at_a_time
-def instants_of(plan: Plan, samples: slice) -> Instants:
-    """Loads of some of a plan's samples."""
-    arrays, joints = plan.signals.arrays, plan.joints
+def compute_instants(plan: Plan, samples: slice) -> Instants:
+    """Compute the loads of some of a plan's samples."""
+    arrays, joints, feet = plan.signals.arrays, plan.joints, plan.robot.feet
     symbols = [SX.sym(name, len(joints)) for name in MOVED]
     wrench = SX.sym("wrench", WRENCH)
-    motions = {name: Motion(*(part[i] for part in symbols)) for i, name in enumerate(joints)}
-    loader = planned_loads(plan.robot, plan.gravity, upright=())
-    # Where feet and hip are matters to the ZMP alone, which is the same for every division.
-    loads = loader(motions, SX(3, 1), {side: SX(2, 1) for side in BOTH_FEET}, wrench)
-    torque, left = ca.vertcat(*(loads.torques[name] for name in joints)), loads.wrenches["L"]
-    parts = [part for value in (torque, left) for part in (value, -ca.jacobian(value, wrench))]
+    q, qd, qdd = (dict(zip(joints, ca.vertsplit(symbol), strict=True)) for symbol in symbols)
+    pushes = {feet["right"].link: above(wrench, feet["right"].ankle_height_m)}
+    tree = tree_from(plan.robot, feet["left"].link)
+    torques, at_ankle = newton_euler(tree, q, qd, qdd, plan.gravity, pushes=pushes)
+    loads = ca.vertcat(*(torques[name] for name in joints)), below(at_ankle, feet["left"].ankle_height_m)
+    parts = [part for value in loads for part in (value, -ca.jacobian(value, wrench))]
     function = ca.Function("loads", symbols, ca.substitute(parts, [wrench], [SX.zeros(WRENCH)]))
     values = [arrays[name][samples] for name in MOVED]
     n = len(values[0])
-    torques, gains, lefts, carried = (np.array(part) for part in function.map(n)(*(value.T for value in values)))
+    torque, gain, left, carried = (np.array(part) for part in function.map(n)(*(value.T for value in values)))
     return Instants(
-        torques.T,
-        gains.reshape(len(joints), n, WRENCH).transpose(1, 0, 2),
-        lefts.T,
+        torque.T,
+        gain.reshape(len(joints), n, WRENCH).transpose(1, 0, 2),
+        left.T,
         carried.reshape(WRENCH, n, WRENCH).transpose(1, 0, 2),
     )
 
 
 @one_at_a_time
-def bearing_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
-    """Matrices (16, 6) by side: what they make of the wrench on a sole must not be negative."""
+def make_sole_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
+    """Return matrices (16, 6) by side; their products with a wrench on the sole must be >= 0."""
     wrench, found = SX.sym("wrench", WRENCH), {}
     for side in SIDES:
         foot = robot.feet[side]
@@ -152,8 +150,8 @@ def bearing_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
     return found
 
 
-def _cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing) -> Array:
-    """Wrenches (n, 6) on the right sole."""
+def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing) -> Array:
+    """Return the wrenches (n, 6) on the right sole."""
     samples = slice(support.first, support.last + 1)
     t, rate = plan.signals.arrays["t"][samples], plan.signals.arrays["qd"][samples]
     n, knots = len(t), max(2, math.ceil((t[-1] - t[0]) / sharing.period_s) + 1)
@@ -177,27 +175,27 @@ def _cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing
     limits = [
         (sparse.hstack([-(speed @ gain), -bound]), -power),
         (sparse.hstack([speed @ gain, -bound]), power),
-        *_bearing(plan, instants, sharing, wrenches, len(weight)),
-        *_ramps(plan, support, instants, sharing, t, knots, place, len(weight)),
+        *_limit_soles(plan, instants, sharing, wrenches, len(weight)),
+        *_limit_rates(plan, support, instants, sharing, t, knots, place, len(weight)),
     ]
     matrix = sparse.vstack([left for left, _ in limits], format="csc")
     right = np.concatenate([limit for _, limit in limits])
-    solution = _solved(quadratic, linear, matrix, right)
+    solution = _solve_qp(quadratic, linear, matrix, right)
     if solution is None:
         raise InputError(
             f"no division of the load keeps both soles flat between {t[0]:.3f} and {t[-1]:.3f} s with a friction of "
-            f"{sharing.friction:g} and a load rate of {sharing.load_rate_1_s:g} weights a second; allow more of either, or "
+            f"{sharing.friction:g} and a load rate of {sharing.load_rate_1_s:g} weights per second; increase either, or "
             "plan with torso_share=free"
         )
     return np.asarray((wrenches @ solution[: knots * WRENCH]).reshape(n, WRENCH))
 
 
-Limit = tuple[Any, Array]  # rows of a sparse matrix, and what they may be at most
+Limit = tuple[Any, Array]  # rows of a sparse matrix and their upper bounds
 
 
-def _bearing(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any, powers: int) -> Iterator[Limit]:
-    """What both soles bear, at every sample."""
-    rows = bearing_rows(plan.robot, sharing.friction)
+def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any, powers: int) -> Iterator[Limit]:
+    """Yield the limits of both soles at every sample."""
+    rows = make_sole_rows(plan.robot, sharing.friction)
     n = len(instants.left)
     left = sparse.block_diag(list(rows["left"] @ instants.carried), format="csr") @ wrenches
     right = sparse.kron(sparse.identity(n), rows["right"], format="csr") @ wrenches
@@ -205,7 +203,7 @@ def _bearing(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any, po
         yield sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))]), most
 
 
-def _ramps(
+def _limit_rates(
     plan: Plan,
     support: Support,
     instants: Instants,
@@ -215,16 +213,16 @@ def _ramps(
     place: Array,
     powers: int,
 ) -> Iterator[Limit]:
-    """How fast the load of each foot changes from knot to knot, and after landing and before lifting from zero on."""
+    """Yield the limits of the change of each foot's load between knots, and from zero at landing and to zero at lifting."""
     if not math.isfinite(sharing.load_rate_1_s):
         return
     most = sharing.load_rate_1_s * plan.robot.mass_kg * plan.gravity * (t[-1] - t[0]) / (knots - 1)
     pick = sparse.csr_matrix(
         (np.ones(knots), (np.arange(knots), WRENCH * np.arange(knots) + 2)), (knots, WRENCH * knots)
     )
-    total = np.interp(np.arange(knots), place, instants.left[:, 2])  # both feet's: the left one's without the right one
+    total = np.interp(np.arange(knots), place, instants.left[:, 2])  # of both feet, at each knot
     steps = sparse.diags([-np.ones(knots - 1), np.ones(knots - 1)], [0, 1], (knots - 1, knots))
-    loads = {"right": (pick, np.zeros(knots)), "left": (-pick, total)}  # matrix @ knots + what is left
+    loads = {"right": (pick, np.zeros(knots)), "left": (-pick, total)}  # matrix @ knots + constant
     for matrix, rest in loads.values():
         change, own = steps @ matrix, steps @ rest
         for sign in (1.0, -1.0):
@@ -239,8 +237,8 @@ def _wide(matrix: Any, powers: int) -> Any:
     return sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))])
 
 
-def _solved(quadratic: Any, linear: Array, matrix: Any, most: Array) -> Array | None:
-    """Minimum of x'Qx/2 + c'x with matrix x <= most; None if there is no such x.
+def _solve_qp(quadratic: Any, linear: Array, matrix: Any, most: Array) -> Array | None:
+    """Minimise x'Qx/2 + c'x subject to matrix x <= most; None if that is infeasible.
 
     Raises:
         MissingExtraError: Clarabel is not installed.
@@ -249,7 +247,7 @@ def _solved(quadratic: Any, linear: Array, matrix: Any, most: Array) -> Array | 
         import clarabel
     except ImportError as error:
         raise MissingExtraError(
-            f"sharing load anew needs Clarabel ({error}); install it with pip install 'nlp-gait[qp]'"
+            f"load sharing requires Clarabel ({error}); install it with pip install 'nlp-gait[qp]'"
         ) from error
     settings = clarabel.DefaultSettings()
     settings.verbose = False

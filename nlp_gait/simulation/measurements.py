@@ -1,10 +1,10 @@
-"""What a simulation showed, beside what the model had predicted."""
+"""Simulations in numbers, with the model's predictions; and walks of several steps."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,11 @@ from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.playback import LEAST_LOAD, Trace
+from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
 
-AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a servo counts as saturated
-LASTING = 0.003  # [s] of a load that is no brush
-MIDDLE = (0.2, 0.8)  # part of the phase that neither the start from unloaded servos nor the landing disturbs
+AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a drive counts as saturated
+SHORTEST_CONTACT = 0.003  # [s]; a shorter one is ignored
+MIDDLE = (0.2, 0.8)  # of the phase, undisturbed by the start from unloaded drives and by the landing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +28,8 @@ class Power:
 
     Attributes:
         mechanical_W: |torque rate|, summed over the joints.
-        signed_W: torque times rate: what the servos do less what they take back. Where set-points jump, |torque rate|
-            depends on the engine's step and this does not.
+        signed_W: torque times rate: work of the drives minus work on them. If set-points jump, |torque rate| depends on the
+            engine's step and this does not.
         heat_W: K torque^2.
     """
 
@@ -38,8 +38,8 @@ class Power:
     heat_W: float
 
     @classmethod
-    def of(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Power:
-        """From torques [Nm] and rates [rad/s] (T, J), K [W/(Nm)^2], and how a time mean is taken of samples (T,)."""
+    def compute(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Power:
+        """Compute it from torques [Nm] and rates [rad/s] (T, J), K [W/(Nm)^2], and a function for the mean of samples (T,)."""
         work = torque * rate
         return cls(
             mechanical_W=mean(np.abs(work).sum(axis=1)),
@@ -55,7 +55,7 @@ class Power:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """Where a swinging sole stood at the end, against the plan; (x, y) under the ankle [m]."""
+    """Final and planned place of a swinging sole; (x, y) under the ankle [m]."""
 
     planned_m: tuple[float, float]
     measured_m: tuple[float, float]
@@ -64,13 +64,13 @@ class Landing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Touchdown:
-    """Where the ground first carried a swinging foot for 3 ms on end, in the second half of its swing.
+    """First contact of a swinging foot that lasts 3 ms, in the second half of its swing.
 
     Attributes:
         side: of the foot.
-        planned_s: when the plan sets it down.
-        measured_s: when that began.
-        speed_m_s: of the sole under the ankle towards the ground just before; 0 if it moved away from it.
+        planned_s: planned time.
+        measured_s: begin of the contact.
+        speed_m_s: of the sole under the ankle towards the ground just before; 0 if it moved away.
     """
 
     side: str
@@ -81,29 +81,29 @@ class Touchdown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
-    """One simulation in numbers; those over time belong to the phase, not to the settling after it.
+    """A simulation in numbers; those over time are for the phase, without the settling after it.
 
     Attributes:
         fallen: the torso tilted by more than 45 degrees or sank below 60 % of its height, then or while settling.
-        fell_at_s: when; None if it stayed up.
+        fell_at_s: time of the fall; None if it stayed up.
         largest_tilt_deg: of the torso, settling included.
         tracking_rms_rad: planned minus measured angle, over all joints.
         tracking_max_rad: largest.
-        slip_m: largest distance of a supporting sole from where it stood when its support began.
+        slip_m: largest distance of a supporting sole from its place at the begin of its support.
         landings: by side, of the swinging feet.
         pressure_rms_m: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP.
         pressure_max_m: largest.
         pressure_middle_rms_m: over the middle 60 % of the phase.
         pressure_raw_rms_m: without averaging; contact forces ring at every new set-point.
-        pressure_in_feet_rms_m: both relative to the supporting feet, where they were and where they were planned.
+        pressure_in_feet_rms_m: both relative to the measured and the planned places of the supporting feet.
         touchdowns: of the swinging feet, in order of time.
-        earliest_landing_s: by how much a foot touched the ground before the plan, at most; negative if all were late.
+        earliest_landing_s: largest time by which a foot touched the ground too early; negative if all were late.
         landing_speed_m_s: largest of the touchdowns; None without any.
         predicted: power by the rigid model.
-        measured: power of the servos.
+        measured: power of the drives.
         saturated: share of time at the torque limit, by joint, where not zero.
-        beyond_limit: largest planned torque over the torque limit, by joint, where above 1: no drive can follow that.
-        joint_limits: joints that went beyond their mechanical range.
+        beyond_limit: ratio of the largest planned torque to the torque limit, by joint, where above 1: no drive can follow.
+        joint_limits: joints that left their mechanical range.
     """
 
     fallen: bool
@@ -128,27 +128,27 @@ class Measurements:
     joint_limits: tuple[str, ...]
 
 
-def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
-    """Numbers of one simulation."""
-    during = trace.t <= plan.duration_s
-    error = plan.at("q", trace.t[during]) - trace.q[during]
-    torque, rate = trace.torque[during], trace.qd[during]
+def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
+    """Compute the numbers of a simulation."""
+    during = simulation.t <= plan.duration_s
+    error = plan.at("q", simulation.t[during]) - simulation.q[during]
+    torque, rate = simulation.torque[during], simulation.qd[during]
     limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
-    pressure, planned = averaged_pressure(trace, drive.period_s), plan.at("zmp", trace.t)
-    raw = np.linalg.norm(trace.pressure - planned, axis=1)[during]
+    pressure, planned = average_pressure(simulation, drive.period_s), plan.at("zmp", simulation.t)
+    raw = np.linalg.norm(simulation.pressure - planned, axis=1)[during]
     deviation = np.linalg.norm(pressure - planned, axis=1)[during]
-    in_feet = np.linalg.norm(pressure - planned - _feet_moved(plan, trace), axis=1)[during]
-    landed = _touchdowns(plan, trace)
-    share = trace.t[during] / plan.duration_s
+    in_feet = np.linalg.norm(pressure - planned - _feet_moved(plan, simulation), axis=1)[during]
+    landed = _touchdowns(plan, simulation)
+    share = simulation.t[during] / plan.duration_s
     middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
     return Measurements(
-        fallen=trace.fell_at_s is not None,
-        fell_at_s=trace.fell_at_s,
-        largest_tilt_deg=math.degrees(float(trace.tilt.max())),
+        fallen=simulation.fell_at_s is not None,
+        fell_at_s=simulation.fell_at_s,
+        largest_tilt_deg=math.degrees(float(simulation.tilt.max())),
         tracking_rms_rad=_rms(error),
         tracking_max_rad=float(np.abs(error).max()),
-        slip_m=_slip(plan, trace),
-        landings={side: _landing(plan, trace, side) for side in SIDES if side not in plan.supports},
+        slip_m=_slip(plan, simulation),
+        landings={side: _landing(plan, simulation, side) for side in SIDES if side not in plan.supports},
         pressure_rms_m=_if_any(_rms, deviation),
         pressure_max_m=_if_any(np.max, deviation),
         pressure_middle_rms_m=_if_any(_rms, middle),
@@ -157,80 +157,81 @@ def measure(plan: Plan, trace: Trace, drive: Drive) -> Measurements:
         touchdowns=landed,
         earliest_landing_s=max((at.planned_s - at.measured_s for at in landed), default=None),
         landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
-        predicted=predicted(plan),
-        measured=Power.of(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
+        predicted=predict_power(plan),
+        measured=Power.compute(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
         saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
         beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
-        joint_limits=_beyond_range(plan, trace.q[during]),
+        joint_limits=_beyond_range(plan, simulation.q[during]),
     )
 
 
-def predicted(plan: Plan) -> Power:
-    """What the rigid model says of the planned motion."""
+def predict_power(plan: Plan) -> Power:
+    """Compute the power of the planned motion by the rigid model."""
     arrays, duration = plan.signals.arrays, plan.duration_s
     mean = lambda samples: float(trapezoid(samples, arrays["t"]) / duration)  # noqa: E731
-    return Power.of(arrays["tau"], arrays["qd"], plan.heat_loss, mean)
+    return Power.compute(arrays["tau"], arrays["qd"], plan.heat_loss, mean)
 
 
-def averaged_pressure(trace: Trace, period_s: float) -> Array:
-    """Centre of pressure (T, 2) averaged over a moving period, each instant weighted by its load [m]; NaN in flight."""
+def average_pressure(simulation: Simulation, period_s: float) -> Array:
+    """Return the centre of pressure (T, 2), averaged over a moving period with the loads as weights [m]; NaN in flight."""
     width = max(1, round(period_s / TIME_STEP))
-    load = trace.loads.sum(axis=1)
-    moment = np.nan_to_num(trace.pressure) * load[:, None]
+    load = simulation.loads.sum(axis=1)
+    moment = np.nan_to_num(simulation.pressure) * load[:, None]
     mean_load = uniform_filter1d(load, width)
     with np.errstate(invalid="ignore", divide="ignore"):
         centre = uniform_filter1d(moment, width, axis=0) / mean_load[:, None]
     return np.asarray(np.where(mean_load[:, None] > LEAST_LOAD, centre, np.nan))
 
 
-def _slip(plan: Plan, trace: Trace) -> float:
-    feet = {side: trace.feet[:, SIDES.index(side), :2] for side in SIDES}
+def _slip(plan: Plan, simulation: Simulation) -> float:
+    feet = {side: simulation.feet[:, SIDES.index(side), :2] for side in SIDES}
     moved = [feet[side] for side in plan.supports]
-    if not moved:  # both feet swing: a support begins and ends
+    if not moved:  # both feet swing: their supports begin and end
         for side, path in feet.items():
-            resting_point = np.concatenate([[0], plan.stands(side, trace.t), [0]])
+            resting_point = np.concatenate([[0], plan.stands(side, simulation.t), [0]])
             starts, ends = (np.flatnonzero(np.diff(resting_point) == change) for change in (1, -1))
             moved += [path[start:end] for start, end in zip(starts, ends, strict=True)]
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 
 
-def _feet_moved(plan: Plan, trace: Trace) -> Array:
-    """How far the feet that should stand are from where they should (T, 2) [m], averaged over these feet."""
-    weights = np.stack([plan.stands(side, trace.t) for side in SIDES], axis=1)
+def _feet_moved(plan: Plan, simulation: Simulation) -> Array:
+    """Return the distance (T, 2) of the supporting feet from their planned places [m], averaged over these feet."""
+    weights = np.stack([plan.stands(side, simulation.t) for side in SIDES], axis=1)
     moved = np.stack(
-        [trace.feet[:, i, :2] - plan.at(f"{side}_foot", trace.t)[:, :2] for i, side in enumerate(SIDES)], axis=1
+        [simulation.feet[:, i, :2] - plan.at(f"{side}_foot", simulation.t)[:, :2] for i, side in enumerate(SIDES)],
+        axis=1,
     )
     with np.errstate(invalid="ignore"):
         return np.asarray((weights[:, :, None] * moved).sum(axis=1) / weights.sum(axis=1)[:, None])
 
 
-def _touchdowns(plan: Plan, trace: Trace) -> tuple[Touchdown, ...]:
-    found, lasting = [], round(LASTING / TIME_STEP)
+def _touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
+    found, lasting = [], round(SHORTEST_CONTACT / TIME_STEP)
     for i, side in enumerate(SIDES):
-        swings = np.diff(np.concatenate([[1.0], plan.bears(side, trace.t), [1.0]]))
+        swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.t), [1.0]]))
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
-            planned = min(int(set_down), len(trace.t) - 1)
+            planned = min(int(set_down), len(simulation.t) - 1)
             middle = (int(lifted) + planned) // 2
-            loaded = (trace.loads[middle:, i] > LEAST_LOAD).astype(float)
-            # From here on the ground carries for a while: a toe that brushes an edge has not landed.
-            carried = np.flatnonzero(np.convolve(loaded, np.ones(lasting), "valid") == lasting)
-            if middle > 0 and carried.size:
-                first = middle + int(carried[0])
-                speed = max(0.0, float(trace.feet[first - 1, i, 2] - trace.feet[first, i, 2]) / TIME_STEP)
+            loaded = (simulation.loads[middle:, i] > LEAST_LOAD).astype(float)
+            # The contact must last: a toe that brushes an edge has not landed.
+            lasting_from = np.flatnonzero(np.convolve(loaded, np.ones(lasting), "valid") == lasting)
+            if middle > 0 and lasting_from.size:
+                first = middle + int(lasting_from[0])
+                speed = max(0.0, float(simulation.feet[first - 1, i, 2] - simulation.feet[first, i, 2]) / TIME_STEP)
                 found.append(
                     Touchdown(
                         side=side,
-                        planned_s=float(trace.t[planned]),
-                        measured_s=float(trace.t[first]),
+                        planned_s=float(simulation.t[planned]),
+                        measured_s=float(simulation.t[first]),
                         speed_m_s=speed,
                     )
                 )
     return tuple(sorted(found, key=lambda at: at.planned_s))
 
 
-def _landing(plan: Plan, trace: Trace, side: str) -> Landing:
+def _landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
     planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2]
-    measured = trace.feet[-1, SIDES.index(side), :2]
+    measured = simulation.feet[-1, SIDES.index(side), :2]
     return Landing(
         planned_m=(float(planned[0]), float(planned[1])),
         measured_m=(float(measured[0]), float(measured[1])),
@@ -253,6 +254,72 @@ def _rms(values: Array) -> float:
 
 
 def _if_any(statistic: Any, values: Array) -> float | None:
-    """A statistic of the values that are numbers; None if none is."""
+    """Return a statistic of the finite values; None without any."""
     numbers = values[np.isfinite(values)]
     return float(statistic(numbers)) if numbers.size else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walk:
+    """A walk in numbers; distances are of the point halfway between the feet, from start to rest.
+
+    Attributes:
+        steps: planned.
+        steps_done: whole steps before a fall; all if it fell later or not at all.
+        planned_m: distance.
+        walked_m: distance forward; None after a fall.
+        drift_m: distance to the left; None after a fall.
+        heading_deg: direction of the torso at the end, positive to the left; None after a fall.
+        model_J_per_m: energy by the model, mechanical and heat, per planned metre.
+        engine_J_per_planned_m: energy of the drives; None after a fall.
+        engine_J_per_m: per metre walked; None after a fall or without progress.
+        measurements: of the simulation.
+    """
+
+    steps: int
+    steps_done: int
+    planned_m: float
+    walked_m: float | None
+    drift_m: float | None
+    heading_deg: float | None
+    model_J_per_m: float
+    engine_J_per_planned_m: float | None
+    engine_J_per_m: float | None
+    measurements: Measurements
+
+    def course(self) -> dict[str, Any]:
+        """Return it as plain data, without the measurements."""
+        return {name: value for name, value in asdict(self).items() if name != "measurements"}
+
+
+def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -> Walk:
+    """Compute the numbers of a simulated walk."""
+    measurements = measure(plan, simulation, drive)
+    planned, (walked, drift) = planned_distance(plan), walked_distance(simulation)
+    energy = measurements.measured.total_W * plan.duration_s
+    fell = simulation.fell_at_s
+    return Walk(
+        steps=steps,
+        steps_done=steps if fell is None else min(steps, math.floor(steps * fell / plan.duration_s)),
+        planned_m=planned,
+        walked_m=walked if fell is None else None,
+        drift_m=drift if fell is None else None,
+        heading_deg=math.degrees(float(simulation.heading[-1])) if fell is None else None,
+        model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned,
+        engine_J_per_planned_m=energy / planned if fell is None else None,
+        engine_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
+        measurements=measurements,
+    )
+
+
+def planned_distance(plan: Plan) -> float:
+    """Return the planned distance forward of the point halfway between the feet [m]."""
+    feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
+    return float(feet[-1, 0] - feet[0, 0]) / 2
+
+
+def walked_distance(simulation: Simulation) -> tuple[float, float]:
+    """Return the distances forward and to the left of the point halfway between the feet, from start to rest [m]."""
+    middle = simulation.feet.mean(axis=1)
+    forward, left = (middle[-1] - middle[0])[:2].tolist()
+    return forward, left

@@ -1,4 +1,4 @@
-"""A robot as MJCF, MuJoCo's model format; needs no MuJoCo."""
+"""Robots and their world in MJCF, MuJoCo's model format; needs no MuJoCo."""
 
 from __future__ import annotations
 
@@ -13,32 +13,38 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.looks import FLOOR, add_light, add_world, paint
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.root import add_root_joints
 from nlp_gait.simulation.shapes import Prism, Shape
 
-# Against 0.1 ms, power is 1 % high in single support; in double support 12 % with set-points held for 40 ms, equal with smooth
-# ones. At 1 ms the light feet chatter.
+# Compared with 0.1 ms, power is 1 % higher in single support; in double support it is 12 % higher with set-points held for 40 ms
+# and equal with smooth ones. At 1 ms the light feet chatter.
 TIME_STEP = 0.0005  # [s]
 CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
-LEAST_MOMENT = 1e-12  # of inertia, that MuJoCo takes [kg m^2]
+LEAST_MOMENT = 1e-12  # of inertia that MuJoCo accepts [kg m^2]
 BALL_RADIUS = 1e-3  # [m]
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
+
+FLOOR = "floor"  # name of the floor and of its material
+LEFT, RIGHT, TRUNK = "0.00 0.45 0.70 1", "0.84 0.37 0.00 1", "0.80 0.81 0.84 1"  # blue and orange of Okabe and Ito
+SIDE_COLOURS = {"left": LEFT, "right": RIGHT}
+LIMBS = "1"  # group of the geometries that a view from above hides; soles and floor are in group 0
+LINES_PER_M = 10  # of the floor's grid
+# Joints of a root in the sagittal plane, in the order of the engine's coordinates.
+PLANAR_JOINTS = {"root x": ("slide", "1 0 0"), "root z": ("slide", "0 0 1"), "root pitch": ("hinge", "0 1 0")}
 
 Shapes = Mapping[str, Sequence[Shape]]
 
 
-def plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
-    """Model of the robot and the ground of a plan; see ``free_model``."""
-    return free_model(
+def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
+    """Return the model of a plan's robot and ground; see ``make_model``."""
+    return make_model(
         plan.robot, plan.shapes(sole), drive, plan.gravity, friction, ground=plan.ground, planar=plan.planar
     )
 
 
-def free_model(
+def make_model(
     robot: Robot,
     shapes: Shapes,
     drive: Drive,
@@ -48,19 +54,19 @@ def free_model(
     ground: Sequence[Tread] = (),
     planar: bool = False,
 ) -> str:
-    """The whole robot on a floor, driven by position servos; solid shapes can touch the ground, and nothing else.
+    """Return the model of a robot on a floor with position drives; only solid shapes can touch the ground.
 
     Args:
-        robot: to be simulated.
+        robot: to simulate.
         shapes: by link.
-        drive: gains and limits of the servos.
+        drive: gains and limits of the joints' drives.
         gravity: [m/s^2], along -z.
         friction: coefficient of sliding friction between robot and ground.
         ground: stairs on the floor.
         planar: the robot's root stays in the plane y = 0.
     """
-    root, option = document(robot.name, gravity)
-    Xml.SubElement(option, "flag", autoreset="disable")  # a simulation that diverges must show it
+    root, option = make_document(robot.name, gravity)
+    Xml.SubElement(option, "flag", autoreset="disable")  # otherwise a divergence is hidden
     Xml.SubElement(
         Xml.SubElement(root, "default"),
         "geom",
@@ -70,13 +76,14 @@ def free_model(
         solref=_numbers(CONTACT_TIME_CONSTANT, 1.0),
         friction=_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION),
     )
-    _add_hulls(add_world(root), shapes)
+    _add_hulls(_add_look(root), shapes)
     world = Xml.SubElement(root, "worldbody")
     Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
     _add_stairs(world, ground)
     bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
-    paint(bodies, robot)
-    add_light(bodies[robot.root])
+    _paint(bodies, robot)
+    light = Xml.SubElement(bodies[robot.root], "light", mode="track", directional="true", pos="0.6 -0.8 1.5")
+    light.attrib |= {"dir": "-0.6 0.8 -1.5", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}
     for side, foot in robot.feet.items():
         Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
     actuators = Xml.SubElement(root, "actuator")
@@ -84,11 +91,11 @@ def free_model(
         limit = drive.torque_limit(joint)
         actuator = Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit))
         actuator.attrib |= {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
-    return text_of(root)
+    return format_xml(root)
 
 
-def document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
-    """Root and options of an empty model."""
+def make_document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
+    """Return root and options of an empty model."""
     root = Xml.Element("mujoco", model=name)
     Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
     option = Xml.SubElement(
@@ -103,7 +110,7 @@ def document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
 
 
 def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
-    """Boxes one on the other's front; the last tread is as long as a stair can be."""
+    """Add a box for each tread up to the next one; the last one has a fixed length."""
     edges = [tread.edge_m for tread in ground[1:]]
     for i, tread in enumerate(ground):
         end = edges[i] if i < len(edges) else tread.edge_m + LAST_TREAD
@@ -114,7 +121,6 @@ def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
 
 
 def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
-    """Convex hulls of the soles."""
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
             if isinstance(shape, Prism):
@@ -126,7 +132,7 @@ def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
 def add_bodies(
     world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, root: Literal["free", "planar", "fixed"]
 ) -> dict[str, Xml.Element]:
-    """Bodies nested as in the tree, each with its frame at its reference point; elements by link."""
+    """Add the bodies of a tree, each with its frame at its reference point; return the elements by link."""
     elements: list[Xml.Element] = []
     for body in tree:
         parent = world if body.parent < 0 else elements[body.parent]
@@ -138,8 +144,11 @@ def add_bodies(
             joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
             if body.armature_kgm2:
                 joint.set("armature", _numbers(body.armature_kgm2))
-        elif root != "fixed":
-            add_root_joints(element, planar=root == "planar")
+        elif root == "free":
+            Xml.SubElement(element, "freejoint")
+        elif root == "planar":
+            for name, (kind, along) in PLANAR_JOINTS.items():
+                Xml.SubElement(element, "joint", name=name, type=kind, axis=along)
         link = body.link
         tensor, mass = _numbers(*_positive_tensor(link)), _numbers(link.mass_kg)
         Xml.SubElement(element, "inertial", pos=_numbers(*body.com_offset_m), mass=mass, fullinertia=tensor)
@@ -149,9 +158,9 @@ def add_bodies(
 
 
 def _positive_tensor(link: Link) -> tuple[float, ...]:
-    """Inertia tensor in MJCF's order: xx, yy, zz, xy, xz, yz [kg m^2].
+    """Return the inertia tensor in MJCF's order, xx, yy, zz, xy, xz, yz [kg m^2].
 
-    MuJoCo takes no points and no thin rods: they become as thick as a small ball of their mass.
+    MuJoCo refuses points and thin rods: they become as thick as a small ball of their mass.
     """
     moments, products = link.inertia_com_kgm2[:3], link.inertia_com_kgm2[3:]
     thin = np.linalg.eigvalsh(link.inertia_matrix)[0] < LEAST_MOMENT
@@ -173,11 +182,41 @@ def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
 
 
 def _numbers(*values: float) -> str:
-    """Numbers as MJCF reads them, to the last digit."""
+    """Format numbers for MJCF, to the last digit."""
     return " ".join(repr(float(value)) for value in values)
 
 
-def text_of(root: Xml.Element) -> str:
-    """A model as MuJoCo reads it."""
+def format_xml(root: Xml.Element) -> str:
+    """Return a model as text."""
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def _paint(bodies: Mapping[str, Xml.Element], robot: Robot) -> None:
+    """Colour the shapes of the legs by their side, all others grey."""
+    above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in bodies}
+    for link, body in bodies.items():
+        # A leg is between the root and a foot, or beyond the foot.
+        sides = [side for side, foot in robot.feet.items() if link in above[foot.link] or foot.link in above[link]]
+        for geom in body.findall("geom"):
+            geom.set("rgba", SIDE_COLOURS[sides[0]] if len(sides) == 1 else TRUNK)
+            if geom.get("type") != "mesh":
+                geom.set("group", LIMBS)
+
+
+def _add_look(root: Xml.Element) -> Xml.Element:
+    """Add light, sky and the floor's material, a grid with a line every 10 cm; return the element of assets."""
+    visual = Xml.SubElement(root, "visual")
+    Xml.SubElement(visual, "global", fovy="30")
+    Xml.SubElement(visual, "headlight", ambient="0.42 0.42 0.42", diffuse="0.3 0.3 0.3", specular="0 0 0")
+    Xml.SubElement(visual, "quality", shadowsize="4096")
+    Xml.SubElement(visual, "map", shadowclip="2")
+    assets = Xml.SubElement(root, "asset")
+    sky = Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384")
+    sky.attrib |= {"rgb1": "1 1 1", "rgb2": "0.80 0.87 0.93"}
+    tiles = Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", mark="edge")
+    tiles.attrib |= {"width": "128", "height": "128"}
+    tiles.attrib |= {"rgb1": "0.93 0.94 0.95", "rgb2": "0.87 0.89 0.91", "markrgb": "0.55 0.58 0.62"}
+    repeat = f"{LINES_PER_M / 2:g} {LINES_PER_M / 2:g}"  # one texture shows two cells in each direction
+    Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texuniform="true", texrepeat=repeat)
+    return assets

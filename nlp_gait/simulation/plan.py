@@ -1,4 +1,4 @@
-"""The planned motion of a gait as functions of time, and what the model predicts for it."""
+"""Planned motion and torques of a gait as functions of time."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from nlp_gait.formulation.display import Tread
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.gaits.several_steps import walk
 from nlp_gait.robots import Robot
-from nlp_gait.simulation.shapes import Shape, link_shapes
+from nlp_gait.simulation.shapes import Shape, make_shapes
 
 SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 STANDING = 1e-9  # [m]; a sole that moves less is a support
-# Of a walk: an engine's step of 0.5 ms is kept with all that is measured, and so is each step's plan.
+# Of a walk: all measurements at every engine's step of 0.5 ms are in memory.
 MOST_STEPS, LONGEST_S = 1000, 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
-    """A gait to be played.
+    """A gait to simulate.
 
     Attributes:
-        robot: as the model takes it, head and neck one with the torso.
+        robot: of the simulation model: links that never move are welded.
         full_robot: with all joints, for its shapes.
         signals: planned time histories on a dense grid.
         heat_loss: K [W/(Nm)^2].
@@ -48,12 +48,12 @@ class Plan:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Those that are driven."""
+        """Driven joints."""
         return self.signals.joints
 
     @property
     def duration_s(self) -> float:
-        """Of the phase."""
+        """Duration of the motion."""
         return float(self.signals.arrays["t"][-1])
 
     @cached_property
@@ -62,24 +62,24 @@ class Plan:
         return tuple(side for side in SIDES if np.ptp(self.signals.arrays[f"{side}_foot"], axis=0).max() < STANDING)
 
     def stands(self, side: str, times: Array) -> Array:
-        """1 where a sole is planned to stand flat on the ground, else 0."""
+        """Return 1 where a sole is planned to stand flat on the ground, else 0."""
         foot = self.at(f"{side}_foot", times)
         return np.asarray(foot[:, 2] - self.level(foot[:, 0]) < ON_GROUND, dtype=float)
 
     def bears(self, side: str, times: Array) -> Array:
-        """1 where any part of a foot is planned to be on the ground, else 0."""
+        """Return 1 where any part of a foot is planned to be on the ground, else 0."""
         name = f"{side}_bears"
         if name not in self.signals.arrays:
             return self.stands(side, times)
         return np.round(self.at(name, times)[:, 0])
 
     def level(self, x: Array) -> Array:
-        """(N,) height of the ground at places along x [m]."""
+        """Return the height (N,) of the ground at places along x [m]."""
         heights = np.array([0.0, *(tread.height_m for tread in self.ground)])
         return heights[np.searchsorted([tread.edge_m for tread in self.ground], x, side="right")]
 
     def attitude(self, times: Array) -> Array:
-        """(T, 4) planned attitude of the root, a unit quaternion (w, x, y, z); of a jump, the side that is nearer in time."""
+        """Return the planned attitude (T, 4) of the root, a unit quaternion (w, x, y, z): that of the nearest sample."""
         samples = self.signals.arrays
         if "attitude" not in samples:
             return np.tile(UPRIGHT, (len(times), 1))
@@ -88,7 +88,7 @@ class Plan:
         return np.asarray(samples["attitude"][nearest])
 
     def torso_axis(self, times: Array) -> Array:
-        """(T, 3) planned direction of the root's upright axis."""
+        """Return the planned direction (T, 3) of the root's upright axis."""
         w, x, y, z = self.attitude(times).T
         return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
 
@@ -109,7 +109,7 @@ class Plan:
         return {name: CubicSpline(arrays["t"], arrays[name]) for name in names}
 
     def at(self, name: str, times: Array) -> Array:
-        """Planned values at any times: beyond the end positions and torques stay, and rates are zero.
+        """Return planned values at any times: after the end, positions and torques stay, and rates are zero.
 
         Args:
             name: ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` or ``right_foot`` [m].
@@ -121,41 +121,41 @@ class Plan:
         samples = self.signals.arrays
         if name == "qd":
             return self.rate("q", times)
-        # Torques jump where a foot lands or lifts: no spline runs through them.
+        # Torques jump where a foot lands or lifts, so a spline would overshoot.
         columns = [np.interp(within, samples["t"], column) for column in samples[name].T]
         return np.stack(columns, axis=1)
 
     def rate(self, name: str, times: Array) -> Array:
-        """Planned rates of what has a spline at any times (T,): zero beyond the end."""
+        """Return planned rates of ``q``, ``zmp``, ``hip`` or a foot at any times (T,): zero after the end."""
         within = np.clip(times, 0.0, self.duration_s)
         return np.asarray(self._splines[name](within, 1) * (times <= self.duration_s)[:, None])
 
     def shapes(self, sole: str) -> dict[str, list[Shape]]:
-        """Shapes of the simulated robot's links."""
+        """Return the shapes of the simulated robot's links."""
         welded = [joint for joint in self.full_robot.joints if joint not in self.robot.joints]
-        return link_shapes(self.full_robot, sole, welded=welded)
+        return make_shapes(self.full_robot, sole, welded=welded)
 
 
 @one_at_a_time
-def plan_of(result: Result, steps: int | None = None) -> Plan:
-    """Plan of a solved problem.
+def make_plan(result: Result, steps: int | None = None) -> Plan:
+    """Return the plan of a solved problem.
 
     Args:
-        result: of a problem that says how its gaits are played.
-        steps: how many are played one after the other; by default what the gait is, one phase or one cycle.
+        result: of a problem with a simulation model.
+        steps: number of consecutive steps; by default one phase or one cycle, whatever the gait is.
 
     Raises:
-        InputError: a problem that says nothing of it, a gait so damaged that its angles are not finite, several steps of
-            what cannot be repeated, or more than anybody waits for.
+        InputError: the problem has no simulation model, the gait cannot be repeated or has samples that are not finite, or there
+            are too many steps.
     """
     problem = result.problem
     model = problem.display.simulation_model
     if model is None:
-        raise InputError(f"problem {problem.name!r} cannot be simulated: it does not say how its gaits are played")
+        raise InputError(f"problem {problem.name!r} cannot be simulated: it has no simulation model")
     if steps is not None and not model.repeats:
-        raise InputError(f"problem {problem.name!r} is no cycle that can be repeated; leave out the number of steps")
+        raise InputError(f"problem {problem.name!r} is not a cycle that can be repeated; leave out the number of steps")
     if steps is not None and steps > MOST_STEPS:
-        raise InputError(f"at most {MOST_STEPS} steps are played, got {steps}; take fewer")
+        raise InputError(f"at most {MOST_STEPS} steps are simulated, got {steps}; use fewer")
     at = problem.at(result.x)
     if model.motion is not None:
         signals = model.motion(at, 1 if steps is None else steps)
@@ -163,10 +163,10 @@ def plan_of(result: Result, steps: int | None = None) -> Plan:
         signals = finely_sampled(result)
         signals = signals if steps is None else walk(signals, model.robot, steps)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
-        raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be played")
+        raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be simulated")
     if (duration := float(signals.arrays["t"][-1])) > LONGEST_S:
         raise InputError(
-            f"{steps} steps of this gait last {duration:g} s, and at most {LONGEST_S:g} s are played; take fewer"
+            f"{steps} steps of this gait last {duration:g} s, and at most {LONGEST_S:g} s are simulated; use fewer"
         )
     return Plan(
         robot=model.robot,

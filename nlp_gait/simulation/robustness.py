@@ -1,4 +1,4 @@
-"""How much disturbance a gait survives: pushes, slippery floors, wrong masses, slopes."""
+"""Disturbances that a gait survives: pushes, slippery floors, wrong masses, slopes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
 DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}
 PUSH_STEP, LARGEST_PUSH = 0.1, 3.0  # [N s]
@@ -20,12 +19,12 @@ MASS_FACTORS = (0.9, 1.1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """What a gait survives; a fall while settling counts.
+    """Disturbances that a gait survives; a fall while settling counts.
 
     Attributes:
-        undisturbed: whether it survives at all.
-        push_Ns: by direction, the largest impulse on the torso below the first that fells it.
-        slope_deg: by the direction in which the floor rises, the largest slope below the first that fells it.
+        undisturbed: whether it survives without any.
+        push_Ns: by direction, the largest impulse on the torso below the first one that makes it fall.
+        slope_deg: by the direction in which the floor rises, the largest slope below the first one that makes it fall.
         friction: by coefficient, whether it survives.
         mass_factor: by factor on all masses, whether it survives.
     """
@@ -37,25 +36,25 @@ class Robustness:
     mass_factor: Mapping[float, bool]
 
 
-def robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
-    """Sweep every disturbance by itself, from none upwards until the robot falls.
+def measure_robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
+    """Increase each disturbance alone until the robot falls.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
 
     def survives(conditions: Conditions) -> bool:
-        return play(plan, conditions, drive).fell_at_s is None
+        return simulate_plan(plan, conditions, drive).fell_at_s is None
 
-    def pushed(direction: str, impulse: float) -> Conditions:
+    def push(direction: str, impulse: float) -> Conditions:
         x, y = DIRECTIONS[direction]
         return Conditions(push=Push(impulse_Ns=(x * impulse, y * impulse)))
 
-    def sloped(direction: str, slope: float) -> Conditions:
+    def slope(direction: str, degrees: float) -> Conditions:
         x, y = DIRECTIONS[direction]
-        return Conditions(slope_rad=(math.radians(x * slope), math.radians(y * slope)))
+        return Conditions(slope_rad=(math.radians(x * degrees), math.radians(y * degrees)))
 
-    def largest(make: Callable[[str, float], Conditions], step: float, most: float) -> dict[str, float]:
+    def find_largest(make: Callable[[str, float], Conditions], step: float, most: float) -> dict[str, float]:
         found = {}
         for direction in DIRECTIONS:
             steps = 1
@@ -66,8 +65,8 @@ def robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
 
     return Robustness(
         undisturbed=survives(Conditions()),
-        push_Ns=largest(pushed, PUSH_STEP, LARGEST_PUSH),
-        slope_deg=largest(sloped, SLOPE_STEP, LARGEST_SLOPE),
+        push_Ns=find_largest(push, PUSH_STEP, LARGEST_PUSH),
+        slope_deg=find_largest(slope, SLOPE_STEP, LARGEST_SLOPE),
         friction={value: survives(Conditions(friction=value)) for value in FRICTIONS},
         mass_factor={value: survives(Conditions(mass_factor=value)) for value in MASS_FACTORS},
     )

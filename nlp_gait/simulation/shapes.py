@@ -1,4 +1,4 @@
-"""Primitive shapes of a robot's links: what is drawn, and what can touch the floor."""
+"""Primitive shapes of a robot's links, for drawing and for contacts with the floor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.robot import Vector
 from nlp_gait.robots.tree import plus
 
-SOLES = ("rectangle", "polygon")  # what balance margins are measured to, or the true outline
+SOLES = ("rectangle", "polygon")  # the outline for balance margins, or the true one
 
 SOLE_THICKNESS = 0.015  # [m]; the sole's lower face alone touches the floor
 LIMB_RADIUS = 0.02  # [m]
@@ -23,15 +23,15 @@ SHORTEST_LIMB = 0.02  # [m]; joints closer together than this share a centre
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capsule:
-    """Cylinder with round ends [m]; a ball where both ends are one. One that is not solid is drawn and touches nothing."""
+    """Cylinder with round ends [m], or a ball if both ends are equal. If not solid, it touches nothing."""
 
     start: Vector
     end: Vector
     radius: float
     solid: bool = True
 
-    def shifted(self, by: Vector) -> Capsule:
-        """The same shape elsewhere."""
+    def move(self, by: Vector) -> Capsule:
+        """Return the shape, moved by a vector."""
         return replace(self, start=plus(self.start, by), end=plus(self.end, by))
 
 
@@ -43,8 +43,8 @@ class Prism:
     bottom: float
     thickness: float
 
-    def shifted(self, by: Vector) -> Prism:
-        """The same shape elsewhere."""
+    def move(self, by: Vector) -> Prism:
+        """Return the shape, moved by a vector."""
         outline = tuple((x + by[0], y + by[1]) for x, y in self.outline)
         return replace(self, outline=outline, bottom=self.bottom + by[2])
 
@@ -52,19 +52,19 @@ class Prism:
 Shape: TypeAlias = Capsule | Prism
 
 
-def link_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
-    """Shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
+def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
+    """Return the shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
 
     Args:
         robot: with all its joints.
         sole: outline of the soles.
-        welded: joints that the simulated robot lacks; shapes beyond them move to the link before them.
+        welded: joints that the simulated robot does not have; the shapes of their children move to the parents.
 
     Raises:
-        InputError: an outline that does not exist.
+        InputError: no such outline.
     """
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
-    low = _low_joints(robot)
+    low = _find_low_joints(robot)
     for joint in robot.joints.values():
         radius = TRUNK_RADIUS if joint.parent == robot.root else LIMB_RADIUS
         if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB and joint.parent not in robot.soles:
@@ -74,21 +74,21 @@ def link_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] =
     for name, link in robot.links.items():
         if name in robot.soles:
             foot = robot.soles[name]
-            outline = sole_outline(foot, sole)
+            outline = get_sole_outline(foot, sole)
             shapes[name].append(Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS))
-        elif name == robot.root and not shapes[name]:  # a trunk that all limbs leave at one point: a rod from there
+        elif name == robot.root and not shapes[name]:  # all limbs start at one point of the trunk: a rod from there
             x, y, z = link.com_m
             shapes[name].append(Capsule(start=(0.0, 0.0, 0.0), end=(2 * x, 2 * y, 2 * z), radius=TRUNK_RADIUS))
         elif name not in parents:  # a hand or a head, about its centre of mass
             radius = TRUNK_RADIUS if np.linalg.norm(link.com_m) > SHORTEST_LIMB + LIMB_RADIUS else LIMB_RADIUS
             shapes[name].append(Capsule(start=link.com_m, end=link.com_m, radius=radius))
     for joint in sorted((robot.joint(name) for name in welded), key=lambda j: -len(robot.path_to_root(j.child))):
-        shapes[joint.parent] += [shape.shifted(joint.origin_m) for shape in shapes.pop(joint.child)]
+        shapes[joint.parent] += [shape.move(joint.origin_m) for shape in shapes.pop(joint.child)]
     return shapes
 
 
-def _low_joints(robot: Robot) -> set[str]:
-    """Joints so near the ground that a limb's round end about them would stand on it in the sole's place."""
+def _find_low_joints(robot: Robot) -> set[str]:
+    """Return the joints so close to the ground that a limb's round end would touch it instead of the sole."""
     low = set()
     for foot in robot.feet.values():
         for joint in robot.path_to_root(foot.link):
@@ -100,11 +100,11 @@ def _low_joints(robot: Robot) -> set[str]:
     return low
 
 
-def sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
-    """Corners of a sole from the ankle's projection on the ground [m].
+def get_sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a sole from the ankle's projection on the ground [m].
 
     Raises:
-        InputError: an outline that does not exist, or one that the robot's data lacks.
+        InputError: no such outline, or the robot's data does not have it.
     """
     if sole not in SOLES:
         raise InputError(f"sole must be one of {', '.join(SOLES)}, got {sole!r}")

@@ -13,6 +13,8 @@ from nlp_gait.symbolic.dynamics import Wrench
 # In free fall there is no ZMP. Below this share of the weight the ground force is taken as this share: the ZMP is then
 # far outside any sole, and finite.
 LEAST_LOAD = 1e-3
+# Static friction that is commonly required of a walkway (UL 410); rubber on a dry floor has more.
+SOLE_FRICTION = 0.5
 
 
 def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:

@@ -97,7 +97,7 @@ def test_what_a_problem_has_not_is_refused(tmp_path):
     for name in ("webots", "naoqi"):
         with pytest.raises(InputError, match="no robot with motors; export it as csv or json"):
             write_as(name, tmp_path / "x", walk, 40)
-    with pytest.raises(InputError, match="does not say how its gaits are played"):
+    with pytest.raises(InputError, match="has no simulation model"):
         write_as(
             "mjcf",
             tmp_path / "x",

@@ -205,7 +205,7 @@ def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyP
     pytest.importorskip("mujoco")
     from nlp_gait.simulation import robustness
 
-    monkeypatch.setattr(robustness, "robustness", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(robustness, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
     done = run("simulate", gait, "--robustness", "--out", str(tmp_path))
     assert f"interrupted in the tests of robustness; the playback is kept in {tmp_path}" in done.stderr
     assert {"report.json", "model.xml", "playback.npz"} <= {path.name for path in tmp_path.iterdir()}

@@ -22,7 +22,7 @@ from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
 from nlp_gait.simulation.load_sharing import Sharing
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
-from nlp_gait.simulation.plan import MOST_STEPS, plan_of
+from nlp_gait.simulation.plan import MOST_STEPS, make_plan
 
 
 def test_a_sweep_is_as_large_as_its_grid() -> None:
@@ -62,14 +62,14 @@ WALK = {"step_length_m": 0.1, "frontal_shift_m": 0.1, "foot_lift_m": 0.02, "bend
 @pytest.mark.parametrize(
     ("steps", "step_time_s", "message"),
     [
-        (10**9, 1.0, f"at most {MOST_STEPS} steps are played, got 1000000000; take fewer"),
-        (4, 100.0, f"4 steps of this gait last 400 s, and at most {LONGEST_PLAYED_S:g} s are played"),
+        (10**9, 1.0, f"at most {MOST_STEPS} steps are simulated, got 1000000000; use fewer"),
+        (4, 100.0, f"4 steps of this gait last 400 s, and at most {LONGEST_PLAYED_S:g} s are simulated"),
     ],
 )
 def test_a_walk_is_played_as_long_as_somebody_waits_for(steps: int, step_time_s: float, message: str) -> None:
     walk = load("walk12").with_values(step_time_s=step_time_s)
     with pytest.raises(InputError, match=message):
-        plan_of(Result(problem=walk, x=walk.check_x(WALK)), steps)
+        make_plan(Result(problem=walk, x=walk.check_x(WALK)), steps)
 
 
 @pytest.mark.parametrize("owner", [Drive, Feedback, Sharing])

@@ -23,7 +23,7 @@ from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import free_model
+from nlp_gait.simulation.mjcf import make_model
 from tests.compare.records import study
 
 SCRIPT = "<script>alert(1)</script>"
@@ -107,7 +107,7 @@ def test_text_in_figures_is_escaped() -> None:
 
 def test_names_of_robots_are_escaped_in_models() -> None:
     robot = replace(load_robot("nao-v5"), name=f"{QUOTED}{SCRIPT}&")
-    root = ElementTree.fromstring(free_model(robot, {}, Drive(), 9.81))
+    root = ElementTree.fromstring(make_model(robot, {}, Drive(), 9.81))
     assert root.get("model") == f"{QUOTED}{SCRIPT}&"
     assert not list(root.iter("script"))
 

@@ -15,8 +15,8 @@ from nlp_gait.gaits.biped.instant import BOTH_FEET
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
-from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.mjcf import add_bodies, document, text_of
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.mjcf import add_bodies, format_xml, make_document
 
 
 def engine_torques(result: Result, signals: Signals) -> Array:
@@ -50,7 +50,7 @@ def _fill(
     torques: Array, tree: Sequence[Body], signals: Signals, shared: str | None = None, share: Array | None = None
 ) -> None:
     """Write the torques of a tree's joints into their columns; ``share`` (T,) scales mass and inertia of one link."""
-    engine = mujoco()
+    engine = load_mujoco()
     model = engine.MjModel.from_xml_string(fixed_model(tree))
     data = engine.MjData(model)
     columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
@@ -76,7 +76,7 @@ def standing_on(
         signals: angles, rates and accelerations.
         forces: of the ground (T, 3) [N] on the frame of each of these links, beyond its sole's front.
     """
-    engine, forces = mujoco(), forces or {}
+    engine, forces = load_mujoco(), forces or {}
     model = engine.MjModel.from_xml_string(fixed_model(tree_from(robot, robot.feet[side].link), gravity))
     data = engine.MjData(model)
     columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
@@ -100,7 +100,7 @@ def standing_on(
 
 def fixed_model(tree: Sequence[Body], gravity: float = GRAVITY) -> str:
     """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to."""
-    root, option = document("fixed", gravity)
+    root, option = make_document("fixed", gravity)
     Xml.SubElement(option, "flag", constraint="disable")
     add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, root="fixed")
-    return text_of(root)
+    return format_xml(root)

@@ -21,13 +21,17 @@ from nlp_gait.symbolic.kinematics import forward_kinematics
 
 pytest.importorskip("mujoco")
 
-from nlp_gait.simulation.conditions import Conditions  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
-from nlp_gait.simulation.engine import mujoco  # noqa: E402
-from nlp_gait.simulation.feedback import Balance, Feedback, load_shares  # noqa: E402
-from nlp_gait.simulation.plan import SIDES, Plan, plan_of  # noqa: E402
-from nlp_gait.simulation.playback import Trace, play, prepared  # noqa: E402
-from nlp_gait.simulation.walking import measure_walk  # noqa: E402
+from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
+from nlp_gait.simulation.feedback import Balance, Feedback, compute_load_shares  # noqa: E402
+from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
+from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
+from nlp_gait.simulation.simulate import (  # noqa: E402
+    Conditions,  # noqa: E402
+    Simulation,
+    prepare,
+    simulate_plan,
+)
 from tests.simulation.test_walking import CHEAPEST  # noqa: E402
 
 IDEAL = replace(Feedback().with_noise(0.0), delay_s=0.0)
@@ -38,11 +42,11 @@ STEPS = 2
 @pytest.fixture(scope="module")
 def plan() -> Plan:
     problem = nlp_gait.load("nao-cycle")
-    return plan_of(Result(problem=problem, x=problem.check_x(CHEAPEST)), STEPS)
+    return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), STEPS)
 
 
-def played(plan: Plan, feedback: Feedback | None, conditions: Conditions | None = None) -> Trace:
-    return play(plan, conditions, Drive(feedback=feedback))
+def played(plan: Plan, feedback: Feedback | None, conditions: Conditions | None = None) -> Simulation:
+    return simulate_plan(plan, conditions, Drive(feedback=feedback))
 
 
 @pytest.mark.slow
@@ -78,7 +82,7 @@ def test_the_same_seed_gives_the_same_walk_and_noise_and_delay_act(plan: Plan) -
 def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
     """In single support one foot has it all; in between, the point that divides the way between them is nearest to the ZMP."""
     single, double, period = 0.4, 0.56565, 0.96565
-    shares = load_shares(plan, np.array([0.2, single + 0.25 * double, single + 0.75 * double, period + 0.2]))
+    shares = compute_load_shares(plan, np.array([0.2, single + 0.25 * double, single + 0.75 * double, period + 0.2]))
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     assert shares[0].tolist() == [1.0, 0.0] and shares[3].tolist() == [0.0, 1.0]
     assert 1.0 > shares[1, 0] > shares[2, 0] > 0.0
@@ -93,11 +97,11 @@ def test_torques_do_the_virtual_work_of_the_springs(plan: Plan) -> None:
     drive, names, start = Drive(), list(plan.joints), np.zeros(1)
     stiffness = np.array([drive.stiffness(plan.robot.joint(name)) for name in names])
     spring = replace(IDEAL, damper_Ns_per_m=0.0, tilt_damper_Nms_per_rad=0.0, growth_per_s=0.0)
-    model, data = prepared(plan, Conditions(), drive, "rectangle")
+    model, data = prepare(plan, Conditions(), drive, "rectangle")
     for name, bent in (("LAnklePitch", 0.1), ("LKneePitch", 0.05), ("RHipRoll", 0.1)):  # the torso's place changes
         data.qpos[model.joint(name).qposadr[0]] += bent
-    mujoco().mj_forward(model, data)
-    shares = load_shares(plan, start)[0]
+    load_mujoco().mj_forward(model, data)
+    shares = compute_load_shares(plan, start)[0]
     assert shares.min() > 0.1
     feet = [data.site(side).xpos for side in SIDES]
     planned = plan.at("hip", start)[0] - shares @ np.stack([plan.at(f"{side}_foot", start)[0] for side in SIDES])
@@ -128,7 +132,7 @@ def virtual_work(plan: Plan, foot: str, force: Array, at: Array) -> Array:
 def test_weaker_servos_are_weaker(plan: Plan) -> None:
     drive = Drive()
     (as_assumed, _), (weak, _) = (
-        prepared(plan, Conditions(stiffness_factor=factor), drive, "rectangle") for factor in (1.0, 0.7)
+        prepare(plan, Conditions(stiffness_factor=factor), drive, "rectangle") for factor in (1.0, 0.7)
     )
     np.testing.assert_allclose(weak.actuator_gainprm[:, 0], 0.7 * as_assumed.actuator_gainprm[:, 0])
     np.testing.assert_allclose(weak.actuator_biasprm[:, 1], 0.7 * as_assumed.actuator_biasprm[:, 1])

@@ -17,14 +17,14 @@ pytest.importorskip("mujoco")
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.film import film  # noqa: E402
-from nlp_gait.simulation.film.caption import Captions, Strip  # noqa: E402
-from nlp_gait.simulation.film.film import picture_size  # noqa: E402
-from nlp_gait.simulation.film.recording import recorded  # noqa: E402
-from nlp_gait.simulation.film.stage import View  # noqa: E402
+from nlp_gait.simulation.film.film import parse_picture_size  # noqa: E402
+from nlp_gait.simulation.film.recording import record_film  # noqa: E402
+from nlp_gait.simulation.film.scene import View  # noqa: E402
+from nlp_gait.simulation.film.strip import Captions, Strip  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
-from nlp_gait.simulation.mjcf import free_model  # noqa: E402
-from nlp_gait.simulation.plan import plan_of  # noqa: E402
-from nlp_gait.simulation.playback import play  # noqa: E402
+from nlp_gait.simulation.mjcf import make_model  # noqa: E402
+from nlp_gait.simulation.plan import make_plan  # noqa: E402
+from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 # Two gaits beside each other, drawn in a process of its own: the graphics driver is chosen when the engine is imported.
@@ -34,27 +34,27 @@ import numpy as np
 import nlp_gait
 from functools import partial
 from nlp_gait.formulation import Result
-from nlp_gait.simulation.engine import mujoco
-mujoco(pictures=True)
-from nlp_gait.simulation.film.film import pictures
-from nlp_gait.simulation.film.recording import recorded
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.engine import load_mujoco
+load_mujoco(pictures=True)
+from nlp_gait.simulation.film.film import draw_pictures
+from nlp_gait.simulation.film.recording import record_film
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 problem = nlp_gait.load("nao-dsp")
 shots = []
 for time_s in (0.4, 0.6):
     x = problem.check_x((0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, time_s))
-    plan = plan_of(Result(problem=problem, x=x))
-    shots.append(recorded("dsp", plan, partial(play, plan), 0.8))
-np.savez(sys.argv[1], one=list(pictures(shots[:1], (480, 360))), two=list(pictures(shots, (640, 360), "slow")))
+    plan = make_plan(Result(problem=problem, x=x))
+    shots.append(record_film("dsp", plan, partial(simulate_plan, plan), 0.8))
+np.savez(sys.argv[1], one=list(draw_pictures(shots[:1], (480, 360))), two=list(draw_pictures(shots, (640, 360), "slow")))
 """
 
 
 @pytest.fixture(scope="module")
 def recording(gait):
-    plan = plan_of(gait("dsp optimum"))
-    return plan, recorded("a title", plan, partial(play, plan), 0.25)
+    plan = make_plan(gait("dsp optimum"))
+    return plan, record_film("a title", plan, partial(simulate_plan, plan), 0.25)
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_ctrl_c_waits_for_the_end_of_a_picture(recording, monkeypatch):
 
     monkeypatch.setattr(film, "Stage", Interrupted)
     with pytest.raises(KeyboardInterrupt):
-        list(film.pictures([recording[1]], (320, 240)))
+        list(film.draw_pictures([recording[1]], (320, 240)))
     assert drawn == [0, "closed"]
 
 
@@ -116,8 +116,8 @@ def test_captions_say_time_speed_and_power_and_a_fall(recording):
 
 @pytest.mark.slow
 def test_a_recording_stands_still_on_a_fall(gait):
-    plan = plan_of(gait("ssp falling"))
-    record = recorded("a fall", plan, partial(play, plan), 0.25)
+    plan = make_plan(gait("ssp falling"))
+    record = record_film("a fall", plan, partial(simulate_plan, plan), 0.25)
     fell_at_s = record.trace.fell_at_s
     assert fell_at_s is not None
     assert (record.t == fell_at_s).sum() == 4  # a second
@@ -128,8 +128,8 @@ def test_a_recording_stands_still_on_a_fall(gait):
 def test_legs_have_a_colour_for_each_side(gait):
     from xml.etree import ElementTree as Xml
 
-    plan = plan_of(gait("dsp optimum"))
-    root = Xml.fromstring(free_model(plan.robot, plan.shapes("rectangle"), Drive(), plan.gravity))
+    plan = make_plan(gait("dsp optimum"))
+    root = Xml.fromstring(make_model(plan.robot, plan.shapes("rectangle"), Drive(), plan.gravity))
     colours = {body.get("name"): {geom.get("rgba") for geom in body.findall("geom")} for body in root.iter("body")}
     left, right = colours["l_ankle"], colours["r_ankle"]
     assert colours["LThigh"] == left != right == colours["RTibia"]
@@ -166,8 +166,8 @@ def test_pictures_show_both_legs_pressure_and_captions_of_one_gait_or_two(tmp_pa
 @pytest.mark.parametrize("text", ["", "1280", "100x100", "1280x", "9999x9999", "-640x480", "640x480x3"])
 def test_a_size_that_is_none_is_refused(text):
     with pytest.raises(InputError, match="size of a film is WIDTHxHEIGHT in pixels from 320x240 to 3840x2160"):
-        picture_size(text)
+        parse_picture_size(text)
 
 
 def test_a_size_is_read():
-    assert picture_size("1280x720") == (1280, 720) and picture_size(" 640X360 ") == (640, 360)
+    assert parse_picture_size("1280x720") == (1280, 720) and parse_picture_size(" 640X360 ") == (640, 360)

@@ -16,8 +16,15 @@ from compare.cli import app
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.formulation import Array, Result, load
 from nlp_gait.robots import load_robot
-from nlp_gait.simulation.load_sharing import Sharing, Support, bearing_rows, double_supports, instants_of, share_loads
-from nlp_gait.simulation.plan import Plan, plan_of
+from nlp_gait.simulation.load_sharing import (
+    Sharing,
+    Support,
+    compute_instants,
+    find_double_supports,
+    make_sole_rows,
+    share_loads,
+)
+from nlp_gait.simulation.plan import Plan, make_plan
 from tests.gaits.nao.test_cycle import OPTIMUM
 from tests.pinocchio_oracle import left_over
 from tests.properties.mirror import JOINT_SIGNS, partner
@@ -31,7 +38,7 @@ K = 0.025
 
 def cycle(steps: int | None = None) -> Plan:
     problem = load("nao-cycle", objective="power").with_values(speed_m_s=0.03)
-    return plan_of(Result(problem=problem, x=np.array([OPTIMUM[name] for name in problem.names])), steps)
+    return make_plan(Result(problem=problem, x=np.array([OPTIMUM[name] for name in problem.names])), steps)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +48,7 @@ def plan() -> Plan:
 
 @pytest.fixture(scope="module")
 def support(plan: Plan) -> Support:
-    (found,) = double_supports(plan.signals)
+    (found,) = find_double_supports(plan.signals)
     return found
 
 
@@ -74,7 +81,7 @@ def test_double_support_begins_after_the_landing(plan: Plan, support: Support) -
 @pytest.mark.slow
 def test_with_the_levers_wrench_it_has_the_levers_torques(plan: Plan, support: Support) -> None:
     samples = slice(support.first, support.last + 1)
-    instants, right = instants_of(plan, samples), wrenches(plan, "right", samples)
+    instants, right = compute_instants(plan, samples), wrenches(plan, "right", samples)
     torque = instants.torque - np.einsum("njk,nk->nj", instants.gain, right)
     np.testing.assert_allclose(torque, plan.signals.arrays["tau"][samples], rtol=0, atol=TORQUE_TOLERANCE_NM)
     left = instants.left - np.einsum("njk,nk->nj", instants.carried, right)
@@ -94,8 +101,8 @@ def test_no_instant_costs_more_than_by_the_lever_rule(plan: Plan, support: Suppo
 def test_it_is_scipys_optimum_at_single_instants(plan: Plan, support: Support, shared: Plan) -> None:
     for sample in np.linspace(support.first, support.last, 5).astype(int).tolist():
         one = slice(sample, sample + 1)
-        torque, gain, left, carried = (part[0] for part in instants_of(plan, one))
-        rate, rows = plan.signals.arrays["qd"][sample], bearing_rows(plan.robot, Sharing().friction)
+        torque, gain, left, carried = (part[0] for part in compute_instants(plan, one))
+        rate, rows = plan.signals.arrays["qd"][sample], make_sole_rows(plan.robot, Sharing().friction)
         driven = np.flatnonzero(np.abs(gain).max(axis=1) > 0)
 
         def cost(z: Array, torque: Array = torque, gain: Array = gain, driven: Array = driven) -> float:
@@ -133,7 +140,7 @@ def test_it_is_scipys_optimum_at_single_instants(plan: Plan, support: Support, s
 @pytest.mark.slow
 def test_soles_bear_it_and_pinocchio_agrees(plan: Plan, support: Support, shared: Plan) -> None:
     samples = slice(support.first, support.last + 1)
-    for side, rows in bearing_rows(plan.robot, Sharing().friction).items():
+    for side, rows in make_sole_rows(plan.robot, Sharing().friction).items():
         assert (wrenches(shared, side, samples) @ rows.T).min() > -ROW_TOLERANCE
     for sample in np.linspace(support.first, support.last, 7).astype(int).tolist():
         rest = left_over(load_robot("nao-v5"), shared.signals, sample, plan.gravity)
@@ -145,7 +152,7 @@ def test_ramps_hold_and_steps_are_mirror_images() -> None:
     """Three steps: the second double support is the image of the first one; the last foot has none to lift after it."""
     rate, three = 20.0, cycle(steps=3)
     plan = share_loads(three, Sharing(load_rate_1_s=rate))
-    first, second, last = double_supports(plan.signals)
+    first, second, last = find_double_supports(plan.signals)
     assert [(s.landed, s.lifting) for s in (first, second, last)] == [
         ("right", "left"),
         ("left", "right"),
@@ -176,7 +183,7 @@ def test_what_cannot_be_shared_is_said(plan: Plan, monkeypatch: pytest.MonkeyPat
     with pytest.raises(InputError, match="no double support"):
         problem = load("nao-ssp")
         x = np.array([0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0])
-        share_loads(plan_of(Result(problem=problem, x=x)))
+        share_loads(make_plan(Result(problem=problem, x=x)))
     with pytest.raises(InputError, match="friction of a sharing of load must be > 0"):
         Sharing(friction=0.0)
     real = builtins.__import__

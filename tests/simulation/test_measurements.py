@@ -11,9 +11,9 @@ pytest.importorskip("mujoco")
 from nlp_gait.formulation import Signals, in_space  # noqa: E402
 from nlp_gait.robots import load_robot  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
-from nlp_gait.simulation.measurements import averaged_pressure, measure  # noqa: E402
+from nlp_gait.simulation.measurements import average_pressure, measure  # noqa: E402
 from nlp_gait.simulation.plan import Plan  # noqa: E402
-from nlp_gait.simulation.playback import Trace  # noqa: E402
+from nlp_gait.simulation.simulate import Simulation  # noqa: E402
 
 ROBOT = load_robot("nao-v5")
 JOINTS = ("LKneePitch", "LHipRoll")
@@ -74,7 +74,7 @@ def traced(**changed):
         "pressure": still(t, ZMP + (0.003, 0.004)),
         "fell_at_s": None,
     }
-    return Trace(**(fields | changed))
+    return Simulation(**(fields | changed))
 
 
 def measured(**changed):
@@ -181,9 +181,9 @@ def test_pressure_is_averaged_over_a_period_by_load() -> None:
     trace = traced()
     pressure, loads = trace.pressure.copy(), trace.loads.copy()
     loads[1000], pressure[1000] = (100.0, 50.0), (1.0, 0.0)  # three times the load of the other nine samples
-    x, y = averaged_pressure(replace(trace, pressure=pressure, loads=loads), 10 * STEP_S)[1000]
+    x, y = average_pressure(replace(trace, pressure=pressure, loads=loads), 10 * STEP_S)[1000]
     usual = ZMP + (0.003, 0.004)
     assert (x, y) == pytest.approx(((9 * usual[0] + 3 * 1.0) / 12, 9 * usual[1] / 12))
     for load, nothing in ((0.45, True), (0.55, False)):  # of each foot; 1 N in all is the least that counts
-        light = averaged_pressure(replace(trace, loads=np.full_like(loads, load)), 10 * STEP_S)
+        light = average_pressure(replace(trace, loads=np.full_like(loads, load)), 10 * STEP_S)
         assert np.isnan(light).all() == np.isnan(light).any() == nothing

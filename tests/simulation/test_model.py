@@ -11,11 +11,11 @@ from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
-from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.mjcf import free_model
-from nlp_gait.simulation.shapes import Prism, link_shapes
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.mjcf import make_model
+from nlp_gait.simulation.shapes import Prism, make_shapes
+from nlp_gait.simulation.simulate import Conditions
 
 HEAD_JOINTS = ("HeadYaw", "HeadPitch")
 NAO = load_robot("nao-v5")
@@ -37,7 +37,7 @@ def test_stall_and_continuous_limits_come_from_motor_and_gear():
         (lambda: Drive(full_error_rad=float("nan")), "full_error_rad"),
         (lambda: Conditions(friction=-1.0), "friction must be > 0, got -1.0"),
         (lambda: Conditions(slope_rad=(2.0, 0.0)), "slope_rad"),
-        (lambda: link_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),
+        (lambda: make_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),
     ],
 )
 def test_bad_settings_are_refused(make, words):
@@ -46,14 +46,14 @@ def test_bad_settings_are_refused(make, words):
 
 
 def test_soles_are_the_papers_rectangle_or_the_true_outline():
-    rectangle, polygon = ((link_shapes(NAO, sole)["l_ankle"][-1]) for sole in ("rectangle", "polygon"))
+    rectangle, polygon = ((make_shapes(NAO, sole)["l_ankle"][-1]) for sole in ("rectangle", "polygon"))
     assert isinstance(rectangle, Prism) and rectangle.bottom == -0.04519
     assert sorted(rectangle.outline) == [(-0.05, -0.04), (-0.05, 0.04), (0.1, -0.04), (0.1, 0.04)]
     assert len(polygon.outline) == 20
 
 
 def test_shapes_of_a_welded_head_move_to_the_torso():
-    shapes = link_shapes(NAO, welded=HEAD_JOINTS)
+    shapes = make_shapes(NAO, welded=HEAD_JOINTS)
     assert "Head" not in shapes and "Neck" not in shapes
     assert any(shape.start == shape.end and shape.start[2] > 0.15 for shape in shapes["torso"])
 
@@ -61,7 +61,7 @@ def test_shapes_of_a_welded_head_move_to_the_torso():
 def test_the_engine_reads_our_masses_to_the_last_digit():
     engine = pytest.importorskip("mujoco")
     robot = weld(NAO, HEAD_JOINTS)
-    model = engine.MjModel.from_xml_string(free_model(robot, link_shapes(NAO, welded=HEAD_JOINTS), Drive(), GRAVITY))
+    model = engine.MjModel.from_xml_string(make_model(robot, make_shapes(NAO, welded=HEAD_JOINTS), Drive(), GRAVITY))
     assert model.body_mass.sum() == pytest.approx(5.30535, abs=1e-12)
     for name, link in robot.links.items():
         body = model.body(name)
@@ -74,7 +74,7 @@ def test_the_engine_reads_our_masses_to_the_last_digit():
 
 
 def test_the_document_is_well_formed_without_the_engine():
-    root = Xml.fromstring(free_model(NAO, link_shapes(NAO), Drive(), GRAVITY, friction=0.5))
+    root = Xml.fromstring(make_model(NAO, make_shapes(NAO), Drive(), GRAVITY, friction=0.5))
     assert len(root.findall(".//joint")) == len(NAO.joints) and len(root.findall(".//freejoint")) == 1
     assert len(root.findall("./actuator/position")) == len(NAO.joints)
     assert root.find("./default/geom").get("friction").startswith("0.5 ")
@@ -89,7 +89,7 @@ def test_slope_tilts_gravity():
 def test_without_the_extra_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[sim\]'"):
-        mujoco()
+        load_mujoco()
 
 
 def _tensor(link):
@@ -101,6 +101,6 @@ def test_the_engine_takes_a_link_without_extent():
     """A URDF may have zeros for a tensor: a point."""
     links = {**NAO.links, "Head": replace(NAO.links["Head"], inertia_com_kgm2=(0.0,) * 6)}
     engine = pytest.importorskip("mujoco")
-    model = engine.MjModel.from_xml_string(free_model(replace(NAO, links=links), link_shapes(NAO), Drive(), GRAVITY))
+    model = engine.MjModel.from_xml_string(make_model(replace(NAO, links=links), make_shapes(NAO), Drive(), GRAVITY))
     assert 0.0 < model.body("Head").inertia.max() < 1e-6
     assert model.body("Head").mass == pytest.approx(NAO.links["Head"].mass_kg)

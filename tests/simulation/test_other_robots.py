@@ -15,8 +15,8 @@ from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import plan_model
-from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.shapes import Prism
 
 pytest.importorskip("mujoco")
@@ -51,7 +51,7 @@ def ideal() -> Result:
 
 def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> None:
     own = climb.problem.signals(climb.x)
-    plan = plan_of(climb)
+    plan = make_plan(climb)
     rear = np.zeros((len(plan.signals.arrays["t"]), 3))
     t = own.arrays["t"]
     new = np.diff(t, prepend=-1.0) > 0.0
@@ -74,7 +74,7 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
 
 
 def test_the_ideal_step_is_played_through_its_own_instants(ideal: Result) -> None:
-    own, plan = ideal.problem.signals(ideal.x), plan_of(ideal)
+    own, plan = ideal.problem.signals(ideal.x), make_plan(ideal)
     per_interval = (len(plan.signals.arrays["t"]) - 1) // (len(own.arrays["t"]) - 1)
     played = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}
     np.testing.assert_allclose(played["t"], own.arrays["t"], atol=1e-12)
@@ -85,7 +85,7 @@ def test_the_ideal_step_is_played_through_its_own_instants(ideal: Result) -> Non
 
 @pytest.mark.parametrize("x", WALKS)
 def test_small_spheres_need_the_point_masses_pressure_and_the_engines_torques(x: tuple[float, ...]) -> None:
-    plan = plan_of(result_of(nlp_gait.load("walk12"), x))
+    plan = make_plan(result_of(nlp_gait.load("walk12"), x))
     torques, wrench = standing_on(plan.robot, plan.gravity, "left", plan.signals)
     assert np.abs(torques).max() > 0.1
     np.testing.assert_allclose(torques, plan.signals.arrays["tau"], atol=AGREEMENT_NM)
@@ -96,7 +96,7 @@ def test_small_spheres_need_the_point_masses_pressure_and_the_engines_torques(x:
 
 
 def test_the_stairs_are_two_boxes_and_the_root_stays_in_the_plane(climb: Result) -> None:
-    root = Xml.fromstring(plan_model(plan_of(climb), Drive()))
+    root = Xml.fromstring(make_plan_model(make_plan(climb), Drive()))
     boxes = [geometry for geometry in root.findall("./worldbody/geom") if geometry.get("type") == "box"]
     tops = [float(box.get("pos").split()[2]) + float(box.get("size").split()[2]) for box in boxes]  # type: ignore[union-attr]
     rise = 0.508 / 2 * 0.70
@@ -107,7 +107,7 @@ def test_the_stairs_are_two_boxes_and_the_root_stays_in_the_plane(climb: Result)
 
 
 def test_feet_begin_on_their_treads_and_toes_are_part_of_them(climb: Result) -> None:
-    plan = plan_of(climb)
+    plan = make_plan(climb)
     start = {side: plan.at(f"{side}_foot", np.zeros(1))[0] for side in ("left", "right")}
     for foot in start.values():
         assert foot[2] == pytest.approx(float(plan.level(foot[:1])[0]), abs=1e-9)
@@ -118,7 +118,7 @@ def test_feet_begin_on_their_treads_and_toes_are_part_of_them(climb: Result) -> 
 
 
 def test_steps_that_repeat_lead_on_up_with_the_legs_exchanged(ideal: Result) -> None:
-    one, three = plan_of(ideal), plan_of(ideal, 3)
+    one, three = make_plan(ideal), make_plan(ideal, 3)
     n = len(one.signals.arrays["t"]) - 1
     left, right = (three.signals.arrays[f"{side}_foot"] for side in ("left", "right"))
     rise = ideal.problem.value("rise_run_ratio") * ideal.problem.value("stair_length_m") / 2
@@ -129,7 +129,7 @@ def test_steps_that_repeat_lead_on_up_with_the_legs_exchanged(ideal: Result) -> 
 
 def test_a_circle_turns_the_torso_by_the_same_angle_each_step() -> None:
     problem = nlp_gait.load("walk12").with_values(turn_rad=0.1)
-    plan = plan_of(result_of(problem, WALKS[0]), 3)
+    plan = make_plan(result_of(problem, WALKS[0]), 3)
     middles = plan.attitude(np.array([0.5, 1.5, 2.5]))
     np.testing.assert_allclose(2 * np.arctan2(middles[:, 3], middles[:, 0]), [0.0, 0.1, 0.2], atol=1e-12)
     np.testing.assert_allclose(plan.torso_axis(np.array([0.5, 2.5])), [[0, 0, 1], [0, 0, 1]], atol=1e-12)
@@ -137,7 +137,7 @@ def test_a_circle_turns_the_torso_by_the_same_angle_each_step() -> None:
 
 def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
     problem = nlp_gait.load("stairs-track")
-    plan = plan_of(result_of(problem, (60.0, 60.0, 1.4)))
+    plan = make_plan(result_of(problem, (60.0, 60.0, 1.4)))
     lean = 2 * np.arctan2(*plan.signals.arrays["attitude"][:3, [2, 0]].T)
     rate = np.diff(lean) / np.diff(plan.signals.arrays["t"][:3])
     assert plan.spin_at_start[1] == pytest.approx(1.5 * rate[0] - 0.5 * rate[1], rel=1e-3)
@@ -146,5 +146,5 @@ def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
 
 
 def test_a_step_that_does_not_end_as_it_began_is_not_repeated(climb: Result) -> None:
-    with pytest.raises(InputError, match="'stairs-plan' is no cycle that can be repeated"):
-        plan_of(climb, 2)
+    with pytest.raises(InputError, match="'stairs-plan' is not a cycle that can be repeated"):
+        make_plan(climb, 2)

@@ -22,9 +22,9 @@ pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is played in the engine
 
 from nlp_gait.simulation.drive import DRIVES, Drive  # noqa: E402
-from nlp_gait.simulation.plan import plan_of  # noqa: E402
-from nlp_gait.simulation.playback import play  # noqa: E402
-from nlp_gait.simulation.walking import measure_walk  # noqa: E402
+from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
+from nlp_gait.simulation.plan import make_plan  # noqa: E402
+from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
 
 # The least energy per metre, 19.149 J/m, to five digits; hip at lift-off, arms, hip at touch-down, arms, swing, times, step.
 CHEAPEST = (0.0019, 0.02108, 0.31, 0.09951, 0.09805, -0.01255, 0.0, 0.0)
@@ -88,8 +88,8 @@ def test_wrenches_carry_the_robot_in_mirrored_steps_too(signals: Signals) -> Non
 
 
 def test_ten_steps_are_walked_without_a_fall(cycle: Result) -> None:
-    plan = plan_of(cycle, STEPS)
-    trace = play(plan)
+    plan = make_plan(cycle, STEPS)
+    trace = simulate_plan(plan)
     found = measure_walk(plan, trace, Drive(), STEPS)
     assert trace.t[-1] == pytest.approx(plan.duration_s + 1.0, abs=0.002)
     assert not found.measurements.fallen and found.steps_done == STEPS
@@ -108,16 +108,16 @@ def test_at_any_speed_the_engine_needs_the_planned_energy(
     speed_m_s: float, x: tuple[float, ...], planned_J_per_m: float
 ) -> None:
     problem = nlp_gait.load("nao-cycle", objective="power").with_values(speed_m_s=speed_m_s)
-    plan = plan_of(Result(problem=problem, x=problem.check_x(x)), 4)
-    found = measure_walk(plan, play(plan), Drive(), 4)
+    plan = make_plan(Result(problem=problem, x=problem.check_x(x)), 4)
+    found = measure_walk(plan, simulate_plan(plan), Drive(), 4)
     assert found.model_J_per_m == pytest.approx(planned_J_per_m, rel=0.001)
     assert found.engine_J_per_planned_m == pytest.approx(found.model_J_per_m, rel=0.02)
     assert found.walked_m is not None and found.walked_m > 0.99 * found.planned_m
 
 
 def test_held_set_points_cost_energy_and_way(cycle: Result) -> None:
-    plan, drive = plan_of(cycle, STEPS), DRIVES["held"]
-    found = measure_walk(plan, play(plan, drive=drive), drive, STEPS)
+    plan, drive = make_plan(cycle, STEPS), DRIVES["held"]
+    found = measure_walk(plan, simulate_plan(plan, drive=drive), drive, STEPS)
     assert found.walked_m is not None and found.engine_J_per_planned_m is not None
     assert 0.8 * found.planned_m < found.walked_m < 0.95 * found.planned_m
     assert found.engine_J_per_planned_m > 2.0 * found.model_J_per_m
@@ -125,7 +125,7 @@ def test_held_set_points_cost_energy_and_way(cycle: Result) -> None:
 
 
 def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
-    plan = plan_of(cycle, 2)
+    plan = make_plan(cycle, 2)
     times = np.array([0.2, 0.6, 0.9, 0.97 + 0.2, 0.97 + 0.6])  # swing, both, both, swing, both
     assert plan.supports == ()
     assert plan.stands("left", times).tolist() == [1, 1, 1, 0, 1]
@@ -135,8 +135,8 @@ def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
 def test_a_fall_leaves_no_distance(cycle: Result) -> None:
     swaying = Result(problem=cycle.problem, x=cycle.x.copy())
     swaying.x[cycle.problem.variable_index("hip_vy_lift_off_m_s")] = 1.5  # over the edge of the foot
-    plan = plan_of(swaying, 2)
-    found = measure_walk(plan, play(plan), Drive(), 2)
+    plan = make_plan(swaying, 2)
+    found = measure_walk(plan, simulate_plan(plan), Drive(), 2)
     assert found.measurements.fallen and found.steps_done <= 2
     assert (found.walked_m, found.drift_m, found.heading_deg, found.engine_J_per_m) == (None, None, None, None)
 
@@ -163,6 +163,6 @@ def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int)
 def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(
         InputError,
-        match="problem 'nao-ssp' is no cycle that can be repeated; leave out the number of steps",
+        match="problem 'nao-ssp' is not a cycle that can be repeated; leave out the number of steps",
     ):
-        plan_of(gait("ssp optimum"), 2)
+        make_plan(gait("ssp optimum"), 2)

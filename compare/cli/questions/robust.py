@@ -40,9 +40,9 @@ def robust(
     from compare.study.store import Store
 
     if simulate:
-        from nlp_gait.simulation.engine import mujoco
+        from nlp_gait.simulation.engine import load_mujoco
 
-        mujoco()
+        load_mujoco()
     spec = problem.spec()
     uncertain = boxes(spec, mass / 100.0, sole / 1000.0)
     store = Store(output.out, say)

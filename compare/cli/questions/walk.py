@@ -62,12 +62,12 @@ def walk(
     from compare.questions.walk.study import CYCLES, default_speeds, optimal_gaits, played
     from compare.study.engine import STEPS
     from compare.study.store import Store
-    from nlp_gait.simulation.engine import mujoco
+    from nlp_gait.simulation.engine import load_mujoco
 
     drive = servos.make()
     steps = (STEPS if engine else 0) if steps is None else steps
     if steps:
-        mujoco()  # if it is missing, say so before the work
+        load_mujoco()  # if it is missing, say so before the work
     if problem.name not in CYCLES:
         raise InputError(f"walk takes a walking cycle, {' or '.join(CYCLES)}; got {problem.name!r}")
     spec = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name)

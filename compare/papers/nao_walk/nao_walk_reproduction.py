@@ -20,8 +20,8 @@ from nlp_gait.files import writable_folder
 from nlp_gait.gaits.biped.cart_table import walker
 from nlp_gait.gaits.nao.cycle import cart_table
 from nlp_gait.progress import Progress
-from nlp_gait.simulation import playback
-from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation import simulate
+from nlp_gait.simulation.engine import load_mujoco
 
 FULL = Effort()
 STEPS = FULL.steps
@@ -40,10 +40,10 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
         InputError: no optimal gait was found at the default speed.
         OutputError: the folder cannot be written to.
     """
-    mujoco()  # if it is missing, say so before the work
+    load_mujoco()  # if it is missing, say so before the work
     folder = writable_folder(out)
     compute = partial(
-        Store(folder).compute_all, code=[claim_runs, published, walker, cart_table, playback], progress=progress
+        Store(folder).compute_all, code=[claim_runs, published, walker, cart_table, simulate], progress=progress
     )
     first = compute(gaits_first(effort))
     speeds = {heat: first[f"speeds-{heat.split()[-1]}"] for heat in SPECS}

@@ -24,11 +24,10 @@ from nlp_gait.gaits.biped.cart_table.walker import Footsteps, cart_table_walk
 from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
 from nlp_gait.gaits.nao.motors import SHARED
 from nlp_gait.robots import Robot
-from nlp_gait.simulation.conditions import Conditions, Push
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import Plan, plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import planned_m, walked_m
+from nlp_gait.simulation.measurements import planned_distance, walked_distance
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
 PAPER_HEAT, SHEET_HEAT = "K of the paper", "K of the data sheet"
 SPECS = {
@@ -126,7 +125,7 @@ def at_heights(heights: Sequence[float]) -> list[dict[str, float]]:
             walk = own_walk(documented(torso_m=height))
         except InputError:
             continue
-        plan = plan_of(walk)
+        plan = make_plan(walk)
         found.append({"torso_m": height, **_model(plan), "knee_deg": knee_deg(walk)})
     return found
 
@@ -161,11 +160,11 @@ def by_joint(drive: Drive, x: Mapping[str, float], heat: str, steps: int) -> dic
         result = Result(problem=problem, x=problem.check_x(x))
     else:
         result = own_walk(documented())
-    plan = plan_of(result, steps)
-    trace = play(plan, drive=drive)
+    plan = make_plan(result, steps)
+    trace = simulate_plan(plan, drive=drive)
     during = trace.t <= plan.duration_s
     arrays = plan.signals.arrays
-    planned, (walked, _) = planned_m(plan), walked_m(trace)
+    planned, (walked, _) = planned_distance(plan), walked_distance(trace)
     return {
         "fell_at_s": trace.fell_at_s,
         "planned_m": planned,
@@ -179,23 +178,23 @@ def by_joint(drive: Drive, x: Mapping[str, float], heat: str, steps: int) -> dic
 
 def on_servos(drive: Drive, steps: int, lengths: Sequence[float], disturbed: bool) -> dict[str, Any]:
     """The robot's own walk on some servos: energy and way, how often disturbances fell it, the fastest that stays up."""
-    plan = plan_of(own_walk(documented()), steps)
-    trace = play(plan, drive=drive)
+    plan = make_plan(own_walk(documented()), steps)
+    trace = simulate_plan(plan, drive=drive)
     during = trace.t <= plan.duration_s
-    walked, _ = walked_m(trace)
+    walked, _ = walked_distance(trace)
     fell = trace.fell_at_s is not None
     energy = _kinds(plan, trace.torque[during], trace.qd[during], trace.t[during], walked).values()
     worlds = _worlds() if disturbed else []
-    falls = sum(play(plan, world, drive).fell_at_s is not None for world in worlds)
+    falls = sum(simulate_plan(plan, world, drive).fell_at_s is not None for world in worlds)
     fastest = 0.0
     for length in lengths:
-        longer = plan_of(own_walk(documented(step_m=length)), steps)
-        tried = play(longer, drive=drive)
+        longer = make_plan(own_walk(documented(step_m=length)), steps)
+        tried = simulate_plan(longer, drive=drive)
         if tried.fell_at_s is None:
-            fastest = max(fastest, walked_m(tried)[0] / longer.duration_s)
+            fastest = max(fastest, walked_distance(tried)[0] / longer.duration_s)
     return {
         "fell": fell,
-        "walked_share": None if fell else walked / planned_m(plan),
+        "walked_share": None if fell else walked / planned_distance(plan),
         "speed_m_s": None if fell else walked / plan.duration_s,
         "sheet_J_per_m": None if fell else total(energy, "sheet"),
         "paper_J_per_m": None if fell else total(energy, "paper"),
@@ -245,7 +244,7 @@ def _kinds(plan: Plan, torque: Array, rate: Array, t: Array, way_m: float) -> di
 def _model(plan: Plan) -> dict[str, float]:
     """Energy for each metre by the model, with the heat constant of the paper and with those of the data sheet [J/m]."""
     arrays = plan.signals.arrays
-    kinds = _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_m(plan)).values()
+    kinds = _kinds(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_distance(plan)).values()
     return {f"{heat}_J_per_m": total(kinds, heat) for heat in ("paper", "sheet")}
 
 

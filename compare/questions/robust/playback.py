@@ -19,9 +19,9 @@ from nlp_gait.files import without_nan
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import averaged_pressure
-from nlp_gait.simulation.plan import SIDES, Plan, plan_of
-from nlp_gait.simulation.playback import play
+from nlp_gait.simulation.measurements import average_pressure
+from nlp_gait.simulation.plan import SIDES, Plan, make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,15 +68,15 @@ def played(
 def _play(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> dict[str, Any]:
     """What was measured, as plain data."""
     point = problem.check_x(x)
-    plan, drive = plan_of(Result(problem=problem, x=point)), Drive()
-    trace = play(plan, drive=drive)
+    plan, drive = make_plan(Result(problem=problem, x=point)), Drive()
+    trace = simulate_plan(plan, drive=drive)
     during = trace.t <= plan.duration_s
     run = Played(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,
         largest_tilt_deg=math.degrees(float(trace.tilt.max())),
-        margin_m=lateral_margin(plan, averaged_pressure(trace, drive.period_s)[during, 1]),
+        margin_m=lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
         predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
     )
     return dict(without_nan(asdict(run)))

@@ -26,7 +26,7 @@ from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.robots.biped import make_biped
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.walking import Walk
+from nlp_gait.simulation.measurements import Walk
 
 CART_TABLE, LEAST_TORQUE, LEAST_POWER = "cart-table", "least-torque", "least-power"
 PLANNERS = (CART_TABLE, LEAST_TORQUE)

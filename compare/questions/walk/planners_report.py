@@ -15,7 +15,7 @@ from compare.questions.walk.planners import CART_TABLE, LEAST_POWER, LEAST_TORQU
 from compare.questions.walk.study import Gait
 from compare.report.document import Figure, Part
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.simulation.walking import Walk
+from nlp_gait.simulation.measurements import Walk
 
 COLOURS = {CART_TABLE: "#D55E00", LEAST_TORQUE: "#009E73", LEAST_POWER: "#000000"}
 # By how much the battery's energy fell from the cart-table to the least squared torques, at 0.5 to 1.3 m/min [%].

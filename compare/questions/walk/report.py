@@ -21,8 +21,7 @@ from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
 from nlp_gait.formulation import GaitProblem, Result, finely_sampled
 from nlp_gait.gaits.several_steps import walk
-from nlp_gait.simulation.measurements import Measurements
-from nlp_gait.simulation.walking import Walk
+from nlp_gait.simulation.measurements import Measurements, Walk
 
 MODEL, ENGINE = "#000000", "#56B4E9"
 LEFT, RIGHT, HIP = "#0072B2", "#D55E00", "#000000"

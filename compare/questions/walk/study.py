@@ -19,9 +19,9 @@ from nlp_gait.gaits.humanoid.cycle import SPEED_M_S
 from nlp_gait.interrupts import Interrupted
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import plan_of
-from nlp_gait.simulation.playback import play
-from nlp_gait.simulation.walking import Walk, measure_walk
+from nlp_gait.simulation.measurements import Walk, measure_walk
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 CYCLE = "nao-cycle"
 CYCLES = (CYCLE, "humanoid-cycle")
@@ -120,8 +120,8 @@ def walked(gait: Result, steps: int, drive: Drive, store: Store) -> Walk:
     inputs = {**fingerprint(gait.problem), "x": gait.x.tolist(), "steps": steps, "drive": repr(drive)}
 
     def measured() -> dict[str, Any]:
-        plan = plan_of(gait, steps)
-        return dict(without_nan(asdict(measure_walk(plan, play(plan, drive=drive), drive, steps))))
+        plan = make_plan(gait, steps)
+        return dict(without_nan(asdict(measure_walk(plan, simulate_plan(plan, drive=drive), drive, steps))))
 
     return decoded(Walk, store.compute("walk-{key}", inputs, measured))
 

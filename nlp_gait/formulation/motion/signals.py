@@ -35,6 +35,23 @@ def in_space(unit: str, axes: str = "xyz") -> Columns:
     return Columns(unit=unit, labels=tuple(axes))
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointAngles:
+    """Angles of some joints over time.
+
+    Attributes:
+        owner: the file, for messages.
+        joints: names of the columns.
+        t: (T,) ascending [s].
+        q: (T, J) [rad].
+    """
+
+    owner: str
+    joints: tuple[str, ...]
+    t: Array
+    q: Array
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Signals:
     """Time histories of one gait.

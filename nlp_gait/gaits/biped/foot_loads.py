@@ -24,7 +24,7 @@ from nlp_gait.gaits.biped.parts import Contribution, Part, rows
 from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import above, below, sole_limits, zmp_of_wrench
+from nlp_gait.symbolic.balance import SOLE_FRICTION, above, below, sole_limits, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -37,8 +37,6 @@ RAMP_SHARE = 0.05
 RAMPS = 2
 # Coefficients start near a load that passes evenly from foot to foot, off it by at most this share of their bounds.
 START_SHARE = 0.02
-# Static friction that is commonly asked of a walkway (UL 410); rubber on a dry floor has more.
-FRICTION_COEFFICIENT = 0.5
 CORNERS = ("+x", "-x", "+y", "-y")
 TURNS = tuple(f"{sense}{first}{second}" for sense in "+-" for first in "+-" for second in "+-")
 
@@ -163,7 +161,7 @@ class FootLimits(Part):
 
     reads_wrenches = True
     parameters = table(
-        ("friction_coefficient", "1", FRICTION_COEFFICIENT, "of both soles on the ground", 0.0, math.inf),
+        ("friction_coefficient", "1", SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
         ("load_rate_limit_1_s", "1/s", 12.5, "fastest change of a foot's load, in weights a second", 0.0, math.inf),
         (
             "switch_load_limit",

@@ -11,9 +11,9 @@ from PIL import Image
 
 from nlp_gait.errors import InputError
 from nlp_gait.interrupts import delay_interrupts
-from nlp_gait.simulation.film.caption import PAPER, Captions, Strip, pasted
 from nlp_gait.simulation.film.recording import Recording
-from nlp_gait.simulation.film.stage import Stage, View, stairs
+from nlp_gait.simulation.film.scene import Stage, View, stairs
+from nlp_gait.simulation.film.strip import PAPER, Captions, Strip, pasted
 from nlp_gait.simulation.film.video import Frame
 
 SMALLEST, LARGEST = (320, 240), (3840, 2160)
@@ -23,7 +23,7 @@ LEAST_POWER = 0.1  # [W] at the top of its curve
 GAP = 4  # between two gaits [pixels]
 
 
-def picture_size(text: str) -> tuple[int, int]:
+def parse_picture_size(text: str) -> tuple[int, int]:
     """Width and height from a text like 1280x720 [pixels].
 
     Raises:
@@ -37,7 +37,7 @@ def picture_size(text: str) -> tuple[int, int]:
     return size
 
 
-def pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str = "") -> Iterator[Frame]:
+def draw_pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str = "") -> Iterator[Frame]:
     """Pictures (height, width, 3) of all recordings beside each other; one that ends before the others stays as it ended.
 
     Args:

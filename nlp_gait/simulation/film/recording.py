@@ -9,10 +9,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.measurements import averaged_pressure
+from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.playback import Observer, Trace
+from nlp_gait.simulation.simulate import OnStep, Simulation
 
 # Averaged over [s]: what is shown would else flicker with every set-point.
 POWER_WINDOW, PRESSURE_WINDOW, SPEED_WINDOW, PATH_WINDOW = 0.1, 0.02, 0.4, 2.0
@@ -24,8 +24,8 @@ HELD = 1.0  # [s] of the simulation for which a film stands still on a fall
 class Player(Protocol):
     """Something that plays one gait."""
 
-    def __call__(self, *, observe: Observer | None = None) -> Trace:
-        """Play it, and let the observer see every step."""
+    def __call__(self, *, on_step: OnStep | None = None) -> Simulation:
+        """Play it, and let the on_stepr see every step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +49,7 @@ class Recording:
 
     title: str
     model: Any
-    trace: Trace
+    trace: Simulation
     t: Array
     states: Array
     power: Array
@@ -61,7 +61,7 @@ class Recording:
     load: Array
 
 
-def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recording:
+def record_film(title: str, plan: Plan, player: Player, interval_s: float) -> Recording:
     """Play a gait and keep what a film needs.
 
     Args:
@@ -83,7 +83,7 @@ def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recor
             indexes.append(count)
         count += 1
 
-    trace = player(observe=keep)
+    trace = player(on_step=keep)
     if trace.fell_at_s is not None:
         held = max(1, round(HELD / interval_s))
         indexes += [len(trace.t) - 1] * held
@@ -102,7 +102,7 @@ def recorded(title: str, plan: Plan, player: Player, interval_s: float) -> Recor
         speed=(torso[ahead, 0] - torso[behind, 0]) / np.maximum((ahead - behind) * TIME_STEP, TIME_STEP),
         path=_smooth(torso, PATH_WINDOW)[at],
         stand=_smooth(trace.feet.mean(axis=1)[:, :2], PATH_WINDOW)[at],
-        pressure=averaged_pressure(trace, PRESSURE_WINDOW)[at],
+        pressure=average_pressure(trace, PRESSURE_WINDOW)[at],
         planned=plan.at("zmp", trace.t[at]),
         load=_smooth(trace.loads.sum(axis=1), PRESSURE_WINDOW)[at],
     )

@@ -7,20 +7,20 @@ import warnings
 from typing import Any
 
 from nlp_gait.errors import OutputError
-from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.film.recording import Player
-from nlp_gait.simulation.playback import Trace
+from nlp_gait.simulation.simulate import Simulation
 
 AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.6, (0.06, 0.0, 0.24)  # it follows the torso
 
 
-def shown(player: Player) -> Trace:
+def show_in_window(player: Player) -> Simulation:
     """Play a gait at its own pace in MuJoCo's window.
 
     Raises:
         OutputError: there is no display.
     """
-    mujoco()
+    load_mujoco()
     _require_display()
     from mujoco import viewer
 
@@ -39,7 +39,7 @@ def shown(player: Player) -> Trace:
             time.sleep(max(0.0, data.time - (time.monotonic() - began)))
 
     try:
-        return player(observe=follow)
+        return player(on_step=follow)
     finally:
         if window is not None:
             window.close()

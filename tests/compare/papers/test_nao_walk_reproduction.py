@@ -17,8 +17,8 @@ from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT,
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, documented
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import predicted
-from nlp_gait.simulation.plan import plan_of
+from nlp_gait.simulation.measurements import predict_power
+from nlp_gait.simulation.plan import make_plan
 
 SMALL = Effort(speeds_m_s=(0.08, SPEED_M_S), torsos_m=(0.315, 0.32), heats=(0.025, 0.5), stiffnesses=(1.0, 0.5))
 
@@ -90,8 +90,8 @@ def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_j
     assert indexes["speed_m_s"] == pytest.approx(SPEED_M_S, rel=1e-12)
     found = by_joint(Drive(), {}, "", 2)
     assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(found["planned_m"], rel=0.02)
-    plan = plan_of(walk, 2)
-    whole = predicted(plan).total_W * plan.duration_s / found["planned_m"]
+    plan = make_plan(walk, 2)
+    whole = predict_power(plan).total_W * plan.duration_s / found["planned_m"]
     assert total(found["model"].values(), "paper") == pytest.approx(whole, rel=1e-12)
     assert total(found["engine"].values(), "paper") == pytest.approx(whole, rel=0.05)
     # Heat by the data sheet is 14 to 33 times that of the paper in the legs; each hip yaw-pitch motor turns two joints.

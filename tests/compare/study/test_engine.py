@@ -81,7 +81,7 @@ def test_a_later_report_shows_it_without_the_engine(
 def test_what_is_kept_is_not_played_again(
     report: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "play", refuse)
+    monkeypatch.setattr(engine, "simulate_plan", refuse)
     gaits = report["gaits"]
     assert isinstance(gaits, list)
     assert [p.engine for p in play_records(folder, [dsp("pso", 3.0)], Drive())] == [gaits[0]["engine"]]

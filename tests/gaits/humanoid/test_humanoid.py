@@ -149,12 +149,12 @@ def test_the_step_is_played_upright_and_exported(problem: GaitProblem, solution:
     from nlp_gait.export.formats import write_as
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.plan import plan_of
-    from nlp_gait.simulation.playback import play
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.simulate import simulate_plan
 
     result = Result(problem=problem, x=np.array(list(solution.x.values())))
-    plan = plan_of(result)
-    found = measure(plan, play(plan), Drive())
+    plan = make_plan(result)
+    found = measure(plan, simulate_plan(plan), Drive())
     assert not found.fallen and found.largest_tilt_deg < 5.0
     assert found.measured.total_W == pytest.approx(found.predicted.total_W, rel=0.1)
     for name, ending in (("csv", "csv"), ("json", "json"), ("mjcf", "xml"), ("webots", "motion")):

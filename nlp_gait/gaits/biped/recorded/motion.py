@@ -25,23 +25,6 @@ FINE = 400  # instants at which a whole motion is looked at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class JointAngles:
-    """Angles of some joints over time.
-
-    Attributes:
-        owner: the file, for messages.
-        joints: names of the columns.
-        t: (T,) ascending [s].
-        q: (T, J) [rad].
-    """
-
-    owner: str
-    joints: tuple[str, ...]
-    t: Array
-    q: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
     """A motion of all joints of the gait on the left foot.
 

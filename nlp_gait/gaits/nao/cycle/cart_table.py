@@ -5,9 +5,9 @@ from __future__ import annotations
 from casadi import SX
 
 from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.formulation.motion.signals import JointAngles
 from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps
 from nlp_gait.gaits.biped.recorded.cycle import Cycles
-from nlp_gait.gaits.biped.recorded.motion import JointAngles
 from nlp_gait.gaits.nao.body import GRAVITY, JOINTS, nao, upright_plan
 from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.gaits.nao.problem import with_robot

@@ -6,7 +6,8 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.biped.recorded.motion import FINE, LEAST_ROWS, LIFTED, JointAngles, Motion
+from nlp_gait.formulation.motion.signals import JointAngles
+from nlp_gait.gaits.biped.recorded.motion import FINE, LEAST_ROWS, LIFTED, Motion
 from nlp_gait.gaits.biped.recorded.stance import Stance
 from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, JOINTS
 from nlp_gait.gaits.nao.legs import leg_geometry

@@ -11,12 +11,13 @@ from casadi import MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Display, GaitProblem, Grid, Point, load
+from nlp_gait.formulation.motion.signals import JointAngles
 from nlp_gait.gaits.biped.double_support import double_support_margins, double_support_mean_margins, support_box
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.parts import Part
 from nlp_gait.gaits.biped.recorded.cycle import Half, Judge, on_grids
 from nlp_gait.gaits.biped.recorded.limits import HipLimits, StandingLimits, SwingLimits, mean_place
-from nlp_gait.gaits.biped.recorded.motion import JointAngles, Motion, RecordedGait
+from nlp_gait.gaits.biped.recorded.motion import Motion, RecordedGait
 from nlp_gait.gaits.biped.recorded.phase import RecordedPhase
 from nlp_gait.gaits.biped.single_support import single_support_mean_margins
 from nlp_gait.gaits.nao.body import JOINTS, PLANNED_JOINTS, nao

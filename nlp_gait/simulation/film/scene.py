@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import OutputError
-from nlp_gait.simulation.engine import mujoco
+from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.film.recording import Recording
 from nlp_gait.simulation.film.video import Frame
 
@@ -53,7 +53,7 @@ class View:
 
 def stairs(model: Any) -> Any:
     """Which geometries of the engine's model are boxes that stand on the floor."""
-    return (model.geom_bodyid == 0) & (model.geom_type == mujoco().mjtGeom.mjGEOM_BOX)
+    return (model.geom_bodyid == 0) & (model.geom_type == load_mujoco().mjtGeom.mjGEOM_BOX)
 
 
 class Stage:
@@ -65,7 +65,7 @@ class Stage:
         Raises:
             OutputError: this machine has no way to draw off the screen.
         """
-        self._engine = engine = mujoco(pictures=True)
+        self._engine = engine = load_mujoco(pictures=True)
         self._recording, self._views, self._size = recording, views, (width, height)
         model = recording.model
         self._data = engine.MjData(model)

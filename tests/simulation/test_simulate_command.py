@@ -18,8 +18,8 @@ pytestmark = pytest.mark.slow  # each gait is played in the engine
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import Measurements, measure  # noqa: E402
-from nlp_gait.simulation.plan import Plan, plan_of  # noqa: E402
-from nlp_gait.simulation.playback import Trace, play  # noqa: E402
+from nlp_gait.simulation.plan import Plan, make_plan  # noqa: E402
+from nlp_gait.simulation.simulate import Simulation, simulate_plan  # noqa: E402
 
 # Optimum of stairs-plan for case 2, to four digits, and one of stairs-track.
 CLIMB = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
@@ -29,9 +29,11 @@ WALK = (0.130, 0.109, 0.014, 0.020)  # Goswami et al. (2008), Table III, lambda 
 SLOW_WALK = (0.126, 0.12, 0.014, 0.0215)  # Table IV, 2 s
 
 
-def played(problem: GaitProblem, x: tuple[float, ...], steps: int | None = None) -> tuple[Plan, Trace, Measurements]:
-    plan = plan_of(Result(problem=problem, x=problem.check_x(x)), steps)
-    trace = play(plan)
+def played(
+    problem: GaitProblem, x: tuple[float, ...], steps: int | None = None
+) -> tuple[Plan, Simulation, Measurements]:
+    plan = make_plan(Result(problem=problem, x=problem.check_x(x)), steps)
+    trace = simulate_plan(plan)
     return plan, trace, measure(plan, trace, Drive())
 
 
@@ -84,4 +86,4 @@ def test_the_command_plays_them_and_says_what_is_not_repeated(tmp_path: Path) ->
     assert json.loads(done.stdout)["fallen"] is False
     assert 'name="tread 1"' in (tmp_path / "out" / "model.xml").read_text()
     refused = CliRunner().invoke(app, ["simulate", str(result), "--steps", "2"])
-    assert refused.exit_code != 0 and "no cycle that can be repeated" in refused.output + refused.stderr
+    assert refused.exit_code != 0 and "not a cycle that can be repeated" in refused.output + refused.stderr

@@ -10,12 +10,15 @@ import pytest
 pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is played in the engine
 
-from nlp_gait.simulation.conditions import Conditions, Push  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
-from nlp_gait.simulation.plan import plan_of  # noqa: E402
-from nlp_gait.simulation.playback import play  # noqa: E402
-from nlp_gait.simulation.robustness import DIRECTIONS, robustness  # noqa: E402
+from nlp_gait.simulation.plan import make_plan  # noqa: E402
+from nlp_gait.simulation.robustness import DIRECTIONS, measure_robustness  # noqa: E402
+from nlp_gait.simulation.simulate import (  # noqa: E402
+    Conditions,
+    Push,
+    simulate_plan,  # noqa: E402
+)
 
 ONE_NEWTON_S = 1.0
 
@@ -27,8 +30,8 @@ def played(gait):
 
     def get(name):
         if name not in found:
-            plan = plan_of(gait(name))
-            trace = play(plan)
+            plan = make_plan(gait(name))
+            trace = simulate_plan(plan)
             found[name] = (plan, trace, measure(plan, trace, Drive()))
         return found[name]
 
@@ -79,10 +82,10 @@ def test_the_floor_carries_the_robot(played):
 
 
 def test_an_infeasible_gait_falls_and_is_reported(gait):
-    plan = plan_of(gait("ssp falling"))
+    plan = make_plan(gait("ssp falling"))
     sole_edge = 0.05 + plan.robot.feet["left"].left_m
     assert plan.signals.arrays["zmp"][:, 1].max() > sole_edge
-    trace = play(plan)
+    trace = simulate_plan(plan)
     m = measure(plan, trace, Drive())
     assert m.fallen and 0.5 < m.fell_at_s < 5.0
     assert m.largest_tilt_deg > 45.0
@@ -91,7 +94,7 @@ def test_an_infeasible_gait_falls_and_is_reported(gait):
 
 def test_twice_the_same_numbers(played):
     plan, first, m = played("dsp optimum")
-    second = play(plan)
+    second = simulate_plan(plan)
     for field in dataclasses.fields(first):
         np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name), err_msg=field.name)
     assert measure(plan, second, Drive()) == m
@@ -99,18 +102,18 @@ def test_twice_the_same_numbers(played):
 
 def test_a_push_moves_and_a_strong_one_fells(played):
     plan, _, m = played("dsp optimum")
-    pushed = play(plan, Conditions(push=Push(impulse_Ns=(ONE_NEWTON_S, 0.0))))
+    pushed = simulate_plan(plan, Conditions(push=Push(impulse_Ns=(ONE_NEWTON_S, 0.0))))
     assert pushed.fell_at_s is None
     assert math.degrees(pushed.tilt.max()) > m.largest_tilt_deg + 0.5
-    assert play(plan, Conditions(push=Push(impulse_Ns=(0.0, 10 * ONE_NEWTON_S)))).fell_at_s is not None
+    assert simulate_plan(plan, Conditions(push=Push(impulse_Ns=(0.0, 10 * ONE_NEWTON_S)))).fell_at_s is not None
 
 
 def test_slope_friction_and_mass_change_the_world(played):
     plan, flat, _ = played("dsp optimum")
-    assert play(plan, Conditions(slope_rad=(math.radians(35.0), 0.0))).fell_at_s is not None
-    slippery = play(plan, Conditions(friction=0.02, slope_rad=(math.radians(4.0), 0.0)))
+    assert simulate_plan(plan, Conditions(slope_rad=(math.radians(35.0), 0.0))).fell_at_s is not None
+    slippery = simulate_plan(plan, Conditions(friction=0.02, slope_rad=(math.radians(4.0), 0.0)))
     assert slippery.feet[-1, 0, 0] < flat.feet[-1, 0, 0] - 0.05  # slides down, that is backward
-    heavy = play(plan, Conditions(mass_factor=1.1))
+    heavy = simulate_plan(plan, Conditions(mass_factor=1.1))
     weight = plan.robot.mass_kg * plan.gravity
     assert heavy.loads[-200:].sum(axis=1).mean() == pytest.approx(1.1 * weight, rel=0.01)
 
@@ -118,7 +121,7 @@ def test_slope_friction_and_mass_change_the_world(played):
 def test_torque_limits_are_named_and_hold(played):
     plan = played("ssp optimum")[0]
     drive = Drive(torque_limits="continuous")
-    trace = play(plan, drive=drive)
+    trace = simulate_plan(plan, drive=drive)
     m = measure(plan, trace, drive)
     limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
     assert (np.abs(trace.torque) <= limits + 1e-9).all()
@@ -127,7 +130,7 @@ def test_torque_limits_are_named_and_hold(played):
 
 def test_polygon_soles_carry_too(played):
     plan = played("dsp optimum")[0]
-    assert play(plan, sole="polygon").fell_at_s is None
+    assert simulate_plan(plan, sole="polygon").fell_at_s is None
 
 
 def test_robustness_finds_the_first_fall(played, monkeypatch):
@@ -143,8 +146,8 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
         fell = push[0] > 0.31 or push[1] < -0.12 or conditions.friction < 0.45 or conditions.mass_factor > 1.0
         return FakeTrace(fell or conditions.slope_rad[0] > math.radians(2.2))
 
-    monkeypatch.setattr(module, "play", fake)
-    found = robustness(played("dsp optimum")[0])
+    monkeypatch.setattr(module, "simulate_plan", fake)
+    found = measure_robustness(played("dsp optimum")[0])
     assert found.undisturbed
     assert found.push_Ns == {"forward": 0.3, "backward": module.LARGEST_PUSH, "left": module.LARGEST_PUSH, "right": 0.1}
     assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
@@ -155,16 +158,16 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
 def test_without_a_display_the_viewer_is_refused_in_one_sentence(played, monkeypatch):
     glfw = pytest.importorskip("glfw")
     from nlp_gait.errors import OutputError
-    from nlp_gait.simulation.film.viewer import shown
+    from nlp_gait.simulation.film.viewer import show_in_window
 
     monkeypatch.setattr(glfw, "init", lambda: False)
     with pytest.raises(OutputError, match="no display; use --video"):
-        shown(partial(play, played("dsp optimum")[0]))
+        show_in_window(partial(simulate_plan, played("dsp optimum")[0]))
 
 
 def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(played):
     plan = played("dsp optimum")[0]
     drive = Drive(full_error_rad=1e-9, torque_limits="stall")  # stiffer than any time step can follow
-    trace = play(plan, Conditions(mass_factor=1e-6), drive)
+    trace = simulate_plan(plan, Conditions(mass_factor=1e-6), drive)
     assert trace.fell_at_s is not None
     assert np.isfinite(trace.q).all() and np.isfinite(trace.torque).all()

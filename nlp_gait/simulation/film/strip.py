@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from nlp_gait.simulation.film.recording import Recording
-from nlp_gait.simulation.film.stage import View
+from nlp_gait.simulation.film.scene import View
 from nlp_gait.simulation.film.video import Frame
 
 INK, FAINT, ALARM, PAPER = (32, 32, 32), (110, 110, 110), (190, 30, 30), (255, 255, 255)

@@ -1,4 +1,4 @@
-"""A planned gait played back: what the servos are told is known before it begins, unless the drive has a feedback."""
+"""Simulation of a planned gait: set-points are computed before it begins, except for corrections by a feedback."""
 
 from __future__ import annotations
 
@@ -9,19 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, in_space
-from nlp_gait.simulation.conditions import Conditions
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import mujoco
-from nlp_gait.simulation.looks import FLOOR
-from nlp_gait.simulation.mjcf import TIME_STEP, plan_model
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.root import place_root
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
 FALLEN_HEIGHT = (
-    0.6  # of the torso's planned height at the start; it has fallen where it sinks by the rest below its plan
+    0.6  # of the torso's planned height at the start; a robot has fallen if it sinks by the rest below its plan
 )
 COLUMNS = {
     "torso": in_space("m"),
@@ -34,22 +32,74 @@ COLUMNS = {
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
 # Called with the engine's model and data before every step.
-Observer = Callable[[Any, Any], None]
+OnStep = Callable[[Any, Any], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Push:
+    """Impulse on the torso's centre of mass in the middle of the phase.
+
+    Attributes:
+        impulse_Ns: (x, y) [N s].
+        duration_s: of the constant force.
+    """
+
+    impulse_Ns: tuple[float, float]
+    duration_s: float = 0.05
+
+    def force(self, since_s: float) -> tuple[float, float]:
+        """Return the force (x, y) at a time since its begin [N]."""
+        if not 0.0 <= since_s < self.duration_s:
+            return (0.0, 0.0)
+        return (self.impulse_Ns[0] / self.duration_s, self.impulse_Ns[1] / self.duration_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """Differences of the simulated world and robot from the plan's.
+
+    Attributes:
+        friction: coefficient of sliding friction.
+        mass_factor: on masses and inertias of all links; the gait was planned for 1.
+        stiffness_factor: on the stiffness of the joints' drives; their damping stays.
+        slope_rad: (x, y) slope of the floor: positive rises forward or to the left.
+        push: none by default.
+    """
+
+    friction: float = FRICTION
+    mass_factor: float = 1.0
+    stiffness_factor: float = 1.0
+    slope_rad: tuple[float, float] = (0.0, 0.0)
+    push: Push | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "mass_factor", "stiffness_factor"):
+            value = getattr(self, name)
+            if not (value > 0.0 and math.isfinite(value)):
+                raise InputError(f"{name} must be > 0, got {value!r}")
+        if not all(abs(slope) < math.pi / 4 for slope in self.slope_rad):
+            raise InputError(f"slope_rad must be within +-pi/4, got {self.slope_rad}")
+
+    def gravity(self, magnitude: float) -> tuple[float, float, float]:
+        """Return gravity in the axes of the sloping floor [m/s^2]."""
+        x, y = (math.tan(slope) for slope in self.slope_rad)
+        scale = magnitude / math.sqrt(1.0 + x * x + y * y)
+        return (-x * scale, -y * scale, -scale)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Trace:
-    """What was measured at every step; the first axis is time, axes are those of the floor.
+class Simulation:
+    """Measurements at every step of the engine; the first axis is time, axes are those of the floor.
 
     Attributes:
         t: (T,) [s].
         q: (T, J) joint angles, columns as in the plan [rad].
         qd: (T, J) [rad/s].
-        torque: (T, J) of the servos [Nm].
-        set_points: (T, J) that the servos were told, shifted by what is fed forward [rad].
+        torque: (T, J) of the drives [Nm].
+        set_points: (T, J) of the drives, including what is fed forward [rad].
         torso: (T, 3) its origin [m].
         tilt: (T,) angle between the torso's axis and its planned direction [rad].
-        heading: (T,) angle of the torso's forward axis about that normal, positive to the left [rad].
+        heading: (T,) angle of the torso's forward axis about the floor's normal, positive to the left [rad].
         feet: (T, 2, 3) soles under the ankles, left and right [m].
         loads: (T, 2) force of the floor on the left and right foot, along its normal [N].
         pressure: (T, 2) centre of pressure of both feet [m]; NaN in flight.
@@ -70,30 +120,30 @@ class Trace:
     fell_at_s: float | None
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
-        """The time histories, for an archive."""
+        """Return the time histories, for an archive."""
         arrays = {name: getattr(self, name) for name in ("t", "q", "qd", "torque", "set_points", *COLUMNS)}
         driven = {"torque": Columns(unit="Nm", labels=joints), "set_points": Columns(unit="rad", labels=joints)}
         return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
 
-def play(
+def simulate_plan(
     plan: Plan,
     conditions: Conditions | None = None,
     drive: Drive | None = None,
     sole: str = "rectangle",
     *,
-    observe: Observer | None = None,
-) -> Trace:
-    """Play a gait from its planned state at time zero until it has settled or the robot has fallen.
+    on_step: OnStep | None = None,
+) -> Simulation:
+    """Simulate a gait from its planned state at time zero until it has settled or the robot has fallen.
 
     Deterministic: the same arguments give the same numbers.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    engine = mujoco()
+    engine = load_mujoco()
     drive, conditions = drive or Drive(), conditions or Conditions()
-    model, data = prepared(plan, conditions, drive, sole)
+    model, data = prepare(plan, conditions, drive, sole)
     at = _Addresses(model, plan)
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
     times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
@@ -105,33 +155,33 @@ def play(
     balance = drive.balance(plan, model)
     for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
         if balance is not None:
-            command += balance.shift(data)  # in place: these are the set-points that the trace keeps
+            command += balance.shift(data)  # in place: the result contains these set-points
         data.ctrl[at.actuators] = command
-        data.xfrc_applied[at.torso, :2] = _push(conditions, plan.duration_s, t)
-        if observe is not None:
-            observe(model, data)
+        if conditions.push is not None:
+            data.xfrc_applied[at.torso, :2] = conditions.push.force(t - plan.duration_s / 2)
+        if on_step is not None:
+            on_step(model, data)
         q, qd = data.qpos[at.angles], data.qvel[at.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
         torso, axes = data.xpos[at.torso].copy(), data.xmat[at.torso]
         upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
         rows.append((q, qd, torque, torso, upright, heading, feet, *_pressure(data, at)))
-        diverged = not np.isfinite(data.qvel).all()  # no such row is kept
+        diverged = not np.isfinite(data.qvel).all()
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
             break
     columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     measured = dict(zip(("q", "qd", "torque", *COLUMNS), columns, strict=True))
-    measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows hold its cosine
+    measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
     n = len(rows)
-    return Trace(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
+    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
 
 
-def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
-    """The engine's model and data, the robot in its planned state at time zero."""
-    engine = mujoco()
-    text = plan_model(plan, drive, sole, conditions.friction)
-    model = engine.MjModel.from_xml_string(text)
+def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
+    """Return the engine's model and data, with the robot in its planned state at time zero."""
+    engine = load_mujoco()
+    model = engine.MjModel.from_xml_string(make_plan_model(plan, drive, sole, conditions.friction))
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
     model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
@@ -141,14 +191,22 @@ def prepared(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tup
     engine.mj_setConst(model, data)
     at, start = _Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
-    place_root(data, plan)
+    # The root's coordinates are the engine's first.
+    (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate("hip", start)[0]
+    attitude, spin = plan.attitude(start)[0], plan.spin_at_start
+    if plan.planar:
+        data.qpos[:3] = x, z, 2.0 * np.arctan2(attitude[2], attitude[0])
+        data.qvel[:3] = vx, vz, spin[1]
+    else:
+        data.qpos[:3], data.qpos[3:7] = (x, y, z), attitude
+        data.qvel[:3], data.qvel[3:6] = (vx, vy, vz), spin
     data.qpos[at.angles], data.qvel[at.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
     engine.mj_forward(model, data)
     return model, data
 
 
 class _Addresses:
-    """Where the engine keeps what is set and measured."""
+    """Indices of the joints, actuators, bodies and sites in the engine's arrays."""
 
     def __init__(self, model: Any, plan: Plan) -> None:
         joints = [model.joint(name) for name in plan.joints]
@@ -157,7 +215,6 @@ class _Addresses:
         self.actuators = np.array([model.actuator(name).id for name in plan.joints])
         self.torso = model.body(plan.robot.root).id
         self.soles = np.array([model.site(side).id for side in SIDES])
-        self.floor = model.geom(FLOOR).id
         self.foot_of_geometry = np.full(model.ngeom, -1)
         for i, side in enumerate(SIDES):
             for part in (plan.robot.feet, plan.robot.toes):
@@ -165,20 +222,12 @@ class _Addresses:
                     self.foot_of_geometry[model.geom_bodyid == model.body(part[side].link).id] = i
 
 
-def _push(conditions: Conditions, duration_s: float, t: float) -> tuple[float, float]:
-    """Force of the push at a time [N]."""
-    push = conditions.push
-    if push is None or not 0.0 <= t - duration_s / 2 < push.duration_s:
-        return (0.0, 0.0)
-    return (push.impulse_Ns[0] / push.duration_s, push.impulse_Ns[1] / push.duration_s)
-
-
 def _pressure(data: Any, at: _Addresses) -> tuple[Array, Array]:
-    """Normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
+    """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
     contact = data.contact
     active = contact.efc_address >= 0
     forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
-    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's come first
+    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
     loads = np.array([forces[feet == i].sum() for i in range(len(SIDES))])
     total = forces.sum()
     centre = forces @ contact.pos[active, :2] / total if total > LEAST_LOAD else np.full(2, np.nan)
