@@ -18,7 +18,8 @@ from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.evaluators import NativeKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, nao, upright_links
+from nlp_gait.gaits.nao.body import GRAVITY, load_nao, upright_links
+from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
@@ -115,7 +116,7 @@ def _with_violation(kernel: Kernel, problem: GaitProblem) -> Function:
 
 def torques(rounds: int) -> list[Row]:
     """Inverse dynamics alone, samples one by one: every joint free, and as the gait moves them."""
-    robot = nao("nao-v5", True)
+    robot = load_nao("nao-v5")
     moving = [name for name in JOINTS if name in PLANNED_JOINTS or name in ARM_SWING]
     free = _torques(rounds, robot, JOINTS, ())
     gait = _torques(rounds, robot, moving, upright_links(robot))

@@ -37,14 +37,14 @@ _LAZY = {
 # What lower packages use of higher ones, by name.
 PROBLEMS.update(
     {
-        "nao-ssp": "nlp_gait.gaits.nao.single_support:nao_ssp",
-        "nao-dsp": "nlp_gait.gaits.nao.double_support:nao_dsp",
-        "nao-ssp-free": "nlp_gait.gaits.nao.single_support_free:nao_ssp_free",
-        "nao-dsp-free": "nlp_gait.gaits.nao.double_support_free:nao_dsp_free",
-        "nao-cycle": "nlp_gait.gaits.nao.cycle.problem:nao_cycle",
-        "humanoid-ssp": "nlp_gait.gaits.humanoid.single_support:humanoid_ssp",
-        "humanoid-dsp": "nlp_gait.gaits.humanoid.double_support:humanoid_dsp",
-        "humanoid-cycle": "nlp_gait.gaits.humanoid.cycle:humanoid_cycle",
+        "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
+        "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
+        "nao-ssp-free": "nlp_gait.gaits.nao.problems:nao_ssp_free",
+        "nao-dsp-free": "nlp_gait.gaits.nao.problems:nao_dsp_free",
+        "nao-cycle": "nlp_gait.gaits.nao.problems:nao_cycle",
+        "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
+        "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
+        "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
         "walk12": "nlp_gait.gaits.walk12.problem:walk12",
         "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
         "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",

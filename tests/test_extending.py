@@ -38,8 +38,12 @@ from nlp_gait.formulation import (
     Variable,
     maker,
 )
-from nlp_gait.gaits.biped.parts import Contribution, Part
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes
+from nlp_gait.gaits.biped.phase_problem import phase_problem
 from nlp_gait.gaits.biped.samples import Samples
+from nlp_gait.gaits.biped.single_support import single_support_phase, single_support_splines
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.robots.custom import humanoid
@@ -112,7 +116,7 @@ def test_a_problem_is_one_function_and_one_line(monkeypatch: pytest.MonkeyPatch)
     assert done.exit_code == 0 and "power" in done.output
 
 
-class MostHipSpeed(Part):
+class MostHipSpeed(Limit):
     """The hip must not be faster than a limit."""
 
     parameters = (
@@ -120,24 +124,23 @@ class MostHipSpeed(Part):
     )
     reads_motion = True
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         limit = at["hip_rate_limit_rad_s"]
         rates = samples.qd[samples.moving.index("LHipPitch"), :].T
         labels = tuple(str(k) for k in range(samples.steps + 1))
         row = Constraint(
             name="hip_rate", labels=labels, unit="rad/s", scale=1.0, value=rates, lower=-limit, upper=limit
         )
-        return Contribution(rows=(row,))
+        return [row], {}
 
 
 @pytest.mark.slow
-def test_a_part_of_a_gait_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It joins the paper's parts of single support, limits the motion there, and its limit is a parameter."""
-    from nlp_gait.gaits.nao import single_support
-
-    paper = single_support.paper_parts
-    monkeypatch.setattr(single_support, "paper_parts", lambda *a: (*paper(*a), MostHipSpeed()))
-    problem = single_support.nao_ssp()
+def test_a_limit_of_a_gait_is_one_class() -> None:
+    """It is added to those of single support, limits the motion there, and has a parameter."""
+    body, grid = make_nao("nao-v5"), Grid(intervals=10)
+    paper = single_support_phase(body, 0.06, single_support_splines(body, "cubic"), grid, Goal())
+    phase = replace(paper, limits=(*paper.limits, MostHipSpeed()))
+    problem = phase_problem("ssp", "single support with a limit on a hip's speed", phase)
     solution = nlp_gait.solve(problem, starts=2)
     fastest = np.abs(problem.signals(solution.x).arrays["qd"]).max(axis=0)
     own = float(fastest[problem.signals(solution.x).joints.index("LHipPitch")])

@@ -29,7 +29,7 @@ from nlp_gait.files import csv_text, write_text
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.gaits.biped.recorded.motion import RecordedGait
+    from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 
 SHOWN_VIOLATIONS = 10
 

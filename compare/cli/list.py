@@ -75,7 +75,7 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
 
 
 def _robot(name: str, out: Path | None, as_json: bool) -> None:
-    from nlp_gait.gaits.humanoid.body import humanoid
+    from nlp_gait.gaits.humanoid.body import make_humanoid
     from nlp_gait.gaits.humanoid.report import understood_of
 
     target = None if out is None else output_file(out)
@@ -83,7 +83,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
     level = log.level
     log.setLevel(logging.ERROR)  # its warnings are among the notes below
     try:
-        body = humanoid(name)
+        body = make_humanoid(name)
     finally:
         log.setLevel(level)
     facts, notes = understood_of(body), body.biped.full.notes

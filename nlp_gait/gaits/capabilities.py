@@ -8,14 +8,14 @@ from typing import Any
 
 from nlp_gait.errors import InputError
 
-_NAO_RECORDED = "nlp_gait.gaits.nao.recorded.problem:make_recorded_gait"
-_NAO_FITTED = "nlp_gait.gaits.nao.single_support_free:fitted_start"
+_NAO_RECORDED = "nlp_gait.gaits.nao.recorded:make_recorded_gait"
+_NAO_FITTED = "nlp_gait.gaits.nao.free_joints:fit_joints"
 # Makes a gait from recorded joint angles, by the problem whose limits judge it; the first is the default.
 RECORDED_GAITS = {"nao-ssp": _NAO_RECORDED, "nao-dsp": _NAO_RECORDED, "nao-cycle": _NAO_RECORDED}
-# Makes the body of the textbook's cart-table walk, by the walking cycle whose limits judge it.
+# Makes the robot of the textbook's cart-table walk, by the walking cycle whose limits judge it.
 CART_TABLE_BODIES = {
-    "nao-cycle": "nlp_gait.gaits.nao.cycle.cart_table:nao_on_a_table",
-    "humanoid-cycle": "nlp_gait.gaits.humanoid.cart_table:humanoid_on_a_table",
+    "nao-cycle": "nlp_gait.gaits.nao.recorded:nao_cycles",
+    "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycles",
 }
 # Fits free joints to a planned motion, by the problem with free joints.
 FITTED_STARTS = {"nao-ssp-free": _NAO_FITTED, "nao-dsp-free": _NAO_FITTED}

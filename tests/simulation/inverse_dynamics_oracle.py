@@ -10,8 +10,8 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Result, Signals
-from nlp_gait.gaits.biped.double_support import torso_shares
-from nlp_gait.gaits.biped.instant import BOTH_FEET
+from nlp_gait.gaits.biped.load_sharing import torso_shares
+from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from

@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.humanoid.newton import newton_steps, residuals
-from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.gaits.nao.joints import LEG_JOINTS
+from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped
 from nlp_gait.robots.leg import Leg

@@ -19,7 +19,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaits.nao.body import PLANNED_JOINTS
+from nlp_gait.gaits.nao.joints import PLANNED_JOINTS
 
 ALGORITHMS = ("pso", "ga")
 LEVER = "nao-dsp-lever"

@@ -17,8 +17,7 @@ from compare.report.writing import write_document
 from compare.study.store import Store
 from nlp_gait.errors import InputError
 from nlp_gait.files import writable_folder
-from nlp_gait.gaits.biped.cart_table import walker
-from nlp_gait.gaits.nao.cycle import cart_table
+from nlp_gait.gaits.biped import cart_table, recorded_cycle
 from nlp_gait.progress import Progress
 from nlp_gait.simulation import simulate
 from nlp_gait.simulation.engine import load_mujoco
@@ -43,7 +42,7 @@ def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
     load_mujoco()  # if it is missing, say so before the work
     folder = writable_folder(out)
     compute = partial(
-        Store(folder).compute_all, code=[claim_runs, published, walker, cart_table, simulate], progress=progress
+        Store(folder).compute_all, code=[claim_runs, published, cart_table, recorded_cycle, simulate], progress=progress
     )
     first = compute(gaits_first(effort))
     speeds = {heat: first[f"speeds-{heat.split()[-1]}"] for heat in SPECS}

@@ -20,9 +20,9 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, finely_sampled
-from nlp_gait.gaits.biped.cart_table.walker import Footsteps, cart_table_walk
-from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
-from nlp_gait.gaits.nao.motors import SHARED
+from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.nao.joints import YAW_PITCHES
+from nlp_gait.gaits.nao.recorded import nao_cycles
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import planned_distance, walked_distance
@@ -208,7 +208,7 @@ def on_servos(drive: Drive, steps: int, lengths: Sequence[float], disturbed: boo
 @cache
 def own_walk(footsteps: Footsteps) -> Result:
     """The robot's own walk: preview control of a cart on a table over footsteps."""
-    return cart_table_walk(nao_on_a_table(), footsteps)
+    return cart_table_walk(nao_cycles(), footsteps)
 
 
 def knee_deg(result: Result) -> float:
@@ -230,7 +230,7 @@ def _kinds(plan: Plan, torque: Array, rate: Array, t: Array, way_m: float) -> di
     mechanical = trapezoid(np.abs(torque * rate), t, axis=0)
     paper = plan.heat_loss * trapezoid(torque**2, t, axis=0)
     by_motor = torque.copy()
-    first, second = (plan.joints.index(joint) for joint in SHARED)  # one motor turns both
+    first, second = (plan.joints.index(joint) for joint in YAW_PITCHES)  # one motor turns both
     by_motor[:, first], by_motor[:, second] = torque[:, first] + torque[:, second], 0.0
     sheet = heat_constants(plan.robot, plan.joints) * trapezoid(by_motor**2, t, axis=0)
     found = {kind: dict.fromkeys(("mechanical", "paper", "sheet"), 0.0) for kind in KINDS}

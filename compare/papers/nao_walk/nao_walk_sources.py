@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from nlp_gait.gaits.biped.cart_table.walker import Footsteps
+from nlp_gait.gaits.biped.cart_table import Footsteps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

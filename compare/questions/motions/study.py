@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decoded
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.biped.curves import SPANS
-from nlp_gait.gaits.nao.single_support_free import fitted_start
+from nlp_gait.gaits.nao.free_joints import fit_joints
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.symbolic.splines import refine_spline
 
@@ -149,7 +149,7 @@ def _start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) ->
             return _embedded(motion.x, problem.names, spans)
     for motion in solved if task.kind == FREED else ():
         planned = motion.task.spec.load()
-        return fitted_start(task.trajectory, planned, planned.check_x(motion.x))  # type: ignore[arg-type]
+        return fit_joints(task.trajectory, planned, planned.check_x(motion.x))  # type: ignore[arg-type]
     return None
 
 

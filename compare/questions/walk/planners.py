@@ -19,10 +19,11 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import problem_maker
-from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps, cart_table_walk
-from nlp_gait.gaits.biped.cycle_motion import LIFT
-from nlp_gait.gaits.humanoid.cart_table import humanoid_on_a_table
-from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.gaits.biped.body import LIFT
+from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
+from nlp_gait.gaits.humanoid.problems import humanoid_cycles
+from nlp_gait.gaits.nao.recorded import nao_cycles
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.robots.biped import make_biped
 from nlp_gait.simulation.drive import Drive
@@ -33,7 +34,7 @@ PLANNERS = (CART_TABLE, LEAST_TORQUE)
 HEIGHT = "hip_z_lift_off_m"  # variable whose bounds are those of the hip's height
 HEIGHT_STEP_M = 0.005  # between the hip's heights that are tried, of NAO
 # Makers of what the textbook walks, judged by the limits of each cycle.
-ON_A_TABLE: dict[str, Callable[..., Body]] = {"nao-cycle": nao_on_a_table, "humanoid-cycle": humanoid_on_a_table}
+ON_A_TABLE: dict[str, Callable[..., RecordedCycles]] = {"nao-cycle": nao_cycles, "humanoid-cycle": humanoid_cycles}
 
 
 @dataclass(frozen=True, kw_only=True)

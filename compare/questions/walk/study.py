@@ -14,8 +14,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
 from nlp_gait.files import without_nan
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.biped.cycle import SPEED
-from nlp_gait.gaits.humanoid.cycle import SPEED_M_S
+from nlp_gait.gaits.biped.cycle import SPEED, SPEED_M_S
 from nlp_gait.interrupts import Interrupted
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive

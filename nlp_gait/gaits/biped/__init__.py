@@ -1,1 +1,17 @@
-"""What spatial bipeds share: a phase sampled over time, the parts of a gait, and the goals that it can have."""
+"""Gait phases of spatial bipeds, written once for every robot.
+
+From a robot to the first constraint, in reading order:
+
+    Body      the robot: joints, legs, feet, size, motors, and how its joints follow from hip and feet (``body.py``)
+    Point     values of variables and parameters by name (``nlp_gait.formulation``)
+    Instant   motion of the robot at one instant, then its torques, ZMP and ground wrenches (``samples.py``)
+    Phase     single or double support: a plan of instants over a Grid, loads, limits and a goal (``phase.py``)
+    Samples   a phase evaluated at all its samples, each once (``samples.py``)
+    Limit     adds rows, their parameters and performance indexes (``limits.py``)
+    Goal      what is minimised: power, torques or smoothness (``goals.py``)
+    Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
+
+``single_support.py`` and ``double_support.py`` compose a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
+``load_sharing.py`` divides the load between two standing feet. ``recorded_*.py`` judge motions that are given as angles over
+time by the same limits, ``cart_table.py`` plans such a motion by the textbook.
+"""

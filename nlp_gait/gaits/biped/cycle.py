@@ -18,6 +18,7 @@ from nlp_gait.formulation import (
     Constraint,
     Display,
     GaitProblem,
+    Grid,
     Objective,
     Parameter,
     Point,
@@ -28,17 +29,24 @@ from nlp_gait.formulation import (
     Variable,
 )
 from nlp_gait.formulation.assembly import parameters
-from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, TIMES
-from nlp_gait.gaits.biped.parts import rows
+from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
+from nlp_gait.gaits.biped.curves import grid_for
+from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, cycle_planners, cycle_variables
+from nlp_gait.gaits.biped.double_support import Box, Point2, double_support_mean_margins, margins_in, support_box
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import Limit, Margins, rows
+from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import LEAST_DURATION
-from nlp_gait.robots import Robot
+from nlp_gait.gaits.biped.phase_problem import add_robot, goal_for, phase_limits, start_within_reach
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
+from nlp_gait.gaits.biped.single_support import single_support_loads, single_support_mean_margins
 from nlp_gait.robots.mirror import mirror_sign
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
+SPEED_M_S = 0.03  # default, of NAO
 # Energy per metre leaves the speed free; the others are means over the time of a cycle at a given speed.
-CycleGoal = Literal["energy-per-metre", "power", "torque"]
+CycleObjective = Literal["energy-per-metre", "power", "torque"]
 ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
@@ -51,23 +59,15 @@ class WalkingCycle:
     """A cycle sampled over both phases.
 
     Attributes:
-        robot: with links welded that never move.
-        images: of every joint on the other side, in the order of the phases' joints.
-        gravity: [m/s^2].
-        torque_size: of the robot's torques next to NAO's.
-        speed_m_s: default of the speed, where it is given.
+        body: the robot.
         variables: of the motion, the step length last.
         phases: ``"ssp"`` and ``"dsp"``.
         at_given_speed: the step length is no decision variable but follows from the speed.
     """
 
-    robot: Robot
-    images: tuple[str, ...]
-    gravity: float
-    torque_size: float = 1.0
-    speed_m_s: float = 0.03
+    body: Body
     variables: tuple[Variable, ...]
-    phases: Mapping[str, Phase]
+    phases: Mapping[PhaseName, Phase]
     at_given_speed: bool
 
     @property
@@ -95,7 +95,7 @@ class WalkingCycle:
             parameter for parameter in own["dsp"] if parameter not in own["ssp"] and parameter.name not in BALANCE
         ]
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
-        limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.torque_size), *jump))
+        limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         return (*self._speed_parameters(), *balance, *limit, *shared)
 
     def _speed_parameters(self) -> tuple[Parameter, ...]:
@@ -103,7 +103,7 @@ class WalkingCycle:
             return ()
         step = self.variables[-1]
         return parameters(
-            (SPEED, "m/s", self.speed_m_s, "speed of walking", LEAST_SPEED, math.inf),
+            (SPEED, "m/s", self.body.scale_time(SPEED_M_S), "speed of walking", LEAST_SPEED, math.inf),
             (f"{STEP}.lower", "m", step.lower, "lower bound of the step length", -math.inf, math.inf),
             (f"{STEP}.upper", "m", step.upper, "upper bound of the step length", -math.inf, math.inf),
         )
@@ -137,7 +137,7 @@ class WalkingCycle:
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
-                "cost_of_transport": energy / step / (self.robot.mass_kg * self.gravity),
+                "cost_of_transport": energy / step / self.body.weight,
                 "speed_m_s": step / period,
                 "step_length_m": step,
                 **indexes,
@@ -146,9 +146,9 @@ class WalkingCycle:
         )
 
     def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
-        limit, joints = motion["torque_jump_limit_Nm"], self.phases["ssp"].joints
+        limit, joints = motion["torque_jump_limit_Nm"], self.body.joints
         return tuple(
-            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.torque_size)
+            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.body.torque_scale)
             for switch, jump in jumps.items()
         )
 
@@ -169,7 +169,7 @@ class WalkingCycle:
             begins = (*begins, phase.duration)
         return tuple(found)
 
-    def _assemble_at(self, name: str, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+    def _assemble_at(self, name: PhaseName, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         """Rows and indexes of one phase with samples at other phases (1, k)."""
         at, phase = self.motion(point), self.phases[name]
         part = phase.assemble(_named_for(at, name), phase.samples_at(at, ops, phases), ops)
@@ -186,9 +186,9 @@ class WalkingCycle:
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Changes of torques (J, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""
-        joints = self.phases["ssp"].joints
-        images = [joints.index(name) for name in self.images]
-        signs = DM([mirror_sign(self.robot, *pair) for pair in zip(joints, self.images, strict=True)])
+        joints = self.body.joints
+        images = [joints.index(name) for name in self.body.images]
+        signs = DM([mirror_sign(self.body.robot, *pair) for pair in zip(joints, self.body.images, strict=True)])
         touch_down, lift_off = double[:, 0] - single[:, -1], signs * single[images, 0] - double[:, -1]
         return {"lift_off": lift_off, "touch_down": touch_down}
 
@@ -199,26 +199,110 @@ class WalkingCycle:
         return {"ssp": single, "dsp": replace(double, arrays=later)}
 
 
-def cycle_problem(name: str, owner: str, cycle: WalkingCycle, start: Start | None = None) -> GaitProblem:
-    """Problem of a cycle, without what drawing and playing need.
+def walking_cycle(body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:
+    """Return both phases of the cycle, joined.
+
+    Args:
+        body: the robot.
+        sharing: of load in double support.
+        grid: of each phase.
+        goal: of each phase; the cycle's is their mean over time, or energy per metre.
+        at_given_speed: the step length follows from the speed.
+    """
+    *motion, step = cycle_variables(body)
+    variables = (*motion, *sharing.variables, step)
+    plans, margins = cycle_planners(body), cycle_margins(body)
+    own: dict[PhaseName, tuple[Planner, Loader, tuple[Limit, ...]]] = {
+        "ssp": (plans["ssp"], single_support_loads(body), ()),
+        "dsp": (sharing.add_to(plans["dsp"]), sharing.loads, sharing.limits),
+    }
+    phases: dict[PhaseName, Phase] = {
+        name: Phase(
+            body=body,
+            variables=variables,
+            duration=TIMES[name],
+            plan=plan,
+            loads=loads,
+            grid=grid,
+            limits=(*phase_limits(body, *margins[name]), *body.motors.limits, *more),
+            goal=goal,
+        )
+        for name, (plan, loads, more) in own.items()
+    }
+    return WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=at_given_speed)
+
+
+def cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
+    """Return the balance margins of each phase, and the default of the least mean ones in x and y [m]."""
+    feet, (left_y, right_y) = body.robot.feet, body.feet_y
+    usual = support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
+
+    def double(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        """In the box around the left foot and the right one a step ahead."""
+        step = at[STEP]
+        back = ca.fmin(-feet["left"].back_m, step - feet["right"].back_m)
+        front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
+        return margins_in(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)
+
+    return {
+        "ssp": (body.sole_margins((0.0, left_y)), single_support_mean_margins(feet["left"])),
+        "dsp": (double, double_support_mean_margins(usual)),
+    }
+
+
+def planned_cycle(
+    body: Body,
+    *,
+    objective: CycleObjective,
+    intervals: int,
+    samples_per_interval: int,
+    torso_share: TorsoShare,
+    load_degree: int,
+) -> GaitProblem:
+    """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
+    grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    sharing, at_given_speed = share_load(body, torso_share, load_degree), objective != "energy-per-metre"
+    goal = goal_for(body, "torque" if objective == "torque" else "power")
+    cycle = walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
+    names = tuple(variable.name for variable in cycle.decisions)
+
+    def reach(at: Point) -> MX:
+        return ca.horzcat(*(phase.samples(cycle.motion(at), Exact()).reach for phase in cycle.phases.values()))
+
+    def start_with_step(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        return start_at_speed(names, parameters, rng)
+
+    start = sharing.start(names, start_with_step if at_given_speed else None)
+    if not body.closed_form:
+        start = start_within_reach(names, (SPEED,) if at_given_speed else (), reach, start)
+    return cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
+
+
+def cycle_problem(
+    name: str, cycle: WalkingCycle, start: Start | None = None, *, rows_over_time: bool, repeats: bool
+) -> GaitProblem:
+    """Return the problem of a cycle.
 
     Args:
         name: of the problem.
-        owner: whose cycle it is, for the title.
         cycle: both phases.
         start: start point; None for one within the bounds.
+        rows_over_time: whether its rows are known between the samples, too.
+        repeats: a gait is one step, whose mirror image is the next one.
     """
-    return GaitProblem(
+    problem = GaitProblem(
         name=name,
-        title=f"{owner}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
+        title=f"{cycle.body.title}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
         objective=cycle.objective,
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
+        rows_over_time=cycle.rows_over_time if rows_over_time else (),
         display=Display(motion=lambda at: joined(cycle.signals(at)), durations=tuple(TIMES.values())),
         hints=SolverHints(start=start),
     )
+    return add_robot(problem, cycle.body, repeats=repeats)
 
 
 def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:

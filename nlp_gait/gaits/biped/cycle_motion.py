@@ -8,13 +8,16 @@ mirror image of the one at the start. So hip, feet and what else is planned have
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
-from nlp_gait.gaits.biped.samples import LEAST_DURATION
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Coordinate, PhaseName
+from nlp_gait.gaits.biped.limits import REACH_MARGIN
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
+from nlp_gait.gaits.biped.single_support import swing_foot
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, stack
 
 SWITCHES = ("lift_off", "touch_down")
@@ -23,33 +26,9 @@ SWITCHES = ("lift_off", "touch_down")
 HIP_X_SHARES = {"lift_off": (-0.25, 0.25), "touch_down": (-0.1, 0.5)}
 STEP_SHARES = (0.1, 0.6)
 
-STEP, LIFT = "step_length_m", "swing_height_m"
+STEP = "step_length_m"
 LEAST_STEP = 1e-3  # [m]; a shorter step is evaluated as this one, so that the path of the swing foot stays defined
-TIMES = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 SUFFIXES = {"m": "m", "m/s": "m_s", "rad": "rad", "rad/s": "rad_s"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Coordinate:
-    """An angle that is planned beside the hip.
-
-    Attributes:
-        name: of its variables.
-        rate: name of its rate's variables.
-        largest: of either sign, or a pair of bounds [rad].
-        largest_rate: of either sign [rad/s].
-        image: +1 or -1: what a mirrored motion has.
-        words: what it is.
-        rate_words: what its rate is.
-    """
-
-    name: str
-    rate: str
-    bounds: tuple[float, float]
-    largest_rate: float
-    image: float
-    words: str
-    rate_words: str
 
 
 class State(NamedTuple):
@@ -92,38 +71,25 @@ class Cycle(NamedTuple):
         )
 
 
-def cycle_variables(
-    hip: Sequence[Variable],
-    leg_m: float,
-    half_width_m: float,
-    coordinates: Sequence[Coordinate],
-    lift_and_times: Sequence[Variable],
-    point: str = "torso origin",
-) -> tuple[Variable, ...]:
-    """Variables of a cycle; the step length is the last one.
+def cycle_variables(body: Body) -> tuple[Variable, ...]:
+    """Return the variables of a cycle; the step length is the last one.
 
-    Args:
-        hip: of a published phase: height, then velocities in z, x and y at both ends, whose bounds are taken.
-        leg_m: length of a leg.
-        half_width_m: from the middle to a foot.
-        coordinates: planned beside the hip.
-        lift_and_times: swing height and both times.
-        point: what the hip is, in words.
+    Heights, velocities, swing height and times have the bounds of the phases.
     """
-    height, vz, _, vx, _, vy, _ = hip
+    height, vz, _, vx, _, vy, _ = body.hip_variables
     found = []
     for switch in SWITCHES:
         at = f"at {switch.replace('_', '-')}"
-        low, high = (round(share * leg_m, 3) for share in HIP_X_SHARES[switch])
+        low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
         table = [
-            ("hip_x", "m", low, high, f"{point} ahead of the left foot"),
-            ("hip_y", "m", 0.0, half_width_m, "towards the left foot"),
-            ("hip_z", "m", height.lower, height.upper, f"height of the {point}"),
+            ("hip_x", "m", low, high, f"{body.hip_name} ahead of the left foot"),
+            ("hip_y", "m", 0.0, body.feet_y[0], "towards the left foot"),
+            ("hip_z", "m", height.lower, height.upper, f"height of the {body.hip_name}"),
             ("hip_vx", "m/s", vx.lower, vx.upper, "sagittal velocity"),
             ("hip_vy", "m/s", vy.lower, vy.upper, "lateral velocity"),
             ("hip_vz", "m/s", vz.lower, vz.upper, "vertical velocity"),
         ]
-        for c in coordinates:
+        for c in body.coordinates:
             table.append((c.name, "rad", *c.bounds, c.words))
             table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
         found += [
@@ -136,9 +102,31 @@ def cycle_variables(
             )
             for name, unit, lower, upper, what in table
         ]
-    low, high = (round(share * leg_m, 3) for share in STEP_SHARES)
+    low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
-    return (*found, *lift_and_times, step)
+    return (*found, body.lift_variable, body.time_variable("ssp"), body.time_variable("dsp"), step)
+
+
+def cycle_planners(body: Body) -> dict[PhaseName, Planner]:
+    """Return the plans of both phases."""
+    left, right = body.standing_ankle("L"), body.standing_ankle("R")
+    right_y, right_z = body.ankle("R")
+
+    def single(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        """From lift-off to touch-down over the left foot."""
+        cycle = cycle_from(at, body.coordinates)
+        swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
+        hip, angles = between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
+        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": swing}, at[REACH_MARGIN], ops)
+
+    def double(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        """From touch-down to the mirror image of lift-off over both feet."""
+        cycle = cycle_from(at, body.coordinates)
+        ahead = right._replace(position=right.position + vertcat(cycle.step, 0, 0))
+        hip, angles = between(cycle.touch_down, cycle.end, cycle.double, phase)
+        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": ahead}, at[REACH_MARGIN], ops)
+
+    return {"ssp": single, "dsp": double}
 
 
 def cycle_from(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:

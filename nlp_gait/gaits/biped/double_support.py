@@ -1,30 +1,28 @@
-"""Both feet on the ground: how they share the load, and the box in which the ZMP has to be."""
+"""Double support: both feet stand, the right one a step ahead, and the load passes to it (sections 3.2 and 4.2)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Mapping
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
-from casadi import MX, SX
+from casadi import MX, SX, fmax
 
-from nlp_gait.formulation import Start, Variable
-from nlp_gait.gaits.biped.foot_loads import FootLimits, PlannedWrench, planned_loads
-from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader, Loads, Planner
-from nlp_gait.gaits.biped.parts import Margins, Part
+from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
+from nlp_gait.gaits.biped.body import TIMES, Body, State
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, Margins
+from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
+from nlp_gait.gaits.biped.phase import Derivatives, Phase
+from nlp_gait.gaits.biped.phase_problem import Criterion, goal_for, phase_limits, phase_problem
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import below, combine_zmps, ground_load, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.symbolic.trajectories import resting_point
 
 # Section 4.2: least mean margins of 0.08 m, in the box of 0.21 m by 0.18 m around NAO's soles.
 MEAN_DBM_SHARES = (8 / 21, 4 / 9)
 
-Division = Literal["printed", "lever"]
-TorsoShare = Literal["printed", "lever", "free"]
-LOAD_DEGREE = 4
 Point2: TypeAlias = tuple[float, float]
 Side = TypeVar("Side", float, MX)
 
@@ -39,7 +37,7 @@ class Box(NamedTuple, Generic[Side]):
 
 
 def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
-    """Rectangle around both soles, whose ankles stand at ``soles`` by side."""
+    """Return the rectangle around both soles, whose ankles are at ``soles`` by side [m]."""
     feet = {side: robot.feet[foot] for side, foot in BOTH_FEET.items()}
     return Box(
         back=min(soles[side][0] - foot.back_m for side, foot in feet.items()),
@@ -50,13 +48,13 @@ def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
 
 
 def double_support_mean_margins(box: Box[float]) -> Point2:
-    """Least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
+    """Return the least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
 
 
 def double_support_margins(box: Box[float]) -> Margins:
-    """Balance margins in x and y: distances to the sides of the box around both soles.
+    """Return the balance margins in x and y: distances to the sides of the box around both soles.
 
     Source:
         Gupta, Pratihar, Deb (2023), Fig. 8 (b).
@@ -65,99 +63,111 @@ def double_support_margins(box: Box[float]) -> Margins:
 
 
 def margins_in(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
-    """Distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
+    """Compute the distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
     x, y = zmp[0, :].T, zmp[1, :].T
     return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
 
 
-def torso_shares(hip_y: SX, rule: Division, feet_y: Point2 = (0.05, -0.05)) -> dict[str, SX]:
-    """Share of the torso's mass that each leg carries, from the hip's distances to the feet; both add up to 1.
+def soles_of(body: Body, step_m: float) -> dict[str, Point2]:
+    """Place the ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2) [m]."""
+    left, right = body.feet_y
+    return {"L": (step_m, left), "R": (2 * step_m, right)}
 
-    With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
+
+def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
+    """Return the hip's place at both ends in x and in y [m].
+
+    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, and from halfway to the left
+    foot to halfway to the right one.
+    """
+    (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
+    sixth = (front_x - rear_x) / 6
+    return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
+
+
+def double_support_splines(body: Body, trajectory: Trajectory) -> Splines:
+    """Return the splines of the phase."""
+    units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("dsp"), "rad")
+    return Splines(trajectory=trajectory, units=units, length_scale=body.length_scale)
+
+
+def planned_double_support(
+    body: Body,
+    *,
+    step_m: float,
+    intervals: int,
+    samples_per_interval: int,
+    trajectory: Trajectory,
+    objective: Criterion,
+    torso_share: TorsoShare,
+    load_degree: int,
+    derivatives: Derivatives = "analytic",
+) -> GaitProblem:
+    """Return the problem of double support; for the options see ``gaits.nao``."""
+    splines, sharing = double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
+    grid = grid_for(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    phase = double_support_phase(body, step_m, splines, sharing, grid, goal_for(body, objective), derivatives)
+    start = sharing.start(phase.names, splines.start_of(phase.names))
+    return phase_problem("dsp", "double support: least mean power", phase, start=start)
+
+
+def double_support_phase(
+    body: Body,
+    step_m: float,
+    splines: Splines,
+    sharing: LoadSharing,
+    grid: Grid,
+    goal: Goal,
+    derivatives: Derivatives = "analytic",
+) -> Phase:
+    """Return the phase from touch-down of the right foot to lift-off of the left one.
 
     Args:
-        hip_y: position of the hip across the walking direction [m].
-        rule: ``"printed"`` is proportional to the distance *from* that leg's own foot, as in the equations; ``"lever"`` to
-            the distance from the other foot, as the text says: the nearer foot carries more.
-        feet_y: of the left and the right foot [m]; by default those of NAO.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), eqs. (28), (29).
+        body: the robot.
+        step_m: from foot to foot.
+        splines: see ``double_support_splines``.
+        sharing: of the load between the feet.
+        grid: its samples.
+        goal: what it minimises.
+        derivatives: of the angles.
     """
-    from_left, from_right = feet_y[0] - hip_y, hip_y - feet_y[1]
-    width = feet_y[0] - feet_y[1]
-    left, right = from_left / width, from_right / width  # (eqs. 28, 29)
-    return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
+    soles = soles_of(body, step_m)
+    box, ends = support_box(body.robot, soles), hip_ends(body, soles)
+    ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
+
+    def state(at: InstantPoint, s: SX) -> State:
+        more = splines.motions(at, double_support_duration(at), s)
+        hip = hip_on_spline(at, more, *ends, double_support_duration(at), s)
+        return hip, body.angles("dsp", at, more, double_support_duration(at), s), ankles
+
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
+
+    return Phase(
+        body=body,
+        variables=(
+            *body.hip_variables,
+            *body.angle_variables,
+            body.time_variable("dsp"),
+            *splines.variables,
+            *sharing.variables,
+        ),
+        duration=TIMES["dsp"],
+        plan=sharing.add_to(plan),
+        loads=sharing.loads,
+        grid=grid,
+        derivatives=derivatives,
+        limits=(
+            *phase_limits(body, double_support_margins(box), double_support_mean_margins(box)),
+            *body.curve_limits("dsp", splines.count, state),
+            *body.motors.limits,
+            *sharing.limits,
+        ),
+        goal=goal,
+        kinks=splines.kinks,
+    )
 
 
-class Sharing(NamedTuple):
-    """What sharing the load in double support adds to a problem.
-
-    Attributes:
-        variables: of the planned wrench.
-        planned: adds that wrench to a motion.
-        loads: torques and ZMP.
-        parts: that limit it.
-        start_of: start points of variables by name, from those of the others.
-    """
-
-    variables: tuple[Variable, ...]
-    planned: Callable[[Planner], Planner]
-    loads: Loader
-    parts: tuple[Part, ...]
-    start_of: Callable[[Sequence[str], Start | None], Start | None]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Standing:
-    """A robot on both feet, each half of which may be taken by itself.
-
-    Attributes:
-        robot: with links welded that never move.
-        halves: joints of the left and the right half by ``"L"`` and ``"R"``; the root belongs to both.
-        feet_y: of the left and the right foot [m].
-        gravity: [m/s^2].
-        upright: links that never turn.
-    """
-
-    robot: Robot
-    halves: Mapping[str, Sequence[str]]
-    feet_y: Point2
-    gravity: float
-    upright: Collection[str]
-
-    def sharing(self, rule: TorsoShare, degree: int) -> Sharing:
-        """By a rule of the paper, or planned freely.
-
-        Args:
-            rule: see ``torso_shares``; ``"free"`` plans the wrench on the right foot.
-            degree: of that wrench over the phase.
-        """
-        if rule != "free":
-            return Sharing((), lambda plan: plan, self.loads(rule), (), lambda _, start: start)
-        wrench = PlannedWrench(robot=self.robot, weight=self.robot.mass_kg * self.gravity, degree=degree)
-        loads = planned_loads(self.robot, self.gravity, self.upright)
-        return Sharing(wrench.variables, wrench.planned, loads, (FootLimits(wrench),), wrench.start_of)
-
-    def loads(self, rule: Division) -> Loader:
-        """Torques of each half from its own foot, and the combined ZMP of both feet."""
-        robot = self.robot
-        trees = {side: tree_from(robot, robot.feet[foot].link, self.halves[side]) for side, foot in BOTH_FEET.items()}
-        weight = robot.mass_kg * self.gravity
-
-        def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
-            q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-            shares = torso_shares(hip[1], rule, self.feet_y)
-            torques: dict[str, SX] = {}
-            zmps, ground_loads, wrenches = [], [], {}
-            for side, tree in trees.items():
-                half, wrench = newton_euler(tree, q, qd, qdd, self.gravity, {robot.root: shares[side]}, self.upright)
-                height = robot.feet[BOTH_FEET[side]].ankle_height_m
-                offset = zmp_of_wrench(wrench, height, weight)
-                wrenches[side] = below(wrench, height)
-                torques |= half
-                zmps.append(feet[side] + offset)
-                ground_loads.append(ground_load(wrench, weight))
-            return Loads(torques, combine_zmps(zmps, ground_loads), wrenches)
-
-        return loads
+def double_support_duration(at: InstantPoint) -> SX:
+    """Return the time of the phase [s], never zero."""
+    return fmax(at[TIMES["dsp"]], LEAST_DURATION)

@@ -27,7 +27,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
 from nlp_gait.formulation.blocks import labels
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, Draw
-from nlp_gait.gaits.biped.parts import Contribution, Part, rows
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
 from nlp_gait.gaits.biped.samples import Samples, time_mean
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
@@ -66,7 +66,7 @@ class Motors:
     robot: Robot
     joints: tuple[str, ...]
     shared: tuple[str, ...] = ()
-    coupling: Part | None = None
+    coupling: Limit | None = None
 
     def __post_init__(self) -> None:
         """Refuse unknown features, and two rules for braking."""
@@ -80,13 +80,13 @@ class Motors:
             self._ratings, self.model  # noqa: B018  a robot without data is refused now
 
     @classmethod
-    def parsed(
+    def parse(
         cls,
         text: str,
         robot: Robot,
         joints: tuple[str, ...],
         shared: tuple[str, ...] = (),
-        coupling: Part | None = None,
+        coupling: Limit | None = None,
     ) -> Motors:
         """Features from an option's text, separated by commas; none if it is empty."""
         features = tuple(part.strip() for part in text.split(",") if part.strip())
@@ -107,8 +107,8 @@ class Motors:
         return replace(self.robot, armatures_kgm2=found)
 
     @property
-    def parts(self) -> tuple[Part, ...]:
-        """Limits of the motors."""
+    def limits(self) -> tuple[Limit, ...]:
+        """Limits that the features add."""
         limits = (MotorLimits(self, self._ratings),) if "limits" in self.features else ()
         return (*limits, *((self.coupling,) if self.coupling is not None and ANKLE in self.features else ()))
 
@@ -156,7 +156,7 @@ class Motors:
         return ca.sparsify(DM(sharing)) @ torque
 
 
-class MotorLimits(Part):
+class MotorLimits(Limit):
     """Speed, torque against speed |tau| <= stall (1 - |qd| / no-load), and root mean square torque of every motor.
 
     As two lines of each sign, tau +- qd stall / no-load within +- stall, in braking too, where a motor could give more.
@@ -172,7 +172,7 @@ class MotorLimits(Part):
     def __init__(self, motors: Motors, ratings: Sequence[Motor]) -> None:
         self._motors, self._ratings = motors, ratings
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         """Two-sided rows, and an upper bound on the mean squares' roots."""
         torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
         n = torque.shape[1]
@@ -197,4 +197,4 @@ class MotorLimits(Part):
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
         rms = ca.sqrt(time_mean(loads**2))
         too_hot = rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
-        return Contribution(rows=(too_fast, *too_weak, too_hot))
+        return (too_fast, *too_weak, too_hot), {}

@@ -25,11 +25,10 @@ from nlp_gait.formulation import (
     in_space,
 )
 from nlp_gait.formulation.display import SIMULATED
+from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.instant import BOTH_FEET, Loader, Loads, PlannedInstant, Planner
-from nlp_gait.gaits.biped.parts import REACH_MARGIN, Part
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples, Trace
-from nlp_gait.robots import Robot
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -51,50 +50,46 @@ COLUMNS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phase:
-    """A support phase: how the robot moves, what that asks of motors and ground, and what is wanted of it.
+    """A support phase: how the robot moves, which loads that causes, what limits it and what it minimises.
 
     Attributes:
-        robot: with links welded that never move.
-        joints: those whose torques and rates count.
-        planned: those whose angles the phase plans.
+        body: the robot.
         variables: of the motion, in the order of x.
         duration: variable that holds the phase's duration.
         plan: the motion.
         loads: torques and ZMP.
         grid: its samples.
         derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
-        parts: what limits the phase.
+        limits: they add the rows.
         goal: what it minimises.
         kinks: phases at which the motion's formula changes: knots of splines.
     """
 
-    robot: Robot
-    joints: tuple[str, ...]
-    planned: tuple[str, ...]
+    body: Body
     variables: tuple[Variable, ...]
     duration: str
     plan: Planner
     loads: Loader
     grid: Grid
     derivatives: Derivatives = "analytic"
-    parts: Sequence[Part] = ()
+    limits: Sequence[Limit] = ()
     goal: Goal = Goal()
     kinks: tuple[float, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Of the goal and of all parts; pairs of bounds stand last, for there are many."""
-        own = (*self.goal.parameters, *(parameter for part in self.parts for parameter in part.parameters))
+        """Of the goal and of all limits; pairs of bounds are last because there are many."""
+        own = (*self.goal.parameters, *(parameter for limit in self.limits for parameter in limit.parameters))
         return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Rows of all parts, the goal, and the indexes of both."""
-        added = [part.contribute(at, samples, ops) for part in self.parts]
+        """Return the rows of all limits, the goal, and the indexes of both."""
+        added = [limit.add(at, samples, ops) for limit in self.limits]
         value, before, after = self.goal.value(at, samples, ops)
-        indexes = {name: index for part in added for name, index in part.indexes.items()}
+        indexes = {name: index for _, own in added for name, index in own.items()}
         return Assembly(
             objective=value,
-            constraints=tuple(row for part in added for row in part.rows),
+            constraints=tuple(row for rows, _ in added for row in rows),
             indexes={**before, **indexes, **after},
         )
 
@@ -122,7 +117,7 @@ class Phase:
             wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if pressed else []
             power, moved = qd * moving, [q, qd, qdd]
         return Samples(
-            joints=self.joints,
+            joints=self.body.joints,
             moving=self.moving,
             per_interval=self.grid.samples_per_interval if phases is None else 1,
             duration=at[self.duration],
@@ -173,7 +168,7 @@ class Phase:
         n = self.grid.parts + 1
         torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
         wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
-        rows = [self.joints.index(name) for name in self.moving]
+        rows = [self.body.joints.index(name) for name in self.moving]
 
         def full(moved: Any, others: Array) -> Array:
             """(N + 1, J) with the joints that stand still."""
@@ -181,7 +176,7 @@ class Phase:
             values[:, rows] = _numbers(moved)
             return values
 
-        still_rates = np.zeros(len(self.joints))
+        still_rates = np.zeros(len(self.body.joints))
         com, left, right, *_ = (_numbers(part) for part in ca.vertsplit(world, 3))
         halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
@@ -198,21 +193,21 @@ class Phase:
             **dict(zip(WRENCHES, halves, strict=True)),
         }
         if not attitude.shape[0]:
-            return Signals(joints=self.joints, arrays=arrays, columns=COLUMNS)
+            return Signals(joints=self.body.joints, arrays=arrays, columns=COLUMNS)
         arrays["attitude"] = _numbers(attitude)
-        return Signals(joints=self.joints, arrays=arrays, columns={**COLUMNS, "attitude": SIMULATED["attitude"]})
+        return Signals(joints=self.body.joints, arrays=arrays, columns={**COLUMNS, "attitude": SIMULATED["attitude"]})
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Joints whose angle changes over the phase."""
         joints = self._symbolic_plan(Exact())[1].joints
-        return tuple(name for name in self.joints if not joints[name].velocity.is_zero())
+        return tuple(name for name in self.body.joints if not joints[name].velocity.is_zero())
 
     @cached_property
     def _held(self) -> Array:
         """(J,) angles of the joints that stand still, zero for the others [rad]."""
         still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
-        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.joints])
+        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.body.joints])
 
     @cached_property
     def _exact_kinematics(self) -> ca.Function:
@@ -225,17 +220,17 @@ class Phase:
 
     @property
     def _traces(self) -> dict[str, Trace]:
-        return {name: trace for part in self.parts for name, trace in part.traces.items()}
+        return {name: trace for limit in self.limits for name, trace in limit.traces.items()}
 
     @property
     def _reads_motion(self) -> bool:
-        return self.goal.reads_motion or any(part.reads_motion for part in self.parts)
+        return self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
 
     @property
     def _reads_wrenches(self) -> bool:
-        return any(part.reads_wrenches for part in self.parts)
+        return any(limit.reads_wrenches for limit in self.limits)
 
-    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], PlannedInstant, InstantPoint]:
+    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
         at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
         return [x, margin, phase], self.plan(at, phase, ops), at
@@ -271,10 +266,10 @@ class Phase:
     ) -> tuple[list[SX], list[SX]]:
         """One sample with analytic derivatives: x, margin and phase, and torques and what else is read."""
         inputs, plan, at = self._symbolic_plan(ops)
-        loads = self.loads(plan.joints, plan.hip, {side: ankle[:2] for side, ankle in plan.ankles.items()}, plan.wrench)
+        loads = self.loads(plan)
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
-        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
-        torque = ca.vertcat(*(loads.torques[name] for name in self.joints))
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
+        torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
         outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
         outputs += [loads.wrenches[side] for side in BOTH_FEET] if wrenches else []
         outputs += self._motion(plan) if motion else []
@@ -287,19 +282,20 @@ class Phase:
         That is the centre of mass with both feet and the planned wrench one below the other, the attitude, and traces.
         """
         inputs, plan, at = self._symbolic_plan(ops)
-        planned = ca.vertcat(*(plan.joints[name].position for name in self.planned))
-        tree = tree_from(self.robot, self.robot.feet["left"].link)
+        planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
+        tree = tree_from(self.body.robot, self.body.robot.feet["left"].link)
         angles = {name: joint.position for name, joint in plan.joints.items()}
         com = centre_of_mass(tree, forward_kinematics(tree, angles, plan.ankles["L"]))
         soles = [
-            plan.ankles[side] - SX([0, 0, self.robot.feet[foot].ankle_height_m]) for side, foot in BOTH_FEET.items()
+            plan.ankles[side] - SX([0, 0, self.body.robot.feet[foot].ankle_height_m])
+            for side, foot in BOTH_FEET.items()
         ]
         world = ca.vertcat(com, *soles, plan.wrench)
         seen = [trace(at, inputs[2]) for trace in traces.values()]
         known = [plan.hip, planned, plan.reach, world, plan.attitude]
         return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
 
-    def _motion(self, plan: PlannedInstant) -> list[SX]:
+    def _motion(self, plan: Instant) -> list[SX]:
         """Angles of the joints that move, and both derivatives."""
         return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
 
@@ -307,7 +303,9 @@ class Phase:
     def _dynamics(self) -> ca.Function:
         """One sample: torques, those of the moving joints, and ZMP, from the inputs of ``_loaded``."""
         inputs, loads = self._loaded()
-        torque, moving = (ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.joints, self.moving))
+        torque, moving = (
+            ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.body.joints, self.moving)
+        )
         return ca.Function("dynamics", inputs, simplify([torque, moving, loads.zmp]))
 
     @cached_property
@@ -316,16 +314,20 @@ class Phase:
         inputs, loads = self._loaded()
         return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
 
-    def _loaded(self) -> tuple[list[SX], Loads]:
+    def _loaded(self) -> tuple[list[SX], Instant]:
         """Loads of one sample as functions of angles, both derivatives, hip, and what ``_kinematics`` gives of the world."""
         plan = self._symbolic_plan(Exact())[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
         _, left, right, *wrench = ca.vertsplit(world, 3)
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
-        feet = {"L": left[:2], "R": right[:2]}
-        loads = self.loads({**plan.joints, **moved}, hip, feet, ca.vertcat(*wrench) if wrench else SX(0, 1))
-        return [*parts, hip, world], loads
+        now = Instant(
+            joints={**plan.joints, **moved},
+            hip=hip,
+            ankles={"L": left, "R": right},
+            wrench=ca.vertcat(*wrench) if wrench else SX(0, 1),
+        )
+        return [*parts, hip, world], self.loads(now)
 
     def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
         """A function of columns and (x, margin, phase) at all samples, or at other phases (1, k), one column each.

@@ -1,20 +1,57 @@
-"""A phase at its samples: what parts and goals read."""
+"""One instant of a biped, and a phase at its samples: what plans return, and what limits and goals read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import InstantPoint
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion
 
+BOTH_FEET = {"L": "left", "R": "right"}
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
 
-# What else is seen of an instant, from the variables by name and the phase in [0, 1]: a column.
-Trace = Callable[[InstantPoint, SX], SX]
+
+class Instant(NamedTuple):
+    """Motion of the whole robot at one instant, and the loads that it causes.
+
+    Attributes:
+        joints: motion of every joint by name [rad].
+        hip: (3,) position of the torso's origin [m].
+        ankles: (3,) positions by side ``"L"``, ``"R"`` [m].
+        reach: (2,) cosines of the left and the right knee.
+        wrench: (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned.
+        miss: (k,) distances by which legs miss their feet [m]; empty where they cannot.
+        attitude: (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright.
+        torques: by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``.
+        zmp: (2,) in the world [m].
+        wrenches: (6,) of the ground on each sole by side, about the point under its ankle [N, Nm].
+    """
+
+    joints: Mapping[str, Motion]
+    hip: SX
+    ankles: Mapping[str, SX]
+    reach: SX = SX(0, 1)
+    wrench: SX = SX(0, 1)
+    miss: SX = SX(0, 1)
+    attitude: SX = SX(0, 1)
+    torques: Mapping[str, SX] = {}
+    zmp: SX = SX(0, 1)
+    wrenches: Mapping[str, SX] = {}
+
+
+# From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
+Planner: TypeAlias = Callable[[InstantPoint, SX, Nonsmooth], Instant]
+# Adds torques, ZMP and the ground's wrenches to a planned motion.
+Loader: TypeAlias = Callable[[Instant], Instant]
+# Another quantity at an instant, a column, from the variables by name and the phase in [0, 1].
+Trace: TypeAlias = Callable[[InstantPoint, SX], SX]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,18 +61,18 @@ class Samples:
     Attributes:
         joints: rows of torque.
         moving: rows of power and of the motion.
-        per_interval: samples in each interval over which a limit on changes holds.
+        per_interval: samples in each interval over which changes are limited.
         duration: of the phase [s].
         planned: (k, N + 1) planned angles [rad].
         reach: (2, N + 1) cosines of the knees.
         torque: (J, N + 1) [Nm].
         power: (m, N + 1) mechanical power of the joints that move [W], signed.
         zmp: (2, N + 1) in the world [m].
-        motion: angles of the joints that move and both derivatives, (m, N + 1) each; empty if nobody reads them.
-        traces: what parts asked to see, by name.
-        wrenches: (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty if nobody reads
-            them.
-        miss: (k, N + 1) by how much legs miss their feet [m]; empty where they cannot.
+        motion: angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them.
+        traces: quantities that limits requested, by name.
+        wrenches: (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty unless a limit
+            reads them.
+        miss: (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot.
     """
 
     joints: tuple[str, ...]
@@ -79,7 +116,7 @@ class Samples:
 
 
 def time_mean(values: MX) -> MX:
-    """Means of rows (m, N + 1) over equidistant samples by the trapezoidal rule."""
+    """Compute the means of rows (m, N + 1) over equidistant samples by the trapezoidal rule."""
     n = values.shape[1]
     weights = np.full(n, 1.0 / (n - 1))
     weights[[0, -1]] /= 2

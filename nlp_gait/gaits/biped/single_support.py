@@ -1,50 +1,173 @@
-"""One foot on the ground: loads of the whole robot on it, the path of the other foot, and the mean margins asked for."""
+"""Single support: the robot stands on its left foot and swings the right one by two steps (sections 3.1 and 4.1)."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
+from typing import NamedTuple
 
-from casadi import SX
+from casadi import MX, SX, fmax
 
-from nlp_gait.gaits.biped.instant import Loader, Loads
-from nlp_gait.robots import Foot, Robot
+from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Point
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, FootClearance, Margins
+from nlp_gait.gaits.biped.phase import Derivatives, Phase
+from nlp_gait.gaits.biped.phase_problem import Criterion, goal_for, phase_limits, phase_problem
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader
+from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import below, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
-from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, parabola_lift, stack
 
 # Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
 MEAN_DBM_SHARES = (1 / 3, 1 / 4)
 
 
+class Stance(NamedTuple):
+    """Place of the left foot, and paths of the right foot and of the hip [m]."""
+
+    support_xy: tuple[float, float]
+    swing_x: tuple[float, float]
+    swing_y: float
+    hip_x: tuple[float, float]
+    hip_y: tuple[float, float]
+
+
+def stance_of(body: Body, step_m: float) -> Stance:
+    """Place each foot below its own hip joint, and the hip halfway to the supporting one (section 4.1, Table 3)."""
+    left, right = body.feet_y
+    return Stance((step_m, left), (0.0, 2 * step_m), right, (step_m / 2, 1.5 * step_m), (left / 2, left / 2))
+
+
+def single_support_splines(body: Body, trajectory: Trajectory) -> Splines:
+    """Return the splines of the phase; the swing foot stays on its line across the walking direction."""
+    units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("ssp"), "rad")
+    return Splines(trajectory=trajectory, units=units | {"foot_x": "m", "foot_z": "m"}, length_scale=body.length_scale)
+
+
+def planned_single_support(
+    body: Body,
+    *,
+    step_m: float,
+    intervals: int,
+    samples_per_interval: int,
+    trajectory: Trajectory,
+    objective: Criterion,
+    derivatives: Derivatives = "analytic",
+) -> GaitProblem:
+    """Return the problem of single support; for the options see ``gaits.nao``."""
+    splines = single_support_splines(body, trajectory)
+    grid = grid_for(trajectory, intervals, samples_per_interval)
+    phase = single_support_phase(body, step_m, splines, grid, goal_for(body, objective), derivatives)
+    return phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
+
+
+def single_support_phase(
+    body: Body,
+    step_m: float,
+    splines: Splines,
+    grid: Grid,
+    goal: Goal,
+    derivatives: Derivatives = "analytic",
+) -> Phase:
+    """Return the phase from rest behind the standing foot to rest in front of it.
+
+    Args:
+        body: the robot.
+        step_m: from foot to foot.
+        splines: see ``single_support_splines``.
+        grid: its samples.
+        goal: what it minimises.
+        derivatives: of the angles.
+    """
+    stance, foot = stance_of(body, step_m), body.robot.feet["left"]
+    left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
+
+    def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
+        """The paper's motion of the right foot at a height, and what its curves add."""
+        time, (begin, end) = single_support_duration(at), stance.swing_x
+        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
+        return add_motions(paper, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
+
+    def state(at: InstantPoint, s: SX) -> State:
+        time = single_support_duration(at)
+        more = splines.motions(at, time, s)
+        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s)
+        return hip, body.angles("ssp", at, more, time, s), {"L": left, "R": swing(at, more, right_height, s)}
+
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
+
+    def sole(at: InstantPoint, s: SX) -> SX:
+        return swing(at, splines.motions(at, single_support_duration(at), s), 0.0, s).position
+
+    return Phase(
+        body=body,
+        variables=(
+            *body.hip_variables,
+            *body.angle_variables,
+            body.lift_variable,
+            body.time_variable("ssp"),
+            *splines.variables,
+        ),
+        duration=TIMES["ssp"],
+        plan=plan,
+        loads=single_support_loads(body),
+        grid=grid,
+        derivatives=derivatives,
+        limits=(
+            *phase_limits(body, body.sole_margins(stance.support_xy), single_support_mean_margins(foot)),
+            *((FootClearance(sole, step_m, LIFT),) if splines.count else ()),
+            *body.curve_limits("ssp", splines.count, state),
+            *body.motors.limits,
+        ),
+        goal=goal,
+        kinks=splines.kinks,
+    )
+
+
+def single_support_duration(at: InstantPoint) -> SX:
+    """Return the time of the phase [s], never zero."""
+    return fmax(at[TIMES["ssp"]], LEAST_DURATION)
+
+
 def single_support_mean_margins(foot: Foot) -> tuple[float, float]:
-    """Least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
+    """Return the least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
 
 
+def nearest_edge_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:
+    """Return the distances of the ZMP to the nearer edges of one sole in x and in y, whose ankle is at ``support_xy`` [m]."""
+
+    def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        x, y = (zmp[0, :] - support_xy[0]).T, (zmp[1, :] - support_xy[1]).T
+        along = ops.min(foot.front_m - x, x + foot.back_m)
+        return along.T, ops.min(foot.left_m - y, y + foot.right_m).T
+
+    return margins
+
+
 def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
-    """Motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
+    """Return the motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
     forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
     rise = parabola_lift(forward, start_x, end_x, lift)
     return stack(forward, constant_motion(y), rise._replace(position=rise.position + ankle_height))
 
 
-def loads_on_left(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:
-    """Torques of the whole tree from the left foot, which supports it, and the ZMP from the ground's wrench on that foot.
-
-    Args:
-        robot: with links welded that never move.
-        gravity: [m/s^2].
-        upright: links that never turn.
-    """
-    foot = robot.feet["left"]
+def single_support_loads(body: Body) -> Loader:
+    """Return a function of the torques from the left foot, which supports the robot, and of the ZMP under it."""
+    robot, foot = body.robot, body.robot.feet["left"]
     tree = tree_from(robot, foot.link)
 
-    def loads(joints: Mapping[str, Motion], hip: SX, feet: Mapping[str, SX], _: SX) -> Loads:
-        q, qd, qdd = ({name: motion[order] for name, motion in joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, gravity, upright=upright)
-        offset = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * gravity)
-        return Loads(torques, feet["L"] + offset, {"L": below(wrench, foot.ankle_height_m), "R": SX(6, 1)})
+    def loads(now: Instant) -> Instant:
+        q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
+        torques, wrench = newton_euler(tree, q, qd, qdd, body.gravity, upright=body.upright)
+        offset = zmp_of_wrench(wrench, foot.ankle_height_m, body.weight)
+        wrenches = {"L": below(wrench, foot.ankle_height_m), "R": SX(6, 1)}
+        return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
 
     return loads

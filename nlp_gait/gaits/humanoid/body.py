@@ -1,147 +1,104 @@
-"""A humanoid's body in a gait: what of its size goes into bounds and limits, and its motion under a torso that leans."""
+"""Any humanoid as its gaits take it: sizes that scale NAO's bounds and limits, and legs under a torso that leans."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from casadi import DM, SX
+from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Parameter, Variable
+from nlp_gait.formulation import InstantPoint, Variable
+from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
-from nlp_gait.gaits.biped.instant import BOTH_FEET, PlannedInstant
+from nlp_gait.gaits.biped.limits import Margins
+from nlp_gait.gaits.biped.motors import Motors
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
+from nlp_gait.gaits.biped.single_support import nearest_edge_margins
 from nlp_gait.gaits.humanoid.newton import newton_steps
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped
-from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion
+from nlp_gait.robots.leg import LEG_JOINT_COUNT
+from nlp_gait.symbolic.general_leg import TorsoMotion, compute_reach, leg_motion
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
 GRAVITY = 9.81  # [m/s^2]
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than
 # its 0.886, with which ankles of other robots reach their limits.
 HEIGHT_SHARES = (0.5905, 0.95)
 # Lean of the torso: roll to either side, pitch back and forward [rad].
-LARGEST_ROLL, LARGEST_PITCH = 0.15, 0.3
+LEAN = ("torso_roll", "torso_pitch")
+LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
+LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 STEP_M = 0.06  # NAO's, from foot to foot
-LETTERS = {foot: letter for letter, foot in BOTH_FEET.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Humanoid:
-    """A biped with what its gaits need.
+class Humanoid(Body):
+    """Any robot with two legs of six turning joints, whose torso may lean.
 
     Attributes:
         biped: its legs and size.
-        steps: of Newton's method, by side.
+        newton_steps: of Newton's method, by foot.
     """
 
     biped: Biped
-    steps: Mapping[str, int]
+    newton_steps: Mapping[str, int]
 
-    @cached_property
-    def middle_m(self) -> Array:
-        """(3,) middle between the hips from the root's origin; the legs are mirror images."""
-        x, _, z = self.biped.hip_middle_m
-        return np.array([x, 0.0, z])
-
-    def foot_y(self, side: str) -> float:
-        """Where a foot stands across the walking direction: as at zero angles [m]."""
-        return float(self.biped.legs[side].foot_m[1])
-
-    @property
-    def images(self) -> tuple[str, ...]:
-        """Of every joint of the legs on the other side."""
-        return tuple(self.biped.images[joint] for joint in self.biped.joints)
-
-    @property
-    def feet_y(self) -> tuple[float, float]:
-        """Of the left and the right foot [m]."""
-        return self.foot_y("left"), self.foot_y("right")
-
-    def ankle_height(self, side: str) -> float:
-        """Origin of a foot's link above its sole [m]."""
-        return self.biped.model.feet[side].ankle_height_m
-
-    @property
-    def heat(self) -> Parameter:
-        """K with the robot's default."""
-        return replace(
-            HEAT_LOSS,
-            default=float(f"{self.biped.heat_W_per_Nm2:.4g}"),
-            description=f"K, heat loss; {self.biped.heat_source}",
-        )
-
-    @property
-    def upright_feet(self) -> frozenset[str]:
-        """Links that keep the world's axes: flat soles."""
-        return frozenset(foot.link for foot in self.biped.model.feet.values())
-
-    def length(self, nao_m: float) -> float:
-        """A length of NAO's gaits for this robot, to a tenth of a millimetre [m]."""
-        return round(nao_m * self.biped.length_scale, 4)
-
-    def velocity(self, nao_m_s: float) -> float:
-        """A velocity, likewise [m/s]."""
-        return float(f"{nao_m_s * self.biped.time_scale:.4g}")
-
-    def time(self, nao_s: float) -> float:
-        """A time, likewise [s]."""
-        return float(f"{nao_s * self.biped.time_scale:.4g}")
-
-    def step_length(self, asked_m: float) -> float:
-        """Step length that an option asks for; 0 for NAO's in proportion [m].
+    def check_step_length(self, step_m: float) -> float:
+        """Return a step length; 0 stands for NAO's in proportion [m].
 
         Raises:
             InputError: it is not a finite number >= 0.
         """
-        number = isinstance(asked_m, (int, float)) and not isinstance(asked_m, bool)
-        if not (number and 0.0 <= asked_m < math.inf):
-            raise InputError(f"step_length_m must be a finite number > 0, or 0 for one in proportion, got {asked_m!r}")
-        return asked_m if asked_m > 0.0 else round(STEP_M * self.biped.length_scale, 3)
+        number = isinstance(step_m, (int, float)) and not isinstance(step_m, bool)
+        if not (number and 0.0 <= step_m < math.inf):
+            raise InputError(f"step_length_m must be a finite number > 0, or 0 for one in proportion, got {step_m!r}")
+        return step_m if step_m > 0.0 else self.step_length_m
 
     @property
-    def hip_variables(self) -> tuple[Variable, ...]:
-        """Height of the hips' middle and velocities at both ends of a phase."""
-        leg = self.biped.legs["left"]
-        above = self.ankle_height("left") + float(leg.ankle_m[2] - leg.foot_m[2])
-        low, high = (round(above + share * leg.length_m, 3) for share in HEIGHT_SHARES)
-        rows = [("hip_height_m", "m", low, high, "middle of both hips above the ground at both ends")]
-        bounds = {"z": (-0.05, 0.05, "vertical"), "x": (0.001, 0.2, "sagittal"), "y": (-0.2, 0.2, "lateral")}
-        for axis, (least, most, word) in bounds.items():
-            for end in ("start", "end"):
-                name = f"hip_v{axis}_{end}_m_s"
-                rows.append((name, "m/s", self.velocity(least), self.velocity(most), f"{word} velocity, at the {end}"))
+    def angle_variables(self) -> tuple[Variable, ...]:
+        """Lean of the torso at both ends of a phase, where it is at rest."""
         return tuple(
-            Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)
-            for name, unit, lower, upper, text in rows
+            Variable(
+                name=f"{name}_{end}_rad",
+                unit="rad",
+                lower=-largest,
+                upper=largest,
+                description=f"{name.replace('_', ' ')} at the {end}",
+            )
+            for name, largest in LARGEST_LEAN.items()
+            for end in ("start", "end")
         )
 
-    def plan(
-        self,
-        hip: Motion,
-        lean: tuple[Motion, Motion],
-        ankles: Mapping[str, Motion],
-        margin: SX,
-        ops: Nonsmooth,
-    ) -> PlannedInstant:
-        """Motion of the whole robot: both legs between the torso and the feet.
+    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+        return LEAN
 
-        Args:
-            hip: (3,) middle of both hips [m].
-            lean: roll about the torso's own x axis, and its pitch before that [rad].
-            ankles: (3,) origins of the feet's links by ``"L"`` and ``"R"`` [m].
-            margin: on the reach of the knees.
-            ops: interpretation.
-        """
-        roll, pitch = lean
+    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
+        return {name: (at[f"{name}_start_rad"], at[f"{name}_end_rad"]) for name in LEAN}
+
+    def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
+        return dict(zip(LEAN, coordinates, strict=True))
+
+    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+        return nearest_edge_margins(support_xy, self.robot.feet["left"])
+
+    def cosines(self, q: MX) -> MX:
+        angles = SX.sym("q", len(self.joints))
+        legs = zip(self.biped.legs.values(), ca.vertsplit(angles, LEG_JOINT_COUNT), strict=True)
+        reach = ca.Function("reach", [angles], [ca.vertcat(*(compute_reach(leg, own) for leg, own in legs))])
+        return reach.map(q.shape[1])(q)
+
+    def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
+        """Return the motion of the whole robot; the torso rolls about its own x axis, and pitches before that."""
+        middle = np.array(self.hip_m)
+        roll, pitch = (angles.get(name, constant_motion(0.0)) for name in LEAN)
         pitched, side = axis_rotation(TO_THE_LEFT, pitch.position), SX(DM(TO_THE_LEFT))
         rotation = pitched @ axis_rotation(FORWARD, roll.position)
         about = pitched @ DM(FORWARD)
@@ -153,15 +110,15 @@ class Humanoid:
         for letter, name in BOTH_FEET.items():
             leg = self.biped.legs[name]
             place = Motion(*(a - b for a, b in zip(hip, ankles[letter], strict=True)))
-            torso = TorsoMotion(rotation, spin, rate, self.middle_m, place)
-            found = leg_motion(leg, self.steps[name], torso, margin, ops, held=ops.exact)
+            torso = TorsoMotion(rotation, spin, rate, middle, place)
+            found = leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
             joints |= {joint: Motion(*(part[i] for part in found.joints)) for i, joint in enumerate(leg.joints)}
             reach.append(found.reach)
             miss.append(found.miss)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
-        return PlannedInstant(
+        return Instant(
             joints=joints,
-            hip=hip.position - rotation @ DM(self.middle_m),
+            hip=hip.position - rotation @ DM(middle),
             ankles={letter: ankle.position for letter, ankle in ankles.items()},
             reach=ca.vertcat(*reach),
             miss=ca.vertcat(*miss) if ops.exact else SX(0, 1),
@@ -174,11 +131,61 @@ class Humanoid:
         )
 
 
-def humanoid(robot: str) -> Humanoid:
-    """Humanoid from a robot's name or file.
+def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") -> Humanoid:
+    """Return a humanoid as its gaits take it.
+
+    Args:
+        robot: name or file.
+        drive_limits: whether torques and speeds are within the limits of the robot's file.
+        motors: features of the real motors that are taken into account, see ``gaits.biped.motors``.
 
     Raises:
         InputError: its legs are not such as are solved; GaitError as ``load_robot``.
     """
     biped = make_biped(load_robot(robot))
-    return Humanoid(biped=biped, steps={side: newton_steps(leg) for side, leg in biped.legs.items()})
+    left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m
+    above = biped.model.feet["left"].ankle_height_m + float(left.ankle_m[2] - left.foot_m[2])
+    rate = float(f"{LARGEST_LEAN_RATE / biped.time_scale:.4g}")
+    heat = float(f"{biped.heat_W_per_Nm2:.4g}")
+    return Humanoid(
+        family="humanoid",
+        title=biped.full.name,
+        full=biped.full,
+        simulated=biped.model,
+        motors=Motors.parse(motors, biped.model, biped.joints),
+        joints=biped.joints,
+        planned=biped.joints,
+        images=tuple(biped.images[joint] for joint in biped.joints),
+        leg_joints={side: biped.legs[foot].joints for side, foot in BOTH_FEET.items()},
+        coordinates=tuple(
+            Coordinate(
+                name=name,
+                rate=f"{name}_rate",
+                bounds=(-largest, largest),
+                largest_rate=rate,
+                image=image,
+                words=name.replace("_", " "),
+                rate_words=f"rate of the {name.replace('_', ' ')}",
+            )
+            for (name, largest), image in zip(LARGEST_LEAN.items(), (-1.0, 1.0), strict=True)
+        ),
+        upright=frozenset(foot.link for foot in biped.model.feet.values()),
+        gravity=GRAVITY,
+        feet_y=(float(left.foot_m[1]), float(biped.legs["right"].foot_m[1])),
+        leg_length_m=biped.leg_length_m,
+        hip_height_m=(
+            round(above + HEIGHT_SHARES[0] * left.length_m, 3),
+            round(above + HEIGHT_SHARES[1] * left.length_m, 3),
+        ),
+        hip_m=(float(middle_x), 0.0, float(middle_z)),  # the legs are mirror images
+        hip_name="middle of both hips",
+        step_length_m=round(STEP_M * biped.length_scale, 3),
+        heat=replace(HEAT_LOSS, default=heat, description=f"K, heat loss; {biped.heat_source}"),
+        closed_form=False,
+        drive_limits=drive_limits,
+        length_scale=biped.length_scale,
+        time_scale=biped.time_scale,
+        torque_scale=biped.torque_scale,
+        biped=biped,
+        newton_steps={side: newton_steps(leg) for side, leg in biped.legs.items()},
+    )

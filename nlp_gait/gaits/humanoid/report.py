@@ -24,7 +24,11 @@ def understood_of(body: Humanoid) -> list[tuple[str, str]]:
             )
         )
     left = legs["left"]
-    exact = "in closed form" if not max(body.steps.values()) else f"by {max(body.steps.values())} Newton steps"
+    exact = (
+        "in closed form"
+        if not max(body.newton_steps.values())
+        else f"by {max(body.newton_steps.values())} Newton steps"
+    )
     rows += [
         ("leg length", f"{biped.leg_length_m:.4f} m, {biped.length_scale:.3f} times NAO's (lambda)"),
         (
@@ -34,8 +38,8 @@ def understood_of(body: Humanoid) -> list[tuple[str, str]]:
         ("inverse kinematics", exact),
         ("held joints", f"{len(biped.posture_rad)}, at zero" + (" but " + _angles(held) if held else "")),
         ("heat constant K", f"{biped.heat_W_per_Nm2:.3g} W/(Nm)^2, {biped.heat_source}"),
-        ("step length", f"{body.step_length(0.0):.3f} m by default"),
-        ("time of a swing", f"{body.time(0.4):.3g} to {body.time(4.0):.3g} s"),
+        ("step length", f"{body.step_length_m:.3f} m by default"),
+        ("time of a swing", f"{body.scale_time(0.4):.3g} to {body.scale_time(4.0):.3g} s"),
         ("torque may change", f"by {1.2 * biped.torque_scale:.3g} Nm over an interval"),
     ]
     return rows

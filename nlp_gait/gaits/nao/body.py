@@ -1,15 +1,31 @@
-"""What the NAO problems share: the robot, its joints, and the motion of hip, legs and arms."""
+"""NAO as its gaits take it: its joints, its closed-form legs under an upright torso, and the swing of its arms."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
-from casadi import DM, SX, vertcat
+from casadi import DM, MX, SX, cos, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.gaits.biped.instant import PlannedInstant
-from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.formulation import InstantPoint, Point, Signals
+from nlp_gait.formulation.motion.skeleton import Skeleton
+from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
+from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins
+from nlp_gait.gaits.biped.samples import Instant
+from nlp_gait.gaits.nao.joints import (
+    HELD_ARM_ANGLES,
+    JOINTS,
+    KNEES,
+    LEG_JOINTS,
+    PLANNED_JOINTS,
+    RESTING_ARM_ANGLES,
+)
+from nlp_gait.gaits.nao.legs import GREATEST_HEIGHT_SHARE, LEAST_HEIGHT_SHARE, leg_geometry
+from nlp_gait.gaits.nao.motors import parse_nao_motors
+from nlp_gait.gaits.nao.skeleton import skeleton
 from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots.mirror import partner
 from nlp_gait.robots.tree import point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -17,24 +33,36 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
-ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
-# Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
-JOINTS = tuple(
-    f"{side}{joint}" for part in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in part
-)
-PLANNED_JOINTS = tuple(f"{side}{joint}" for side in "LR" for joint in LEG_JOINTS)
-HELD_ARM_ANGLES = {  # section 3.1 [rad]
-    "LShoulderRoll": 0.26,
-    "RShoulderRoll": -0.26,
-    "LElbowYaw": -1.5,
-    "RElbowYaw": 1.5,
-    "LWristYaw": 0.0,
-    "RWristYaw": 0.0,
+ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {  # [rad]
+    "ssp": {  # Table 3, rows 6 to 9
+        "LShoulderPitch": (2.0, 1.0),
+        "LElbowRoll": (-0.42, -0.64),
+        "RShoulderPitch": (1.0, 2.0),
+        "RElbowRoll": (0.64, 0.42),
+    },
+    "dsp": {  # Table 5, rows 4 to 7
+        "LShoulderPitch": (1.0, 1.5),
+        "LElbowRoll": (-0.64, -0.50),
+        "RShoulderPitch": (2.0, 1.5),
+        "RElbowRoll": (0.42, 0.50),
+    },
 }
+# Table 3 swings the shoulders about 1.5 rad and the elbows about 0.53 rad, their rolls by 0.22 rad for each rad of the shoulders.
+MIDDLE_SHOULDER, MIDDLE_ELBOW, ELBOW_PER_SHOULDER = 1.5, 0.53, 0.22
+LARGEST_SWING, LARGEST_RATE = 0.5, 1.0  # [rad], [rad/s]; Table 3 swings the shoulders by 0.5 rad to either side
+ARM_COORDINATE = Coordinate(
+    name="arm_swing",
+    rate="arm_rate",
+    bounds=(-LARGEST_SWING, LARGEST_SWING),
+    largest_rate=LARGEST_RATE,
+    image=-1.0,
+    words="left shoulder pitch beyond the middle, right one short of it",
+    rate_words="rate of the arms' swing",
+)
 
 
-def nao(robot: str, rotational_inertia: bool) -> Robot:
-    """Robot of a NAO problem: joints that no gait moves are locked at zero, links are point masses if asked for.
+def load_nao(robot: str) -> Robot:
+    """Return the robot of a NAO problem: joints that no gait moves are locked at zero.
 
     Of NAO these are the head and the neck, which become one with the torso; another robot may have fingers, or no neck.
 
@@ -50,19 +78,19 @@ def nao(robot: str, rotational_inertia: bool) -> Robot:
     welded = weld(loaded, [joint for joint in loaded.joints if joint not in JOINTS])
     for side in "LR":
         leg_geometry(welded, side)
-    return welded if rotational_inertia else point_masses(welded)
+    return welded
 
 
 def upright_links(robot: Robot) -> frozenset[str]:
-    """Links that keep the world's axes: an upright torso, flat soles, and hips whose yaw-pitch joint is held at zero."""
+    """Return the links that keep the world's axes: torso, soles, and hips whose yaw-pitch joint is held at zero."""
     hips = (robot.joint(f"{side}HipYawPitch").child for side in "LR")
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
 
 
 def upright_plan(
     robot: Robot, hip: Motion, ankles: Mapping[str, Motion], arms: Mapping[str, Motion], margin: SX, ops: Nonsmooth
-) -> PlannedInstant:
-    """Motion of the whole robot under an upright torso: legs in closed form between the hip and both ankles by side."""
+) -> Instant:
+    """Return the motion of the whole robot under an upright torso: closed-form legs between the hip and both ankles."""
     joints: dict[str, Motion] = {}
     reach = []
     for side, ankle in ankles.items():
@@ -77,7 +105,7 @@ def upright_plan(
         joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
         joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
         reach.append(leg.reach)
-    return PlannedInstant(
+    return Instant(
         joints={**joints, **arms},
         hip=hip.position,
         ankles={side: ankle.position for side, ankle in ankles.items()},
@@ -86,7 +114,116 @@ def upright_plan(
 
 
 def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:
-    """Joint motions of both arms: those named in ``swing`` as cubics from rest to rest [rad], the others held."""
+    """Return the joint motions of both arms: those in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
     return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NaoBody(Body):
+    """NAO, or a robot of its build: closed-form legs under an upright torso, arms that swing as in the paper."""
+
+    def round_place(self, x: float) -> float:
+        """Round to a micrometre, so that the paper's numbers come out exactly."""
+        return round(x, 6)
+
+    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+        return tuple(ARM_SWING[phase])
+
+    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
+        return {name: (SX(start), SX(end)) for name, (start, end) in ARM_SWING[phase].items()}
+
+    def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
+        """Return the joints of both arms, which swing against each other; elbows bend as their shoulders move."""
+        (swing,) = coordinates
+
+        def joint(middle: float, factor: float) -> Motion:
+            return Motion(middle + factor * swing.position, factor * swing.velocity, factor * swing.acceleration)
+
+        return {
+            "LShoulderPitch": joint(MIDDLE_SHOULDER, 1.0),
+            "RShoulderPitch": joint(MIDDLE_SHOULDER, -1.0),
+            # Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
+            "LElbowRoll": joint(-MIDDLE_ELBOW, ELBOW_PER_SHOULDER),
+            "RElbowRoll": joint(MIDDLE_ELBOW, ELBOW_PER_SHOULDER),
+        }
+
+    def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
+        arms = {**{name: constant_motion(angle) for name, angle in RESTING_ARM_ANGLES.items()}, **angles}
+        return upright_plan(self.robot, hip, ankles, arms, margin, ops)
+
+    def cosines(self, q: MX) -> MX:
+        return cos(q[[JOINTS.index(knee) for knee in KNEES], :])
+
+    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+        """Return the balance margins in x and y on the left sole.
+
+        In x the distance to the sole's edge on the side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.
+        Outside the sole the paper's zero is continued below zero, so that an infeasible gait shows how far outside it is.
+
+        Source:
+            Gupta, Pratihar, Deb (2023), eqs. (21), (22).
+        """
+        foot = self.robot.feet["left"]
+
+        def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+            x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
+            dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
+            dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T
+            return dbm_x, dbm_y
+
+        return margins
+
+    def curve_limits(
+        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+    ) -> tuple[Limit, ...]:
+        """Return the limits of the arms' joints that swing."""
+        joints = tuple(ARM_SWING[phase])
+
+        def positions(at: InstantPoint, s: SX) -> SX:
+            _, angles, _ = state(at, s)
+            return vertcat(*(angles[joint].position for joint in joints))
+
+        return (AngleLimits("arm_angle", self.robot, joints, positions),) if count else ()
+
+    @property
+    def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
+        return skeleton(self.full)
+
+
+def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -> NaoBody:
+    """Return NAO as its gaits take it.
+
+    Args:
+        robot: name or file.
+        rotational_inertia: False takes every link as a point mass.
+        motors: features of the real motors that are taken into account, see ``gaits.biped.motors``.
+
+    Raises:
+        InputError: the robot or its motors do not suit the NAO problems.
+    """
+    simulated = load_nao(robot)
+    left, right = (leg_geometry(simulated, side) for side in "LR")
+    leg_length = left.thigh_m + left.tibia_m
+    ground = left.ankle_height_m - left.hip_m[2]
+    return NaoBody(
+        family="nao",
+        title="NAO",
+        full=load_robot(robot),
+        simulated=simulated,
+        motors=parse_nao_motors(motors, simulated if rotational_inertia else point_masses(simulated)),
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        images=tuple(map(partner, JOINTS)),
+        leg_joints={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
+        coordinates=(ARM_COORDINATE,),
+        upright=upright_links(simulated),
+        gravity=GRAVITY,
+        feet_y=(left.hip_m[1], right.hip_m[1]),
+        leg_length_m=leg_length,
+        hip_height_m=(
+            round(ground + LEAST_HEIGHT_SHARE * leg_length, 3),
+            round(ground + GREATEST_HEIGHT_SHARE * leg_length, 3),
+        ),
+    )

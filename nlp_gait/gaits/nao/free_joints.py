@@ -1,4 +1,4 @@
-"""Motion of NAO on its left foot with free joints between the paper's ends.
+"""NAO on its left foot with free joints between the paper's ends: the lower bound of all plans of hip, foot and arms.
 
 Each joint's angle is a cubic between the ends plus a spline that leaves the ends alone. At both ends the robot is where the paper
 puts it: torso upright at the paper's hip positions with the hip's velocities as variables, both soles flat and at rest, arms at
@@ -8,46 +8,48 @@ the paper swings: the torso leans and turns, the swing foot tilts and leaves its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import Array, Constraint, InstantPoint, Point, Signals
-from nlp_gait.formulation.blocks import labels
-from nlp_gait.gaits.biped.curves import Splines, Trajectory
-from nlp_gait.gaits.biped.instant import Loader, PlannedInstant, Planner
-from nlp_gait.gaits.biped.parts import (
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, Signals
+from nlp_gait.gaits.biped.body import LIFT
+from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import (
     REACH_MARGIN,
-    Contribution,
-    Part,
+    Limit,
+    RowsAndIndexes,
+    angle_rows,
     halfway_rows,
-    limit_rows,
-    rows,
+    rows_at_samples,
 )
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.recorded.stance import FreeParts, free_parts
-from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
-from nlp_gait.gaits.nao.single_support import ARM_SWING, LIFT
+from nlp_gait.gaits.biped.recorded_motion import FreeParts, free_parts
+from nlp_gait.gaits.biped.samples import Instant, Samples
+from nlp_gait.gaits.biped.single_support import (
+    single_support_duration,
+    single_support_phase,
+    single_support_splines,
+)
+from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
+from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
 from nlp_gait.symbolic.splines import fit_spline
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic
 
-YAW_PITCH = "HipYawPitch"  # one motor turns both hips
-YAW_PITCHES = tuple(f"{side}{YAW_PITCH}" for side in "LR")
-CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING)
+YAW_PITCH = "HipYawPitch"  # curve of both hips
+CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])
 MOVING = (*YAW_PITCHES, *CURVES[1:])
-KNEES = ("LKneePitch", "RKneePitch")
-
-
-OTHERS = (YAW_PITCHES[0], *ARM_SWING)
+OTHERS = (YAW_PITCHES[0], *ARM_SWING["ssp"])
+CORNERS = ("back right", "back left", "front right", "front left")
+FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,25 +57,19 @@ class FreeMotion:
     """Joint angles as splines.
 
     Attributes:
-        robot: with links welded that never move.
+        paper: the paper's phase, whose ends are taken, for a body none of whose links stays upright.
         splines: on every curve.
-        paper: the paper's motion, whose ends are taken.
-        loads: torques and ZMP.
         support: (3,) the left ankle, which stands [m].
-        duration: of the phase [s].
     """
 
-    robot: Robot
+    paper: Phase
     splines: Splines
-    paper: Planner
-    loads: Loader
     support: tuple[float, float, float]
-    duration: Callable[[InstantPoint], SX]
 
     def joints(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
-        """Motion of every joint [rad]."""
-        duration = self.duration(at)
-        start, end = (self.paper(at, SX(instant), ops).joints for instant in (0, 1))
+        """Return the motion of every joint [rad]."""
+        duration = single_support_duration(at)
+        start, end = (self.paper.plan(at, SX(instant), ops).joints for instant in (0, 1))
         more = self.splines.motions(at, duration, phase)
         moved: dict[str, Motion] = {}
         for name in MOVING:
@@ -82,11 +78,11 @@ class FreeMotion:
             moved[name] = add_motions(hermite, more[YAW_PITCH if name in YAW_PITCHES else name])
         return {**start, **moved}
 
-    def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> PlannedInstant:
-        """Motion of the whole robot."""
+    def plan(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        """Return the motion of the whole robot."""
         joints = self.joints(at, phase, ops)
         body = self.body({name: motion.position for name, motion in joints.items()})
-        return PlannedInstant(
+        return Instant(
             joints=joints,
             hip=body.torso,
             ankles={"L": SX(DM(self.support)), "R": body.ankle},
@@ -94,12 +90,12 @@ class FreeMotion:
         )
 
     def body(self, q: Mapping[str, SX]) -> FreeParts:
-        """Where torso and right foot are, from angles by joint name."""
-        return free_parts(self.robot, self._tree, q, self.support)
+        """Return the places of torso and right foot for angles by joint name."""
+        return free_parts(self.paper.body.robot, q, self.support)
 
     @cached_property
     def instant(self) -> ca.Function:
-        """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and where ankle and sole are."""
+        """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and places of ankle and sole."""
         rows = len(CURVES)
         v = SX.sym("v", 3 * rows)
         joints = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
@@ -107,14 +103,10 @@ class FreeMotion:
             motion = Motion(*(v[order * rows + row] for order in range(3)))
             joints |= dict.fromkeys(YAW_PITCHES if curve == YAW_PITCH else (curve,), motion)
         body = self.body({name: motion.position for name, motion in joints.items()})
-        loads = self.loads(joints, body.torso, {"L": SX(DM(self.support[:2]))}, SX(0, 1))
+        loads = self.paper.loads(Instant(joints=joints, hip=body.torso, ankles={"L": SX(DM(self.support))}))
         torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
         left = body.corners[1, 1::2]
         return ca.Function("instant", [v], simplify([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
-
-    @cached_property
-    def _tree(self) -> tuple[Body, ...]:
-        return tree_from(self.robot, self.robot.feet["left"].link)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,8 +136,8 @@ class FreePhase(Phase):
             tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
         )
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
-        motions = tied(values, ops)
-        torque, zmp, along, heights, sides = (tied(part, ops) for part in self.free.instant.map(n)(motions))
+        motions = tie(values, ops)
+        torque, zmp, along, heights, sides = (tie(part, ops) for part in self.free.instant.map(n)(motions))
         q, qd, qdd = (by_joint(part) for part in ca.vertsplit(motions, len(CURVES)))
         return Samples(
             joints=JOINTS,
@@ -168,16 +160,16 @@ class FreePhase(Phase):
 
 
 def by_joint(rows: MX) -> dict[str, MX]:
-    """Rows of a matrix (15, N + 1) by joint name."""
+    """Return the rows of a matrix (15, N + 1) by joint name."""
     found = dict(zip(CURVES, ca.vertsplit(rows), strict=True))
     return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
 
 
-class FreeLimits(Part):
+class FreeLimits(Limit):
     """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
 
     Args:
-        robot: whose limits they are.
+        robot: with the joints' limits.
         path_middle: x of the swing foot halfway [m].
         inner_edge: y of the supporting sole's inner edge [m].
     """
@@ -185,39 +177,65 @@ class FreeLimits(Part):
     def __init__(self, robot: Robot, path_middle: float, inner_edge: float) -> None:
         self._robot, self._path_middle, self._inner_edge = robot, path_middle, inner_edge
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows between the ends; the number of samples is odd, for one of them is the middle."""
-        traces, middle = samples.traces, samples.steps // 2
-        heights, corners = traces["heights"], ("back right", "back left", "front right", "front left")
-        halfway = halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], corners)
-        return Contribution(
-            rows=(
-                limit_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
-                _corner_rows("foot_height", heights[:, 1:-1], corners),
-                *halfway,
-                _corner_rows("feet_apart", self._inner_edge - traces["sides"][:, 1:-1], corners[1::2]),
-            )
-        )
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        traces, middle = samples.traces, samples.steps // 2  # the number of samples is odd
+        heights, aside = traces["heights"], self._inner_edge - traces["sides"][:, 1:-1]
+        return (
+            angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
+            rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
+            *halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS),
+            rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
+        ), {}
 
 
-def _corner_rows(name: str, values: MX, corners: Sequence[str]) -> Constraint:
-    """Values (c, N - 1) of a sole's corners between the ends that must not be negative [m]."""
-    names = labels(corners, range(1, values.shape[1] + 1))
-    return rows(name, "m", ca.vec(values), MX(0.0), None, names, "instant")
+def free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
+    """Return single support with free joints between the ends of the paper's.
+
+    Args:
+        body: the robot.
+        step_m: from foot to foot.
+        trajectory: of the joints.
+        grid: one of its samples is the middle.
+    """
+    body = replace(body, upright=frozenset())
+    paper = single_support_phase(body, step_m, single_support_splines(body, "cubic"), grid, Goal())
+    splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
+    _, left_y, _ = support = (step_m, *body.ankle("L"))
+    motion = FreeMotion(paper=paper, splines=splines, support=support)
+    return FreePhase(
+        body=body,
+        variables=(*paper.variables, *splines.variables),
+        duration=paper.duration,
+        plan=motion.plan,
+        loads=paper.loads,
+        grid=grid,
+        limits=(*paper.limits, FreeLimits(body.robot, step_m, left_y - body.robot.feet["left"].right_m)),
+        free=motion,
+        kinks=splines.kinks,
+    )
 
 
-def free_splines(trajectory: Trajectory) -> Splines:
-    """Splines on every joint."""
-    return Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
+def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
+    """Return the point (n,) of free joints whose motion is nearest to a planned one.
+
+    Args:
+        trajectory: of the free joints.
+        planned: of ``nao_ssp`` with the same robot and step.
+        x: variables of the planned motion.
+    """
+    dense = planned.dense(FIT_FACTOR)
+    assert dense is not None  # a phase has one; for the type checker
+    own = x[: sum("[" not in name for name in planned.names)]
+    return np.concatenate([own, joint_coefficients(dense.signals(x), SPANS[trajectory])])
 
 
-def tied(values: MX, ops: Nonsmooth) -> MX:
-    """A matrix of which each entry is a variable of its own to a solver (see ``Nonsmooth.tie``)."""
+def tie(values: MX, ops: Nonsmooth) -> MX:
+    """Return a matrix whose entries are variables of a gradient solver (see ``Nonsmooth.tie``)."""
     return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
 
 
 def joint_coefficients(signals: Signals, spans: int) -> Array:
-    """Coefficients, curve by curve, of the free motion that is nearest to another one with the same ends.
+    """Return the coefficients, curve by curve, of the free motion that is nearest to another one with the same ends.
 
     Args:
         signals: of the other motion, the more samples the better.

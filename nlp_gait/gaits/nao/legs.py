@@ -6,11 +6,10 @@ import math
 from typing import NamedTuple
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Variable
+from nlp_gait.gaits.nao.joints import LEG_JOINTS
 from nlp_gait.robots import Joint, Robot
 from nlp_gait.robots.robot import Vector
 
-LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 # The axis about which each joint must turn.
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
@@ -77,25 +76,6 @@ def leg_geometry(robot: Robot, side: str) -> LegGeometry:
         )
     hip = tuple(a + b for a, b in zip(yaw.origin_m, roll.origin_m, strict=True))
     return LegGeometry(hip, -knee.origin_m[2], -ankle.origin_m[2], foot.ankle_height_m)  # type: ignore[arg-type]
-
-
-def hip_variables(robot: Robot) -> tuple[Variable, ...]:
-    """Hip height and velocities at both ends of a phase: the first variables of every phase (section 4).
-
-    The bounds of the height follow from the left leg's lengths, those of the velocities are the paper's for any robot.
-    """
-    leg = leg_geometry(robot, "L")
-    stretched, ground = leg.thigh_m + leg.tibia_m, leg.ankle_height_m - leg.hip_m[2]
-    low, high = (round(ground + share * stretched, 3) for share in (LEAST_HEIGHT_SHARE, GREATEST_HEIGHT_SHARE))
-    return (
-        Variable(name="hip_height_m", unit="m", lower=low, upper=high, description="x1, torso origin at both ends"),
-        Variable(name="hip_vz_start_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x2, vertical velocity"),
-        Variable(name="hip_vz_end_m_s", unit="m/s", lower=-0.05, upper=0.05, description="x3"),
-        Variable(name="hip_vx_start_m_s", unit="m/s", lower=0.001, upper=0.2, description="x4, sagittal velocity"),
-        Variable(name="hip_vx_end_m_s", unit="m/s", lower=0.001, upper=0.2, description="x5"),
-        Variable(name="hip_vy_start_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x6, lateral velocity"),
-        Variable(name="hip_vy_end_m_s", unit="m/s", lower=-0.2, upper=0.2, description="x7"),
-    )
 
 
 def check_step_length(step_length_m: float) -> None:

@@ -9,14 +9,13 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.formulation import Point
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
 from nlp_gait.gaits.biped.motors import Motors
-from nlp_gait.gaits.biped.parts import Contribution, Part, rows
 from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.gaits.nao.body import JOINTS
+from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-SHARED = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
 # Ankle pitch, least and greatest roll of the left ankle [rad]; straight lines between. The right ankle mirrors it.
 # Source: public MATLAB tables "Nao Parameters v4.0" (there stored under the other side's name; the greatest range is that of
 # the left joint).
@@ -31,18 +30,17 @@ ANKLE_ROLL = (
 )
 
 
-def nao_motors(text: str, robot: Robot) -> Motors:
-    """What of NAO's motors an option's text takes into account."""
-    return Motors.parsed(text, robot, JOINTS, SHARED, AnkleCoupling())
+def parse_nao_motors(text: str, robot: Robot) -> Motors:
+    """Return the features of NAO's motors that an option's text lists."""
+    return Motors.parse(text, robot, JOINTS, YAW_PITCHES, AnkleCoupling())
 
 
-class AnkleCoupling(Part):
+class AnkleCoupling(Limit):
     """Roll of both ankles within the lines over their pitch."""
 
     reads_motion = True
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with one bound each."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         angles: Mapping[str, MX] = dict(zip(samples.moving, ca.vertsplit(samples.q), strict=True))
         names = [str(k) for k in range(samples.steps + 1)]
         found = []
@@ -53,11 +51,11 @@ class AnkleCoupling(Part):
                 rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
                 rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
             ]
-        return Contribution(rows=tuple(found))
+        return found, {}
 
 
 def ankle_roll(pitch: MX, column: int) -> MX:
-    """Least (column 1) or greatest (2) roll of the left ankle over its pitch [rad], constant beyond the table."""
+    """Return the least (column 1) or greatest (2) roll of the left ankle over its pitch [rad], constant beyond the table."""
     corners = np.array(ANKLE_ROLL)
     slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
     turns = np.diff(np.concatenate([[0.0], slopes, [0.0]]))

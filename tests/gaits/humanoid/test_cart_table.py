@@ -8,9 +8,10 @@ import pytest
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, finely_sampled, load
-from nlp_gait.gaits.biped.cart_table.walker import Body, Footsteps, cart_table_walk
-from nlp_gait.gaits.humanoid.body import GRAVITY, humanoid
-from nlp_gait.gaits.humanoid.cart_table import humanoid_on_a_table
+from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
+from nlp_gait.gaits.humanoid.body import GRAVITY
+from nlp_gait.gaits.humanoid.problems import humanoid_cycles
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.robots.crooked import SOLE_AHEAD_M, crooked
 
@@ -29,13 +30,13 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="module")
-def body(path: str) -> Body:
-    return humanoid_on_a_table(path, intervals=4)
+def cycles(path: str) -> RecordedCycles:
+    return humanoid_cycles(path, intervals=4)
 
 
 @pytest.fixture(scope="module")
-def walk(body: Body) -> Result:
-    return cart_table_walk(body, STEPS)
+def walk(cycles: RecordedCycles) -> Result:
+    return cart_table_walk(cycles, STEPS)
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +44,14 @@ def signals(walk: Result) -> Signals:
     return finely_sampled(walk)
 
 
-def test_the_cycle_is_one_step_at_a_constant_height_and_goes_on_mirrored(walk: Result, signals: Signals) -> None:
+def test_the_cycle_is_one_step_at_a_constant_height_and_continues_mirrored(
+    cycles: RecordedCycles, walk: Result, signals: Signals
+) -> None:
     hip, robot = signals.arrays["hip"], walk.problem.display.simulation_model.robot  # type: ignore[union-attr]
     assert walk.x == pytest.approx((0.8, 0.6, 0.1), abs=1e-12) and walk.problem.display.simulation_model.repeats  # type: ignore[union-attr]
     assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.1, 0, 0), abs=1e-9)
     # The middle of both hips is where the file has it below the root.
-    middle = humanoid(walk.problem.options["robot"]).middle_m[2]  # type: ignore[arg-type]
+    middle = cycles.body.hip_m[2]
     assert hip[:, 2] + middle == pytest.approx(STEPS.hip_height_m, abs=1e-6)
     right = signals.arrays["right_foot"]
     assert right[:, 2].max() == pytest.approx(STEPS.lift_m, abs=1e-5)
@@ -95,7 +98,7 @@ def test_the_whole_bodys_zmp_is_the_planned_one(walk: Result, signals: Signals) 
 
 
 @pytest.mark.slow
-def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, body: Body) -> None:
+def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, cycles: RecordedCycles) -> None:
     """Its torso leans; a spline through samples 10 ms apart is this near to a cubic hip."""
     problem = load("humanoid-cycle", robot=path, intervals=4)
     x = 0.5 * (problem.lower + problem.upper)
@@ -104,7 +107,7 @@ def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, body: Bo
     finer = problem.dense(20)
     assert finer is not None
     dense = finer.signals(x)
-    back = body.judged(STEPS, dense.arrays["t"], dense.arrays["q"])
+    back = cycles.judge(dense.arrays["t"], dense.arrays["q"], STEPS.single_s)
     own, before = (build_exact_model(r.problem).at(r.x, r.problem.p) for r in (back, Result(problem=problem, x=x)))
     for index, value in before.indexes.items():
         assert own.indexes[index] == pytest.approx(value, rel=2e-3, abs=1e-4), index
@@ -122,6 +125,6 @@ def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, body: Bo
         (0.08, "at .* the right leg misses its foot; choose another height of the hip"),
     ],
 )
-def test_a_hip_that_reaches_no_step_is_refused(body: Body, height_m: float, message: str) -> None:
+def test_a_hip_that_reaches_no_step_is_refused(cycles: RecordedCycles, height_m: float, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        cart_table_walk(body, Footsteps(**{**vars(STEPS), "hip_height_m": height_m}))
+        cart_table_walk(cycles, Footsteps(**{**vars(STEPS), "hip_height_m": height_m}))

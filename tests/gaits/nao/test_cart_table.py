@@ -8,10 +8,10 @@ from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, finely_sampled
-from nlp_gait.gaits.biped.cart_table.preview_control import JERK_WEIGHT, PreviewController
-from nlp_gait.gaits.biped.cart_table.walker import Footsteps, Walker, cart_table_walk
-from nlp_gait.gaits.nao.body import GRAVITY, nao
-from nlp_gait.gaits.nao.cycle.cart_table import nao_on_a_table
+from nlp_gait.gaits.biped.cart_table import Footsteps, Walker, cart_table_walk
+from nlp_gait.gaits.biped.preview_control import JERK_WEIGHT, PreviewController
+from nlp_gait.gaits.nao.body import GRAVITY, load_nao
+from nlp_gait.gaits.nao.recorded import nao_cycles
 
 STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3, lift_m=0.015)
 
@@ -21,7 +21,7 @@ def histories(gait: Result) -> dict[str, Array]:
 
 
 def walker() -> Walker:
-    return Walker(body=nao_on_a_table(), footsteps=STEPS)
+    return Walker(cycles=nao_cycles(), footsteps=STEPS)
 
 
 def test_preview_control_is_the_least_squares_optimum() -> None:
@@ -58,7 +58,7 @@ def test_a_course_is_exact_between_its_samples() -> None:
 def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_image() -> None:
     first, last = walker().planned_zmp(np.array([0.0, STEPS.period_s])).T
     assert last == pytest.approx(first * (1, -1) + (STEPS.step_m, 0), abs=1e-12)
-    robot = nao("nao-v5", rotational_inertia=True)
+    robot = load_nao("nao-v5")
     foot, ankle = robot.feet["left"], robot.joint("LHipYawPitch").origin_m[1]
     assert -foot.back_m < first[0] < foot.front_m
     assert first[1] - ankle == pytest.approx(foot.left_m - (first[1] - ankle) - foot.right_m, abs=1e-12)
@@ -69,7 +69,7 @@ def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_
 @pytest.fixture(scope="module")
 def walks() -> dict[int, Result]:
     """The same footsteps with the cart alone, and with the whole body's ZMP."""
-    return {passes: cart_table_walk(nao_on_a_table(), STEPS, passes=passes) for passes in (1, 2)}
+    return {passes: cart_table_walk(nao_cycles(), STEPS, passes=passes) for passes in (1, 2)}
 
 
 @pytest.mark.slow
@@ -94,9 +94,9 @@ def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Result]) ->
 
 @pytest.mark.slow
 def test_another_robot_walks_on_its_own_legs() -> None:
-    gait = cart_table_walk(nao_on_a_table("nao-v6", 2), STEPS, passes=1)
+    gait = cart_table_walk(nao_cycles("nao-v6", 2), STEPS, passes=1)
     assert gait.problem.options["robot"] == "nao-v6" and gait.problem.display.robot is not None
-    assert gait.problem.display.robot.name == nao("nao-v6", rotational_inertia=True).name
+    assert gait.problem.display.robot.name == load_nao("nao-v6").name
 
 
 @pytest.mark.parametrize(
@@ -113,4 +113,4 @@ def test_another_robot_walks_on_its_own_legs() -> None:
 )
 def test_footsteps_that_are_no_walk_are_refused(change: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        cart_table_walk(nao_on_a_table(), Footsteps(**{**vars(STEPS), **change}))
+        cart_table_walk(nao_cycles(), Footsteps(**{**vars(STEPS), **change}))

@@ -7,12 +7,10 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.biped.double_support import LOAD_DEGREE
+from nlp_gait.gaits.biped.cycle import walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.nao.body import GRAVITY, nao
-from nlp_gait.gaits.nao.cycle.problem import walking_cycle
-from nlp_gait.gaits.nao.double_support import standing
-from nlp_gait.gaits.nao.motors import nao_motors
+from nlp_gait.gaits.biped.load_sharing import share_load
+from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
@@ -75,10 +73,10 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     """Single and double support, both with their samples at the switch."""
-    real = nao_motors("", nao("nao-v5", rotational_inertia=True))
-    sharing = standing(real.model).sharing(problem.options["torso_share"], LOAD_DEGREE)  # type: ignore[arg-type]
+    body = make_nao("nao-v5")
+    sharing = share_load(body, problem.options["torso_share"])  # type: ignore[arg-type]
     assert problem.grid is not None
-    cycle = walking_cycle(real, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
+    cycle = walking_cycle(body, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

@@ -11,7 +11,7 @@ import pytest
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY
-from nlp_gait.gaits.nao.closed_chain import check_yaw_pitches
+from nlp_gait.gaits.nao.leaning_torso import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated

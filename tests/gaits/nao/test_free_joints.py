@@ -10,7 +10,7 @@ import pytest
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.nao.body import GRAVITY
-from nlp_gait.gaits.nao.single_support_free import fitted_start
+from nlp_gait.gaits.nao.free_joints import fit_joints
 from nlp_gait.robots import load_robot
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
@@ -89,7 +89,7 @@ def test_the_ends_are_the_papers() -> None:
 @pytest.mark.slow
 def test_a_planned_motion_is_a_free_one_nearly() -> None:
     planned, free = load("nao-ssp"), problem_of("spline-8")
-    x = fitted_start("spline-8", planned, np.array(PAPER))
+    x = fit_joints("spline-8", planned, np.array(PAPER))
     power, expected = (evaluated(p, v).cost for p, v in ((free, x), (planned, PAPER)))
     assert power == pytest.approx(expected, rel=FIT_SHARE)
     started = free.start_point(np.random.default_rng(0))

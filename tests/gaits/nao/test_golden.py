@@ -15,7 +15,7 @@ from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
-from nlp_gait.gaits.biped.double_support import TorsoShare, torso_shares
+from nlp_gait.gaits.biped.load_sharing import TorsoShare, torso_shares
 from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))

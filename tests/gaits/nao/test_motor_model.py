@@ -13,11 +13,11 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, Constraint
+from nlp_gait.gaits.biped.limits import Limit
 from nlp_gait.gaits.biped.motors import SUPPLY, Motors
-from nlp_gait.gaits.biped.parts import Part
 from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.gaits.nao.body import JOINTS
-from nlp_gait.gaits.nao.motors import ANKLE_ROLL, SHARED, nao_motors
+from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES
+from nlp_gait.gaits.nao.motors import ANKLE_ROLL, parse_nao_motors
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -65,14 +65,14 @@ def ratings(name: str) -> Array:
     return np.array([getattr(ROBOT.joint(joint).motor, name) for joint in MOTORS])
 
 
-def contributed(part: Part) -> dict[str, Constraint]:
-    return {row.name: row for row in part.contribute(AT, SAMPLES, Exact()).rows}  # type: ignore[arg-type]
+def rows_of(limit: Limit) -> dict[str, Constraint]:
+    return {row.name: row for row in limit.add(AT, SAMPLES, Exact())[0]}  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("heat", ["", "heat"])
 @pytest.mark.parametrize("braking", ["", "free-braking", "regeneration"])
 def test_power(braking: str, heat: str) -> None:
-    draw = nao_motors(f" {braking} ,{heat}, limits", ROBOT).draw
+    draw = parse_nao_motors(f" {braking} ,{heat}, limits", ROBOT).draw
     if not braking and not heat:
         assert draw is None  # the paper's way
         return
@@ -86,10 +86,10 @@ def test_power(braking: str, heat: str) -> None:
 
 
 def test_limits() -> None:
-    (part,) = nao_motors("limits, rotor", ROBOT).parts
-    assert part.reads_motion and part.parameters == (SUPPLY,)
+    (limit,) = parse_nao_motors("limits, rotor", ROBOT).limits
+    assert limit.reads_motion and limit.parameters == (SUPPLY,)
     assert (SUPPLY.default, SUPPLY.minimum, SUPPLY.maximum) == (1.0, 0.05, 2.0)
-    found = contributed(part)
+    found = rows_of(limit)
     assert list(found) == ["joint_speed", "torque_forwards", "torque_backwards", "continuous_torque"]
     instants = [str(k) for k in range(COUNT)]
     for name, joints, unit in (("joint_speed", MOVING, "rad/s"), ("torque_forwards", MOTORS, "Nm")):
@@ -118,9 +118,9 @@ def test_limits() -> None:
 
 
 def test_ankles() -> None:
-    (part,) = nao_motors("ankle", ROBOT).parts
-    assert part.reads_motion
-    found, corners = contributed(part), np.array(ANKLE_ROLL)
+    (limit,) = parse_nao_motors("ankle", ROBOT).limits
+    assert limit.reads_motion
+    found, corners = rows_of(limit), np.array(ANKLE_ROLL)
     assert len(found) == 4
     for side, sign, least, greatest in (("L", 1.0, 1, 2), ("R", -1.0, 2, 1)):
         pitch, roll = (Q[MOVING.index(f"{side}Ankle{axis}")] for axis in ("Pitch", "Roll"))
@@ -143,31 +143,31 @@ def test_the_ankles_table_is_round_in_degrees() -> None:
 
 
 def test_features() -> None:
-    both = nao_motors("ankle, limits", ROBOT)
-    assert both.features == ("ankle", "limits") and len(both.parts) == 2
-    none = nao_motors("", ROBOT)
-    assert none.features == () and none.parts == () and none.draw is None and none.model is ROBOT
-    heavy = nao_motors("rotor", ROBOT)
-    assert heavy.parts == () and heavy.draw is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
+    both = parse_nao_motors("ankle, limits", ROBOT)
+    assert both.features == ("ankle", "limits") and len(both.limits) == 2
+    none = parse_nao_motors("", ROBOT)
+    assert none.features == () and none.limits == () and none.draw is None and none.model is ROBOT
+    heavy = parse_nao_motors("rotor", ROBOT)
+    assert heavy.limits == () and heavy.draw is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
-        Motors.parsed("ankle", ROBOT, JOINTS)
+        Motors.parse("ankle", ROBOT, JOINTS)
     with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
-        nao_motors("ankles", ROBOT)
+        parse_nao_motors("ankles", ROBOT)
     with pytest.raises(InputError, match="either draws nothing"):
-        nao_motors("regeneration, free-braking", ROBOT)
+        parse_nao_motors("regeneration, free-braking", ROBOT)
 
 
 def test_joints_that_share_a_motor() -> None:
     torque: Any = MX(DM(TORQUE))
-    assert Motors.parsed("heat", ROBOT, JOINTS).by_motor(torque) is torque
-    shared = np.array(ca.evalf(Motors.parsed("heat", ROBOT, JOINTS, SHARED).by_motor(torque)))
+    assert Motors.parse("heat", ROBOT, JOINTS).by_motor(torque) is torque
+    shared = np.array(ca.evalf(Motors.parse("heat", ROBOT, JOINTS, YAW_PITCHES).by_motor(torque)))
     np.testing.assert_allclose(np.delete(shared, JOINTS.index("RHipYawPitch"), axis=0), at_motors(), rtol=1e-15)
     assert not shared[JOINTS.index("RHipYawPitch")].any()
     inertia = {
         name: motors.model.armatures_kgm2["LHipYawPitch"]
         for name, motors in (
-            ("one each", Motors.parsed("rotor", ROBOT, JOINTS)),
-            ("one for two", nao_motors("rotor", ROBOT)),
+            ("one each", Motors.parse("rotor", ROBOT, JOINTS)),
+            ("one for two", parse_nao_motors("rotor", ROBOT)),
         )
     }
     assert inertia["one each"] == 2 * inertia["one for two"] > 0.0
@@ -176,6 +176,6 @@ def test_joints_that_share_a_motor() -> None:
 def test_a_robot_without_motors_is_refused() -> None:
     knee = ROBOT.joint("LKneePitch")
     bare = replace(ROBOT, joints={**ROBOT.joints, "LKneePitch": replace(knee, motor=None)})
-    assert nao_motors("", bare).model is bare and nao_motors("ankle", ROBOT).model is ROBOT
+    assert parse_nao_motors("", bare).model is bare and parse_nao_motors("ankle", ROBOT).model is ROBOT
     with pytest.raises(InputError, match="'LKneePitch' has no motor data"):
-        nao_motors("limits", bare)
+        parse_nao_motors("limits", bare)

@@ -14,12 +14,10 @@ from scipy.optimize import linprog
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.biped.foot_loads import RAMP_SHARE, load_basis
+from nlp_gait.gaits.biped.cycle import walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.nao.body import GRAVITY, nao
-from nlp_gait.gaits.nao.cycle.problem import walking_cycle
-from nlp_gait.gaits.nao.double_support import standing
-from nlp_gait.gaits.nao.motors import nao_motors
+from nlp_gait.gaits.biped.load_sharing import RAMP_SHARE, load_basis, share_load
+from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.balance import sole_limits
 from tests.backends.toys import row_violations
@@ -66,9 +64,9 @@ def double_support(name: str, x: Array) -> Signals:
     problem = problem_of(name)
     if name != "nao-cycle":
         return problem.signals(x)
-    real = nao_motors("", nao("nao-v5", rotational_inertia=True))
+    body = make_nao("nao-v5")
     assert problem.grid is not None
-    cycle = walking_cycle(real, standing(real.model).sharing("free", 4), problem.grid, Goal(), at_given_speed=True)
+    cycle = walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
     return cycle.signals(problem.at(x))["dsp"]
 
 

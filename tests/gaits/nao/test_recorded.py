@@ -15,9 +15,10 @@ from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.motion.signals import JointAngles
-from nlp_gait.gaits.biped.recorded.motion import RecordedGait
-from nlp_gait.gaits.nao.body import GRAVITY, JOINTS
-from nlp_gait.gaits.nao.recorded.problem import make_recorded_gait
+from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
+from nlp_gait.gaits.nao.body import GRAVITY
+from nlp_gait.gaits.nao.joints import JOINTS
+from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.mirror import mirror_sign, partner
 from tests.pinocchio_oracle import floating_model, stand

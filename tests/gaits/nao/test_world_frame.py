@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.nao.body import ARM_JOINTS, nao, upright_plan
+from nlp_gait.gaits.nao.body import load_nao, upright_plan
+from nlp_gait.gaits.nao.joints import ARM_JOINTS
 from nlp_gait.gaits.nao.least_power.world_frame import leg_rates, world_frame_dynamics
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
@@ -30,7 +31,7 @@ def moving(name: str, size: int) -> Motion:
 @pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
 @pytest.mark.parametrize("share", [1.0, 0.3])
 def test_torques_and_wrench_are_the_recursions(robot: str, share: float) -> None:
-    model = nao(robot, rotational_inertia=True)
+    model = load_nao(robot)
     hip, swing = moving("hip", 3), moving("swing", 3)
     stance = Motion(SX.sym("stance", 3), SX(3, 1), SX(3, 1))
     arms = {f"{side}{name}": moving(f"{side}{name}", 1) for side in "LR" for name in ARM_JOINTS}

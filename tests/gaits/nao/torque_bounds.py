@@ -17,19 +17,11 @@ import nlp_gait
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.gaits.biped.curves import hip_motion
-from nlp_gait.gaits.biped.single_support import swing_foot
-from nlp_gait.gaits.nao.body import (
-    ARM_JOINTS,
-    GRAVITY,
-    JOINTS,
-    arm_joints,
-    nao,
-    upright_links,
-    upright_plan,
-)
+from nlp_gait.gaits.biped.single_support import stance_of, swing_foot
+from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, make_nao, upright_links, upright_plan
+from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright, world_frame_dynamics
-from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
-from nlp_gait.gaits.nao.single_support import ARM_SWING, stance_of
+from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
@@ -86,8 +78,9 @@ def enclose_sample(edge: float) -> tuple[Errors, Errors]:
 
 
 def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
-    robot = nao("nao-v5", rotational_inertia=True)
-    stance, foot, tree = stance_of(robot, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
+    body = make_nao("nao-v5")
+    robot = body.robot
+    stance, foot, tree = stance_of(body, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
     z = SX.sym("z", len(names))
     time, phase = z[-1], SX(PHASE)
     sums = [part / time for k in (1, 3, 5) for part in (z[k] + z[k + 1], z[k] - z[k + 1])]
@@ -103,7 +96,7 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     path = (SX(end) for end in stance.swing_x)
     swing = swing_foot(*path, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], time, phase)
     ankles = {"L": resting_point((*stance.support_xy, foot.ankle_height_m)), "R": swing}
-    arms = arm_joints(ARM_SWING, time, phase)
+    arms = arm_joints(ARM_SWING["ssp"], time, phase)
     if in_world:
         frames = upright_frames(robot, hip, ankles, arms, 1 - REACH_MARGIN)
         torques, wrench = world_frame_dynamics(tree, frames, {}, GRAVITY)

@@ -17,7 +17,7 @@ from casadi import SX
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.gaits.biped.parts import SCALES
+from nlp_gait.gaits.biped.limits import SCALES
 from nlp_gait.gaits.nao.least_power.power_instants import PAIRS, PowerInstant, PowerPhase
 from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot

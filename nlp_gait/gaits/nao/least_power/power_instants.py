@@ -13,9 +13,11 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.biped.double_support import Division, Point2, support_box, torso_shares
+from nlp_gait.gaits.biped.double_support import Point2, support_box
+from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
 from nlp_gait.gaits.biped.single_support import swing_foot
-from nlp_gait.gaits.nao.body import ARM_JOINTS, GRAVITY, arm_joints
+from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
+from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS
 from nlp_gait.gaits.nao.least_power.world_frame import (
     SplitWrench,
     chain_frames,
@@ -25,7 +27,7 @@ from nlp_gait.gaits.nao.least_power.world_frame import (
     upright,
     world_frame_dynamics,
 )
-from nlp_gait.gaits.nao.legs import LEG_JOINTS, leg_geometry
+from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import ground_load
@@ -83,7 +85,7 @@ def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
 
 
 def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
-    """Return the distance to the side beyond the ankle, see ``single_support.single_support_margins``."""
+    """Return the distance to the side beyond the ankle, see ``NaoBody.sole_margins``."""
     return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
 
 
@@ -93,7 +95,7 @@ def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
     return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
 
 
-def double_support_phase(
+def double_support_instants(
     robot: Robot,
     soles: Mapping[str, Point2],
     hip_ends: tuple[Point2, Point2],
@@ -138,7 +140,7 @@ def double_support_phase(
     return PowerPhase(instant, sides, {axis: _nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)})
 
 
-def single_support_phase(
+def single_support_instants(
     robot: Robot,
     support_xy: Point2,
     swing_x: Point2,

@@ -10,7 +10,7 @@ Source:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,12 +20,14 @@ from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, finely_sampled
-from nlp_gait.gaits.biped.cart_table.preview_control import PREVIEW_S, PreviewController
-from nlp_gait.gaits.biped.instant import BOTH_FEET, PlannedInstant
-from nlp_gait.gaits.biped.parts import CLOSURE_M
+from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.limits import CLOSURE_M
+from nlp_gait.gaits.biped.preview_control import PREVIEW_S, PreviewController
+from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
+from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.biped.single_support import swing_foot
-from nlp_gait.robots import Foot
-from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
+from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
+from nlp_gait.symbolic.trajectories import Motion
 
 SAMPLE_S = 0.005  # as in the source
 SETTLING_S = 10.0  # after which the walk repeats
@@ -62,39 +64,21 @@ class Footsteps:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Body:
-    """What the textbook knows of a robot.
-
-    Attributes:
-        feet: ``"left"`` and ``"right"``.
-        ankles: origins of the feet's links by side ``"L"``, ``"R"``, on the ground: across, and above it [m].
-        joints: of the legs.
-        legs: their angles under an upright torso, from the motions of the hip and of both ankles by side.
-        hip_m: (3,) hip from the torso's origin [m].
-        gravity: [m/s^2].
-        judged: the cycle of footsteps whose legs have angles (T, J) at times (T,), judged as a planned one [s, rad].
-    """
-
-    feet: Mapping[str, Foot]
-    ankles: Mapping[str, tuple[float, float]]
-    joints: tuple[str, ...]
-    legs: Callable[[Motion, Mapping[str, Motion]], PlannedInstant]
-    hip_m: Sequence[float]
-    gravity: float
-    judged: Callable[[Footsteps, Array, Array], Result]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Walker:
     """A robot that walks by footsteps: from the hip's path over the floor to its joints.
 
     Attributes:
-        body: the robot.
-        footsteps: where and when.
+        cycles: the robot, and the limits by which its cycles are judged.
+        footsteps: places and times.
     """
 
-    body: Body
+    cycles: RecordedCycles
     footsteps: Footsteps
+
+    @property
+    def body(self) -> Body:
+        """The robot."""
+        return self.cycles.body
 
     @property
     def sample_s(self) -> float:
@@ -125,7 +109,7 @@ class Walker:
 
         return zmp
 
-    def followed(
+    def follow(
         self, zmp: Callable[[Array], Array], height_m: float, *, advances: bool = True
     ) -> Callable[[Array], Array]:
         """Path (2, k) of the cart's mass in the cycle whose ZMP follows one that repeats, mirrored from step to step [m].
@@ -170,31 +154,31 @@ class Walker:
                     f"a hip {steps.hip_height_m:g} m high reaches no step of {steps.step_m:g} m: at {t[worst]:.3f} s the "
                     f"{('left', 'right')[leg]} {what}; {remedy}"
                 )
-        return self.body.judged(steps, t, angles)
+        return self.cycles.judge(t, angles, steps.single_s)
 
     @cached_property
     def _legs(self) -> ca.Function:
         """From the share of single support and the hip (3,) to the legs' angles, the cosines of both knees, and their misses."""
         share, hip, still = SX.sym("share"), SX.sym("hip", 3), SX(3, 1)
-        (left_y, left_z), (right_y, right_z) = self.body.ankles["L"], self.body.ankles["R"]
+        right_y, right_z = self.body.ankle("R")
         step = SX(self.footsteps.step_m)
         swing = swing_foot(-step, step, right_y, right_z, SX(self.footsteps.lift_m), SX(self.footsteps.single_s), share)
-        feet = {"L": stack(*map(constant_motion, (0.0, left_y, left_z))), "R": swing}
-        plan = self.body.legs(Motion(hip, still, still), feet)
+        ankles = {"L": self.body.standing_ankle("L"), "R": swing}
+        plan = self.body.plan(Motion(hip, still, still), {}, ankles, SX(LEAST_REACH_MARGIN), Exact())
         angles = ca.vertcat(*(plan.joints[name].position for name in self.body.joints))
         return ca.Function("legs", [share, hip], [angles, plan.reach, plan.miss])
 
     def _middle(self, side: str) -> tuple[float, float]:
         """Of the sole whose ankle stands at x = 0 [m]."""
-        foot = self.body.feet[BOTH_FEET[side]]
-        return (foot.front_m - foot.back_m) / 2, self.body.ankles[side][0] + (foot.left_m - foot.right_m) / 2
+        foot, (y, _) = self.body.robot.feet[BOTH_FEET[side]], self.body.ankle(side)
+        return (foot.front_m - foot.back_m) / 2, y + (foot.left_m - foot.right_m) / 2
 
 
-def cart_table_walk(body: Body, footsteps: Footsteps, *, passes: int = 2) -> Result:
-    """A walking cycle from footsteps alone.
+def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int = 2) -> Result:
+    """Plan a walking cycle from footsteps alone.
 
     Args:
-        body: the robot.
+        cycles: the robot, and the limits by which its cycles are judged.
         footsteps: with the hip's height.
         passes: 1 takes the robot for a cart; every further one moves the hip by what a cart needs to undo the distance of the
             whole body's ZMP from the planned one. The source has two.
@@ -204,14 +188,14 @@ def cart_table_walk(body: Body, footsteps: Footsteps, *, passes: int = 2) -> Res
     """
     if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
         raise InputError(f"passes must be a whole number >= 1, got {passes!r}")
-    walker = Walker(body=body, footsteps=footsteps)
+    walker = Walker(cycles=cycles, footsteps=footsteps)
     planned = walker.planned_zmp
     # The robot whose hip is the cart says where its mass is; the cart is then moved there.
-    hip = walker.followed(planned, footsteps.hip_height_m)
+    hip = walker.follow(planned, footsteps.hip_height_m)
     first = finely_sampled(walker.gait(hip)).arrays
-    mass = (first["com"] - first["hip"]).mean(axis=0) - np.array(body.hip_m)
+    mass = (first["com"] - first["hip"]).mean(axis=0) - np.array(cycles.body.hip_m)
     ahead, _, height = mass + (0.0, 0.0, footsteps.hip_height_m)
-    cart = walker.followed(planned, height)
+    cart = walker.follow(planned, height)
     corrections: list[Callable[[Array], Array]] = []
 
     def path(t: Array) -> Array:
@@ -225,6 +209,6 @@ def cart_table_walk(body: Body, footsteps: Footsteps, *, passes: int = 2) -> Res
             zmp = np.stack([np.interp(t, played["t"], played["zmp"][:, k]) for k in range(2)])
             return planned(t) - zmp
 
-        corrections.append(walker.followed(missed, height, advances=False))
+        corrections.append(walker.follow(missed, height, advances=False))
         gait = walker.gait(path)
     return gait

@@ -1,12 +1,12 @@
-"""Parts of a gait: each adds the rows, the parameters and the indexes of one concern."""
+"""Limits of a phase: each adds the rows, the parameters and the indexes of one concern."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -19,33 +19,29 @@ from nlp_gait.gaits.biped.samples import Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-# Violations that count alike in the total, by unit: 10 mm of a margin or a height counts like 1 rad, and like a change of a
+# Violations that count alike in the total, by unit: 10 mm of a margin or a height count like 1 rad, and like a change of a
 # foot's load that is too fast by a weight in 0.1 s.
 SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0}
 REACH_MARGIN = "reach_margin"
 TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
-CLOSURE_M = 1e-9  # that a leg may miss its foot by: far below what matters, far above rounding
+LEGS = ("left leg", "right leg")
+CLOSURE_M = 1e-9  # by which a leg may miss its foot: far below what matters, far above rounding
 
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
 Margins = Callable[[MX, Point, Nonsmooth], tuple[MX, MX]]
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contribution:
-    """What a part adds to an assembly."""
-
-    rows: tuple[Constraint, ...] = ()
-    indexes: Mapping[str, MX] = field(default_factory=dict)
+# What a limit adds: rows, and performance indexes by name.
+RowsAndIndexes: TypeAlias = tuple[Sequence[Constraint], Mapping[str, MX]]
 
 
-class Part(ABC):
-    """One concern of a gait; a part overrides what it has.
+class Limit(ABC):
+    """What limits a phase; a subclass overrides what it needs.
 
     Attributes:
-        parameters: its limits.
+        parameters: of the limit, which can be changed without rebuilding.
         reads_motion: whether it reads angles and their derivatives.
         reads_wrenches: whether it reads those of the ground on the soles.
-        traces: what else it reads of each instant, by name.
+        traces: other quantities that it reads at each instant, by name.
     """
 
     parameters: tuple[Parameter, ...] = ()
@@ -54,8 +50,8 @@ class Part(ABC):
     traces: Mapping[str, Trace] = MappingProxyType({})
 
     @abstractmethod
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows and indexes at a point."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        """Return the rows at a point, and performance indexes by name."""
 
 
 def rows(
@@ -68,7 +64,7 @@ def rows(
     over: Over | None = None,
     size: float = 1.0,
 ) -> Constraint:
-    """Rows of a part, in which a violation counts as every other in its unit; ``size`` is that of the robot next to NAO's."""
+    """Make rows with the scale of their unit; ``size`` is that of the robot's quantity relative to NAO's."""
     return Constraint(
         name=name,
         labels=tuple(labels),
@@ -81,7 +77,32 @@ def rows(
     )
 
 
-class JointLimits(Part):
+def rows_at_samples(
+    name: str,
+    unit: str,
+    values: MX,
+    names: Sequence[str],
+    lower: MX | None,
+    upper: MX | None = None,
+    *,
+    first: int = 0,
+) -> Constraint:
+    """Make rows of every instant from a matrix with a column for each sample.
+
+    Args:
+        name: of the rows.
+        unit: of the values.
+        values: (k, n).
+        names: (k,) of the matrix's rows.
+        lower: scalar or (k n, 1).
+        upper: likewise.
+        first: number of the first sample.
+    """
+    numbers = range(first, first + values.shape[1])
+    return rows(name, unit, ca.vec(values), lower, upper, labels(names, numbers), "instant")
+
+
+class JointLimits(Limit):
     """Planned angles within the robot's limits, which are parameters (sections 4.1 and 4.2)."""
 
     def __init__(self, robot: Robot, planned: tuple[str, ...]) -> None:
@@ -97,53 +118,41 @@ class JointLimits(Part):
             for side, end in enumerate(("lower", "upper"))
         )
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Two-sided rows."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
-        limits = {end: ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper")}
-        lower, upper = (ca.repmat(limit, n, 1) for limit in limits.values())
-        names = labels(self._planned, range(n))
-        return Contribution(rows=(rows("joint_angle", "rad", ca.vec(samples.planned), lower, upper, names, "instant"),))
+        limits = (ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper"))
+        lower, upper = (ca.repmat(limit, n, 1) for limit in limits)
+        return [rows_at_samples("joint_angle", "rad", samples.planned, self._planned, lower, upper)], {}
 
 
-class Reach(Part):
-    """Knees neither straight nor folded beyond reach: the cosine that gives a knee's angle, off +-1 by a margin."""
+class Reach(Limit):
+    """Knees neither straight nor folded: the cosine of a knee's angle stays off +-1 by a margin."""
 
     parameters = table(
         (REACH_MARGIN, "1", 0.01, "distance of a knee's cosine from +-1: 0.01 keeps it bent by 0.14 rad", 0.0, 0.5)
     )
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Two-sided rows."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         limit = 1 - at[REACH_MARGIN]
-        names = labels(("left leg", "right leg"), range(samples.steps + 1))
-        return Contribution(rows=(rows("reach", "1", ca.vec(samples.reach), -limit, limit, names, "instant"),))
+        return [rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
 
 
-class Closure(Part):
-    """Legs end at their feet, where their angles come from Newton's method; a solver has these equations as its own.
+class Closure(Limit):
+    """Legs that end at their feet where Newton's method computes their angles; gradient solvers have equations instead."""
 
-    Args:
-        legs: names, as in the rows of ``Samples.miss``.
-    """
-
-    def __init__(self, legs: Sequence[str]) -> None:
-        self._legs = tuple(legs)
-
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with an upper bound; a solver, which must have the same rows in the same places, sees them far below it."""
-        columns = samples.steps + 1
-        miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(self._legs) * columns)
-        names = labels(self._legs, range(columns))
-        return Contribution(rows=(rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant"),))
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        # A gradient solver needs the same rows in the same places: there they are far below their bound.
+        miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(LEGS) * (samples.steps + 1))
+        names = labels(LEGS, range(samples.steps + 1))
+        return [rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant")], {}
 
 
-class DriveLimits(Part):
-    """What a robot's file says that its joints can give: torque and speed, either sign.
+class DriveLimits(Limit):
+    """Torque and speed of every joint within the limits of the robot's file, in both directions.
 
     Args:
-        robot: whose joints they are.
-        size: of its torques next to NAO's.
+        robot: with these limits.
+        size: of its torques relative to NAO's.
     """
 
     reads_motion = True
@@ -151,39 +160,27 @@ class DriveLimits(Part):
     def __init__(self, robot: Robot, size: float) -> None:
         self._robot, self._size = robot, size
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Two-sided rows, and the largest shares of both limits."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
         effort = DM([self._robot.joint(joint).torque_limit_Nm for joint in samples.joints])
         speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in samples.moving])
         strongest, fastest = (MX(ca.repmat(limit, n, 1)) for limit in (effort, speed))
         torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
-        return Contribution(
-            rows=(
-                rows(
-                    "effort",
-                    "Nm",
-                    torque,
-                    -strongest,
-                    strongest,
-                    labels(samples.joints, range(n)),
-                    "instant",
-                    self._size,
-                ),
-                rows("joint_speed", "rad/s", rate, -fastest, fastest, labels(samples.moving, range(n)), "instant"),
-            ),
-            indexes={
-                "effort_share": ca.mmax(ca.fabs(torque) / strongest),
-                "speed_share": ca.mmax(ca.fabs(rate) / fastest),
-            },
-        )
+        joints, moving = (labels(names, range(n)) for names in (samples.joints, samples.moving))
+        return (
+            rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
+            rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
+        ), {
+            "effort_share": ca.mmax(ca.fabs(torque) / strongest),
+            "speed_share": ca.mmax(ca.fabs(rate) / fastest),
+        }
 
 
-class TorqueChange(Part):
-    """Change of every torque over an interval of time, limited (sections 4.1 and 4.2).
+class TorqueChange(Limit):
+    """Largest change of every torque over an interval of time (sections 4.1 and 4.2).
 
     Args:
-        size: of the robot's torques next to NAO's.
+        size: of the robot's torques relative to NAO's.
     """
 
     def __init__(self, size: float = 1.0) -> None:
@@ -193,20 +190,18 @@ class TorqueChange(Part):
             ("torque_change_limit_Nm", "Nm", limit, "largest change of a torque over one interval", 0.0, math.inf)
         )
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Two-sided rows, and the largest change."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         step = samples.per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = at["torque_change_limit_Nm"]
         names = labels(samples.joints, range(change.shape[1]))
-        return Contribution(
-            rows=(rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size),),
-            indexes={"torque_change_Nm": ca.mmax(ca.fabs(change))},
-        )
+        return [rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
+            "torque_change_Nm": ca.mmax(ca.fabs(change))
+        }
 
 
-class BalanceMargins(Part):
-    """Dynamic balance margins, at every sample and in the mean (sections 3.1, 3.2, 4.1 and 4.2).
+class BalanceMargins(Limit):
+    """Least dynamic balance margins, at every sample and in the mean (sections 3.1, 3.2, 4.1 and 4.2).
 
     Args:
         margins: of the phase's ground contact.
@@ -223,8 +218,7 @@ class BalanceMargins(Part):
             ("dbm_y_mean_limit_m", "m", y, "least mean margin in y", -math.inf, math.inf),
         )
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with a lower bound; least and mean margins."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
         margins = dict(zip("xy", self._margins(samples.zmp, at, ops), strict=True))
         means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
@@ -237,21 +231,18 @@ class BalanceMargins(Part):
             rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
             for axis, value in means.items()
         ]
-        return Contribution(
-            rows=(*each, *mean),
-            indexes={
-                **{f"dbm_{axis}_min_m": ca.mmin(margin) for axis, margin in margins.items()},
-                **{f"dbm_{axis}_mean_m": value for axis, value in means.items()},
-            },
-        )
+        return (*each, *mean), {
+            **{f"dbm_{axis}_min_m": ca.mmin(margin) for axis, margin in margins.items()},
+            **{f"dbm_{axis}_mean_m": value for axis, value in means.items()},
+        }
 
 
-class AngleLimits(Part):
-    """Angles between the ends of a phase within the robot's limits, where only a richer motion can break them.
+class AngleLimits(Limit):
+    """Angles between the ends of a phase within the robot's limits, which only a richer motion than a cubic can break.
 
     Args:
         name: of the rows.
-        robot: whose limits they are.
+        robot: with these limits.
         joints: names.
         angles: of these joints, a column.
     """
@@ -260,44 +251,40 @@ class AngleLimits(Part):
         self._name, self._robot, self._joints = name, robot, tuple(joints)
         self.traces = {name: angles}
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Two-sided rows."""
-        return Contribution(
-            rows=(limit_rows(self._name, self._robot, self._joints, samples.traces[self._name][:, 1:-1]),)
-        )
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        return [angle_rows(self._name, self._robot, self._joints, samples.traces[self._name][:, 1:-1])], {}
 
 
-def limit_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
-    """Angles (m, N - 1) of joints between the ends of a phase within the robot's limits [rad]."""
-    columns = angles.shape[1]
+def angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
+    """Make rows that keep angles (m, N - 1) between the ends of a phase within the robot's limits [rad]."""
     lower, upper = (
-        MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], columns))) for end in (0, 1)
+        MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], angles.shape[1])))
+        for end in (0, 1)
     )
-    return rows(name, "rad", ca.vec(angles), lower, upper, labels(joints, range(1, columns + 1)), "instant")
+    return rows_at_samples(name, "rad", angles, joints, lower, upper, first=1)
 
 
-class FootClearance(Part):
-    """A planned swing foot above the ground between its ends, and halfway in the middle of its path as high as asked for.
+class FootClearance(Limit):
+    """A planned swing foot above the ground between its ends, and high enough in the middle of its path halfway in time.
 
     Args:
         path: (3,) of the foot, height above the ground [m].
         middle: where it is halfway [m].
-        least_height: variable that says how high it must be there.
+        least_height: variable with the least height there.
     """
 
     def __init__(self, path: Trace, middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
         self.traces = {"foot": path}
 
-    def contribute(self, at: Point, samples: Samples, ops: Nonsmooth) -> Contribution:
-        """Rows with a lower bound, and the equation of the middle."""
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
         above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         halfway = self._halfway(at)
-        return Contribution(rows=(above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])))
+        return (above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
 
     def _halfway(self, at: Point) -> MX:
-        """The foot at half the phase, which is a sample only on some grids."""
+        """Evaluate the foot at half the phase, which is a sample only on some grids."""
         names = [name for name, (kind, _) in at.positions.items() if kind == "x"]
         x = ca.SX.sym("x", len(names))
         function = ca.Function("halfway", [x], [self._path(InstantPoint.of(x, ca.SX(0, 1), names, ()), ca.SX(0.5))])
@@ -307,13 +294,13 @@ class FootClearance(Part):
 def halfway_rows(
     along: MX, middle: float, heights: MX, least: MX, corners: tuple[str, ...] = ()
 ) -> tuple[Constraint, ...]:
-    """Where a swing foot is halfway through the phase: in the middle of its path, as in the papers, and high enough.
+    """Make rows for a swing foot halfway through the phase: in the middle of its path, as in the papers, and high enough.
 
     Args:
         along: position along the path [m].
         middle: of the path [m].
         heights: (m, 1) of the foot's points [m].
-        least: that these may have [m].
+        least: lower limit of these [m].
         corners: names of the points.
     """
     return (

@@ -1,4 +1,4 @@
-"""Legs between two flat, standing soles and a torso that leans: the closed chain of double support.
+"""NAO between two flat, standing soles with a torso that leans: the closed chain of double support.
 
 Torso and soles are held apart by twelve leg joints of which two are one motor: that leaves the torso five of its six freedoms.
 Its position, roll and pitch are free here; its yaw and the angle of the hips' yaw-pitch follow.
@@ -6,24 +6,92 @@ Its position, roll and pitch are free here; its yaw and the angle of the hips' y
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import casadi as ca
-from casadi import DM, SX
+from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.gaits.nao.legs import AXIS_TOLERANCE, FORWARD, LEG_JOINTS, TO_THE_LEFT, leg_geometry
+from nlp_gait.formulation import InstantPoint, Point
+from nlp_gait.gaits.biped.body import Angles, PhaseName, State
+from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, rows_at_samples
+from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
+from nlp_gait.gaits.nao.body import NaoBody
+from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, LEG_JOINTS, YAW_PITCHES
+from nlp_gait.gaits.nao.legs import AXIS_TOLERANCE, FORWARD, TO_THE_LEFT, leg_geometry
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion, add_motions, map_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 
 UP = (0.0, 0.0, 1.0)
-YAW_PITCHES = {side: f"{side}HipYawPitch" for side in "LR"}
+LEAN = ("torso_roll", "torso_pitch")
+# A sole turned by this leaves the ground by a tenth of a micrometre: largest error of the closed chain [rad].
+FLAT = 1e-6
 # Each step of Newton's method squares the error: from 0.3 rad of lean four end at rounding; limits on the turn say so if not.
 NEWTON_STEPS = 4
+
+
+class LeaningNao(NaoBody):
+    """NAO in double support whose torso also rolls and pitches, from upright and at rest at one end to the same at the other."""
+
+    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+        return (*super().angle_names(phase), *LEAN)
+
+    def angles(self, phase: PhaseName, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
+        return {**super().angles(phase, at, more, duration, s), **{name: more[name] for name in LEAN}}
+
+    def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
+        places = {side: ankle.position for side, ankle in ankles.items()}
+        legs = leaning_legs(self.robot, hip, lean_of(angles), places, margin, ops)
+        arms = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
+        arms |= {name: motion for name, motion in angles.items() if name not in LEAN}
+        return Instant(joints={**legs.joints, **arms}, hip=hip.position, ankles=places, reach=legs.reach)
+
+    def curve_limits(
+        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+    ) -> tuple[Limit, ...]:
+        def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
+            hip, angles, ankles = state(at, s)
+            places = {side: ankle.position for side, ankle in ankles.items()}
+            return closure(self.robot, ca.vertcat(hip.position, lean_of(angles).position), places)
+
+        yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1], lambda at, s: close(at, s)[0])
+        return (*super().curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
+
+
+def leaning_nao(body: NaoBody) -> LeaningNao:
+    """Return the body with a free torso.
+
+    Raises:
+        InputError: the hips' yaw-pitch axes do not close the chain.
+    """
+    check_yaw_pitches(body.robot)
+    fields = {field.name: getattr(body, field.name) for field in dataclasses.fields(body)}
+    return LeaningNao(**fields | {"upright": frozenset()})
+
+
+class FlatSoles(Limit):
+    """Soles that the closed chain leaves flat between the ends, where Newton's method has converged.
+
+    Args:
+        turns: angle of each sole from flat (2,) [rad].
+    """
+
+    def __init__(self, turns: Trace) -> None:
+        self.traces = {"sole_turn": turns}
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        turns = samples.traces["sole_turn"][:, 1:-1]
+        return [rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
+
+
+def lean_of(angles: Angles) -> Motion:
+    """Return roll and pitch of the torso (2,) [rad]."""
+    return stack(*(angles[name] for name in LEAN))
 
 
 class Stance(NamedTuple):
@@ -44,10 +112,10 @@ def check_yaw_pitches(robot: Robot) -> None:
     Raises:
         InputError: the axes are equally steep.
     """
-    left, right = (robot.joint(YAW_PITCHES[side]).axis[2] for side in "LR")
+    left, right = (robot.joint(name).axis[2] for name in YAW_PITCHES)
     if abs(left - right) <= AXIS_TOLERANCE:
         raise InputError(
-            f"robot {robot.name!r}: the axes of {' and '.join(YAW_PITCHES.values())} must differ in z, got {left} and {right}; "
+            f"robot {robot.name!r}: the axes of {' and '.join(YAW_PITCHES)} must differ in z, got {left} and {right}; "
             "with equal ones a lean of the torso is not closed by one motor"
         )
 
@@ -80,7 +148,7 @@ def leaning_legs(
         _, pitch, *below = (_part(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
         at_hip = (_part(hip, slice(3, 4)), add_motions(pitch, _part(hip, slice(4, 5))))
         joints |= {f"{side}{name}": motion for name, motion in zip(LEG_JOINTS, (*at_hip, *below), strict=True)}
-        joints[YAW_PITCHES[side]] = yaw_pitch
+        joints[f"{side}HipYawPitch"] = yaw_pitch
         reach.append(leg.reach)
     return Stance(joints, ca.vertcat(*reach))
 
@@ -127,7 +195,7 @@ def _misfit(robot: Robot, side: str, turn: SX, pose: SX, ankle: SX) -> SX:
 
 def _hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
     """Hip joint (3,) [m] and rotation (3, 3) of the link above the hip's roll, in the world."""
-    yaw, roll = robot.joint(YAW_PITCHES[side]), robot.joint(f"{side}HipRoll")
+    yaw, roll = robot.joint(f"{side}HipYawPitch"), robot.joint(f"{side}HipRoll")
     axes = (UP, TO_THE_LEFT, FORWARD)
     about_z, about_y, about_x = (axis_rotation(k, a) for k, a in zip(axes, (turn[0], pose[4], pose[3]), strict=True))
     torso = about_z @ about_y @ about_x

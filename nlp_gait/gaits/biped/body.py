@@ -1,0 +1,239 @@
+"""A biped as the gaits take it: everything in which one robot's phases differ from another's."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from casadi import MX, SX
+
+from nlp_gait.formulation import InstantPoint, Parameter, Signals, Variable
+from nlp_gait.formulation.motion.skeleton import Skeleton
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
+from nlp_gait.gaits.biped.limits import Limit, Margins
+from nlp_gait.gaits.biped.motors import Motors
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
+from nlp_gait.gaits.biped.skeleton import skeleton
+from nlp_gait.robots import Robot
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
+
+PhaseName: TypeAlias = Literal["ssp", "dsp"]
+TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
+LIFT = "swing_height_m"
+# Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso.
+Angles: TypeAlias = Mapping[str, Motion]
+# What is planned of an instant, and what the joints follow from: motions of the hip, of these angles, and of both ankles by side.
+State: TypeAlias = tuple[Motion, Angles, Mapping[str, Motion]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coordinate:
+    """An angle that a cycle plans besides the hip.
+
+    Attributes:
+        name: of its variables.
+        rate: name of its rate's variables.
+        bounds: of the angle [rad].
+        largest_rate: in both directions [rad/s].
+        image: +1 or -1, its factor in a mirrored motion.
+        words: description.
+        rate_words: description of its rate.
+    """
+
+    name: str
+    rate: str
+    bounds: tuple[float, float]
+    largest_rate: float
+    image: float
+    words: str
+    rate_words: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body(ABC):
+    """A biped whose gaits are planned.
+
+    Attributes:
+        family: first part of the names of its problems.
+        title: its name in titles.
+        full: the robot with all its joints, as it is drawn.
+        simulated: the robot of the engine, with links welded that never move and without the motors' rotors.
+        motors: with the robot as the dynamics take it.
+        joints: those whose torques and rates count.
+        planned: those whose angles are limited.
+        images: of every joint on the other side.
+        leg_joints: joints of the left and the right half by ``"L"`` and ``"R"``; the root belongs to both.
+        coordinates: angles that a cycle plans besides the hip.
+        upright: links that never turn.
+        gravity: [m/s^2].
+        feet_y: of the left and the right foot in all gaits, each below its own hip [m].
+        leg_length_m: from hip to ankle.
+        hip_height_m: least and greatest height of the hip.
+        hip_m: (3,) point that is called the hip, from the torso's origin [m].
+        hip_name: of this point, in words.
+        step_length_m: default, from foot to foot.
+        heat: parameter K with the robot's default.
+        closed_form: False if Newton's method computes the legs' angles.
+        drive_limits: whether torques and speeds are within the limits of the robot's file.
+        length_scale: lengths relative to NAO's.
+        time_scale: times and velocities relative to NAO's.
+        torque_scale: torques relative to NAO's.
+    """
+
+    family: str
+    title: str
+    full: Robot
+    simulated: Robot
+    motors: Motors
+    joints: tuple[str, ...]
+    planned: tuple[str, ...]
+    images: tuple[str, ...]
+    leg_joints: Mapping[str, Sequence[str]]
+    coordinates: tuple[Coordinate, ...]
+    upright: frozenset[str]
+    gravity: float
+    feet_y: tuple[float, float]
+    leg_length_m: float
+    hip_height_m: tuple[float, float]
+    hip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hip_name: str = "torso origin"
+    step_length_m: float = 0.06
+    heat: Parameter = HEAT_LOSS
+    closed_form: bool = True
+    drive_limits: bool = False
+    length_scale: float = 1.0
+    time_scale: float = 1.0
+    torque_scale: float = 1.0
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as the dynamics take it: links welded that never move, perhaps with the inertia of its rotors."""
+        return self.motors.model
+
+    @property
+    def weight(self) -> float:
+        """Of the whole robot [N]."""
+        return self.robot.mass_kg * self.gravity
+
+    def ankle(self, side: str) -> tuple[float, float]:
+        """Return the place of an ankle above its foot ``"L"`` or ``"R"``: across the walking direction, and its height [m]."""
+        return self.feet_y["LR".index(side)], self.robot.feet[BOTH_FEET[side]].ankle_height_m
+
+    def standing_ankle(self, side: str, x: float = 0.0) -> Motion:
+        """Return the motion (3,) of an ankle at rest [m]."""
+        return stack(*map(constant_motion, (x, *self.ankle(side))))
+
+    @property
+    def support(self) -> tuple[float, float, float]:
+        """(3,) left ankle where a motion begins at x = 0 [m]."""
+        return (0.0, *self.ankle("L"))
+
+    def scale_length(self, nao_m: float) -> float:
+        """Scale a length of NAO's gaits, to a tenth of a millimetre [m]."""
+        return round(nao_m * self.length_scale, 4)
+
+    def scale_time(self, nao: float) -> float:
+        """Scale a time or a velocity of NAO's gaits, so that Froude numbers are equal [s, m/s]."""
+        return float(f"{nao * self.time_scale:.4g}")
+
+    def round_place(self, x: float) -> float:
+        """Round a place that follows from the step [m]."""
+        return x
+
+    @property
+    def hip_variables(self) -> tuple[Variable, ...]:
+        """Hip height and velocities at both ends of a phase: the first variables of every phase (section 4)."""
+        low, high = self.hip_height_m
+        rows = [("hip_height_m", "m", low, high, f"height of the {self.hip_name} at both ends")]
+        bounds = {"z": (-0.05, 0.05, "vertical"), "x": (0.001, 0.2, "sagittal"), "y": (-0.2, 0.2, "lateral")}
+        for axis, (least, most, word) in bounds.items():
+            for end in ("start", "end"):
+                limits = self.scale_time(least), self.scale_time(most)
+                rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
+        return tuple(
+            Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)
+            for name, unit, lower, upper, text in rows
+        )
+
+    @property
+    def lift_variable(self) -> Variable:
+        """Height of the swing."""
+        lower, upper = self.scale_length(0.015), self.scale_length(0.03)
+        return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
+
+    def time_variable(self, phase: PhaseName) -> Variable:
+        """Return the duration of a phase."""
+        least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
+        word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
+        return Variable(
+            name=TIMES[phase],
+            unit="s",
+            lower=self.scale_time(least),
+            upper=self.scale_time(most),
+            description=word,
+        )
+
+    @property
+    def angle_variables(self) -> tuple[Variable, ...]:
+        """Of the planned angles at both ends of a phase, where these are free."""
+        return ()
+
+    @abstractmethod
+    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+        """Return the names of the angles that a phase plans besides the hip."""
+
+    @abstractmethod
+    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
+        """Return these angles at the start and the end of a phase [rad]."""
+
+    def angles(self, phase: PhaseName, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
+        """Return the motion of these angles: cubics from rest to rest, and what the splines ``more`` add."""
+        still = SX(0)
+        return {
+            name: add_motions(cubic(start, end, still, still, duration, s), more[name])
+            for name, (start, end) in self.angle_ends(phase, at).items()
+        }
+
+    @abstractmethod
+    def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
+        """Return the planned angles of a cycle from its coordinates."""
+
+    @abstractmethod
+    def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
+        """Return the motion of the whole robot: both legs between the torso and the feet.
+
+        Args:
+            hip: (3,) [m].
+            angles: planned ones [rad]; those left out rest.
+            ankles: (3,) by ``"L"`` and ``"R"`` [m].
+            margin: on the reach of the knees.
+            ops: interpretation.
+        """
+
+    @abstractmethod
+    def cosines(self, q: MX) -> MX:
+        """Return the cosines (2, n) of both knees, as ``plan`` has them, from the angles (J, n) of all joints."""
+
+    @abstractmethod
+    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+        """Return the balance margins in x and y on the left sole, whose ankle is at ``support_xy`` [m]."""
+
+    def curve_limits(
+        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+    ) -> tuple[Limit, ...]:
+        """Return the limits that cubics cannot break but splines can.
+
+        Args:
+            phase: of the gait.
+            count: coefficients of each spline, 0 for cubics.
+            state: planned one at an instant.
+        """
+        return ()
+
+    @property
+    def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
+        """Function that draws the robot."""
+        return skeleton(self.full)

@@ -1,1 +1,0 @@
-"""Walking by the textbook: the ZMP is planned, the centre of mass follows by preview control, the legs by inverse kinematics."""

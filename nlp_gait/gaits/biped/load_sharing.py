@@ -1,0 +1,294 @@
+"""Load in double support: divided between the feet by a rule of the paper, or planned freely.
+
+Two standing feet make a closed chain: the motion fixes only the sum of both wrenches, and how they share it is the controller's
+choice. The paper's rules give each leg a share of the torso's mass. A planned load is the wrench on the right sole as polynomials
+of the phase whose coefficients are variables; the wrench on the left sole and the torques of both legs follow, and flat soles on
+a rough floor limit both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from casadi import MX, SX
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, InstantPoint, Point, Start, Variable
+from nlp_gait.formulation.assembly import parameters as table
+from nlp_gait.formulation.blocks import labels
+from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows, rows_at_samples
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
+from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.balance import SOLE_FRICTION, above, below, combine_zmps, ground_load, sole_limits, zmp_of_wrench
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"}
+LARGEST_DEGREE = 12
+# Part of the phase, at either end, in which load passes to or from a foot: a low polynomial alone cannot begin at zero
+# and be elsewhere soon after.
+RAMP_SHARE = 0.05
+RAMPS = 2
+# Coefficients start near a load that passes evenly from foot to foot, within this share of their bounds.
+START_SHARE = 0.02
+CORNERS = ("+x", "-x", "+y", "-y")
+TURNS = tuple(f"{sense}{first}{second}" for sense in "+-" for first in "+-" for second in "+-")
+
+Division = Literal["printed", "lever"]
+TorsoShare = Literal["printed", "lever", "free"]
+LOAD_DEGREE = 4
+
+
+def torso_shares(hip_y: SX, rule: Division, feet_y: tuple[float, float] = (0.05, -0.05)) -> dict[str, SX]:
+    """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
+
+    With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
+
+    Args:
+        hip_y: position of the hip across the walking direction [m].
+        rule: ``"printed"`` is proportional to the distance *from* that leg's own foot, as in the equations; ``"lever"`` to
+            the distance from the other foot, as the text says: the nearer foot carries more.
+        feet_y: of the left and the right foot [m]; by default those of NAO.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (28), (29).
+    """
+    from_left, from_right = feet_y[0] - hip_y, hip_y - feet_y[1]
+    width = feet_y[0] - feet_y[1]
+    left, right = from_left / width, from_right / width  # (eqs. 28, 29)
+    return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
+
+
+class LoadSharing:
+    """Load that a rule of the paper divides: each leg stands on its own foot and carries a share of the torso.
+
+    Attributes:
+        variables: in addition to those of the motion.
+        limits: likewise.
+        loads: torques of each half from its own foot, and the combined ZMP of both feet.
+
+    Args:
+        body: the robot.
+        rule: see ``torso_shares``.
+    """
+
+    variables: tuple[Variable, ...] = ()
+    limits: tuple[Limit, ...] = ()
+
+    def __init__(self, body: Body, rule: Division) -> None:
+        self.loads = divided_loads(body, rule)
+
+    def add_to(self, plan: Planner) -> Planner:
+        """Return a plan with the load's own part."""
+        return plan
+
+    def start(self, names: Sequence[str], others: Start | None) -> Start | None:
+        """Return start points of variables by name from those of the others; None for any within the bounds."""
+        return others
+
+
+def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
+    """Return how the feet share the load.
+
+    Args:
+        body: the robot.
+        rule: see ``torso_shares``; ``"free"`` plans the wrench on the right foot.
+        degree: of that wrench over the phase.
+
+    Raises:
+        InputError: a degree that is not allowed.
+    """
+    return PlannedLoad(body, degree) if rule == "free" else LoadSharing(body, rule)
+
+
+class PlannedLoad(LoadSharing):
+    """Wrench of the ground on the right sole, about the point under its ankle: polynomials in Bernstein form, and ramps.
+
+    Args:
+        body: the robot.
+        degree: of the polynomials.
+
+    Raises:
+        InputError: a degree that is not allowed.
+    """
+
+    def __init__(self, body: Body, degree: int) -> None:
+        if not 1 <= degree <= LARGEST_DEGREE:
+            raise InputError(f"load_degree must be within [1, {LARGEST_DEGREE}], got {degree}")
+        self._degree, self._weight = degree, body.weight
+        self._count = degree + 1 + RAMPS  # coefficients of each component
+        self.variables = self._coefficients(body.robot.feet["right"])
+        self.loads = planned_loads(body.robot, body.gravity, body.upright)
+        self.limits = (FootLimits(body, self.load_slope),)
+
+    def _coefficients(self, foot: Foot) -> tuple[Variable, ...]:
+        """Component by component, with wide bounds: coefficients may lie beyond what the curve reaches."""
+        weight = self._weight
+        along, across = max(foot.front_m, foot.back_m), max(foot.left_m, foot.right_m)
+        most = dict(zip(COMPONENTS, (0.5, 0.5, 2.0, across, along, across), strict=True))
+        return tuple(
+            Variable(
+                name=f"right_{component}_{unit}[{k}]",
+                unit=unit,
+                lower=-(weight if component == "force_z" else round(share * weight, 3)),
+                upper=round(share * weight, 3),
+                description=f"coefficient {k} of the ground's {component.replace('_', ' along ')} on the right sole",
+            )
+            for (component, unit), share in zip(COMPONENTS.items(), most.values(), strict=True)
+            for k in range(self._count)
+        )
+
+    def add_to(self, plan: Planner) -> Planner:
+        names = [variable.name for variable in self.variables]
+
+        def both(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+            values = ca.reshape(ca.vertcat(*(at[name] for name in names)), self._count, len(COMPONENTS))
+            return plan(at, phase, ops)._replace(wrench=values.T @ load_basis(self._degree, phase))
+
+        return both
+
+    def load_slope(self, at: InstantPoint, phase: SX) -> SX:
+        """Return the derivative of the load on the right sole with respect to the phase [N]."""
+        own = [v.name for v in self.variables if v.name.startswith("right_force_z")]
+        return ca.dot(ca.vertcat(*(at[name] for name in own)), ca.jacobian(load_basis(self._degree, phase), phase))
+
+    def start(self, names: Sequence[str], others: Start | None) -> Start:
+        """Start near a load that passes evenly to the right foot."""
+        own = [variable.name for variable in self.variables]
+        places = [names.index(name) for name in own]
+        middle = np.zeros((len(COMPONENTS), self._count))
+        middle[list(COMPONENTS).index("force_z"), :-RAMPS] = np.linspace(0.0, self._weight, self._degree + 1)
+
+        def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+            lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
+            x = rng.uniform(lower, upper) if others is None else others(parameters, rng)
+            width = START_SHARE * (upper - lower)[places] / 2
+            x[places] = middle.ravel() + rng.uniform(-width, width)
+            return x
+
+        return start
+
+
+def load_basis(degree: int, phase: SX) -> SX:
+    """Return (degree + 3,) Bernstein polynomials of the phase, and cubic ramps down from its start and up to its end."""
+    ramps = (ca.fmax(0, 1 - far / RAMP_SHARE) ** 3 for far in (phase, 1 - phase))
+    return ca.vertcat(
+        *(math.comb(degree, k) * phase**k * (1 - phase) ** (degree - k) for k in range(degree + 1)), *ramps
+    )
+
+
+def planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:
+    """Return a function of the torques from the left foot with the planned wrench on the right one, and the ZMP of both feet.
+
+    Args:
+        robot: with links welded that never move.
+        gravity: [m/s^2].
+        upright: links that never turn.
+    """
+    tree, weight = tree_from(robot, robot.feet["left"].link), robot.mass_kg * gravity
+    left, right = robot.feet["left"], robot.feet["right"]
+
+    def loads(now: Instant) -> Instant:
+        q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
+        feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
+        pushes = {right.link: above(wrench, right.ankle_height_m)}
+        torques, at_ankle = newton_euler(tree, q, qd, qdd, gravity, upright=upright, pushes=pushes)
+        own = below(at_ankle, left.ankle_height_m)
+        arm = ca.vertcat(feet["R"] - feet["L"], 0)
+        both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
+        offset = zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, weight)
+        return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": own, "R": wrench})
+
+    return loads
+
+
+def divided_loads(body: Body, rule: Division) -> Loader:
+    """Return a function of the torques of each half from its own foot, and the combined ZMP of both feet."""
+    robot, gravity, weight = body.robot, body.gravity, body.weight
+    trees = {side: tree_from(robot, robot.feet[foot].link, body.leg_joints[side]) for side, foot in BOTH_FEET.items()}
+
+    def loads(now: Instant) -> Instant:
+        q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
+        shares = torso_shares(now.hip[1], rule, body.feet_y)
+        torques: dict[str, SX] = {}
+        zmps, ground_loads, wrenches = [], [], {}
+        for side, tree in trees.items():
+            own, wrench = newton_euler(tree, q, qd, qdd, gravity, {robot.root: shares[side]}, body.upright)
+            height = robot.feet[BOTH_FEET[side]].ankle_height_m
+            offset = zmp_of_wrench(wrench, height, weight)
+            wrenches[side] = below(wrench, height)
+            torques |= own
+            zmps.append(now.ankles[side][:2] + offset)
+            ground_loads.append(ground_load(wrench, weight))
+        return now._replace(torques=torques, zmp=combine_zmps(zmps, ground_loads), wrenches=wrenches)
+
+    return loads
+
+
+class FootLimits(Limit):
+    """What both soles can bear at every sample, and how fast load may pass from the left to the right foot.
+
+    That the ground does not pull follows from friction and pressure together.
+
+    Args:
+        body: the robot.
+        load_slope: derivative of the load on the right sole with respect to the phase [N].
+    """
+
+    reads_wrenches = True
+    parameters = table(
+        ("friction_coefficient", "1", SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
+        ("load_rate_limit_1_s", "1/s", 12.5, "fastest change of a foot's load, in weights per second", 0.0, math.inf),
+        (
+            "switch_load_limit",
+            "1",
+            1.0,
+            "largest load, in weights, of the foot that has just landed and of the one about to lift; no limit by default",
+            0.0,
+            math.inf,
+        ),
+    )
+
+    def __init__(self, body: Body, load_slope: Trace) -> None:
+        self._feet, self._weight = body.robot.feet, body.weight
+        self.traces = {"load_slope": load_slope}
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        n, mu = samples.steps + 1, at["friction_coefficient"]
+        found, loads = [], {}
+        for side, foot in BOTH_FEET.items():
+            kinds = _bearing(self._feet[foot]).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
+            for (name, unit, names), values in zip(ROWS, kinds, strict=True):
+                found.append(rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
+            loads[foot] = samples.wrenches[side][2, :] / self._weight
+        # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
+        right = samples.traces["load_slope"] / (samples.step_s * samples.steps * self._weight)
+        total = loads["left"] + loads["right"]
+        changes = (total[1:] - total[:-1]) / samples.step_s
+        rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}
+        limit, names = at["load_rate_limit_1_s"], labels(tuple(rates), range(n))
+        ends = ca.vertcat(loads["right"][0], loads["left"][-1])
+        feet = ("right, landed", "left, lifting")
+        return (
+            *found,
+            rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
+            rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
+        ), {
+            "load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))),
+            "switch_load": ca.mmax(ends),
+        }
+
+
+ROWS = (("friction", "N", CORNERS), ("pressure", "Nm", CORNERS), ("turning", "Nm", TURNS))
+
+
+def _bearing(foot: Foot) -> ca.Function:
+    wrench, mu = SX.sym("wrench", 6), SX.sym("mu")
+    limits = sole_limits(wrench, (-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m), mu)
+    return ca.Function("bearing", [wrench, mu], list(limits))

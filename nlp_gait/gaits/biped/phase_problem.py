@@ -1,0 +1,159 @@
+"""From a phase or a cycle to a problem: its goal, its limits, its start points, and what drawing and simulation need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from casadi import MX
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Point, SimulationModel, SolverHints, Start
+from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
+from nlp_gait.gaits.biped.limits import (
+    REACH_MARGIN,
+    BalanceMargins,
+    Closure,
+    DriveLimits,
+    JointLimits,
+    Limit,
+    Margins,
+    Reach,
+    TorqueChange,
+)
+from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+
+Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
+DRAWS = 50  # of a start point, at most
+
+
+def goal_for(body: Body, criterion: Criterion) -> Goal:
+    """Return the goal of a criterion, with the robot's motors and heat constant.
+
+    Raises:
+        InputError: the motors change the power, but something else is minimised.
+    """
+    motors, heat = body.motors, body.heat
+    if criterion != "power" and motors.draw is not None:
+        raise InputError(
+            f"motors={','.join(motors.features)!r} changes the power, but the objective is "
+            f"{INSTEAD[criterion].objective.name}; leave out what changes it"
+        )
+    if criterion != "power":
+        return replace(INSTEAD[criterion], heat=heat)
+    return Goal(heat=heat) if motors.draw is None else Goal(heat=heat, draw=motors.draw)
+
+
+def phase_limits(
+    body: Body, margins: Margins, mean_limits_m: tuple[float, float], *, solved: bool = True
+) -> tuple[Limit, ...]:
+    """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
+
+    Args:
+        body: the robot.
+        margins: of balance.
+        mean_limits_m: default of the least mean margins in x and y [m].
+        solved: the legs' angles are computed from their feet; False where the angles are given.
+    """
+    size = body.torque_scale
+    return (
+        JointLimits(body.robot, body.planned),
+        Reach(),
+        *((Closure(),) if solved and not body.closed_form else ()),
+        TorqueChange(size),
+        *((DriveLimits(body.robot, size),) if body.drive_limits else ()),
+        BalanceMargins(margins, mean_limits_m),
+    )
+
+
+def phase_problem(
+    name: str, title: str, phase: Phase, *, start: Start | None = None, searchable: bool = True
+) -> GaitProblem:
+    """Return the problem of one phase.
+
+    Args:
+        name: of the problem, without the robot's family.
+        title: one line, without the robot.
+        phase: with its limits and its goal.
+        start: start point; None for one within the bounds.
+        searchable: False for a problem that only gradient methods can solve.
+    """
+
+    def assemble(at: Point, ops: Nonsmooth) -> Assembly:
+        return phase.assemble(at, phase.samples(at, ops), ops)
+
+    body = phase.body
+    if not body.closed_form:
+        start = start_within_reach(phase.names, (), lambda at: phase.samples(at, Exact()).reach, start)
+    problem = GaitProblem(
+        name=f"{body.family}-{name}",
+        title=f"{body.title}, {title}",
+        variables=phase.variables,
+        own_parameters=phase.parameters,
+        objective=phase.goal.objective,
+        assemble=assemble,
+        grid=phase.grid,
+        rows_over_time=phase.rows_over_time() if body.closed_form else (),
+        display=Display(motion=phase.signals, durations=(phase.duration,)),
+        hints=SolverHints(start=start, searchable=searchable),
+    )
+    return add_robot(problem, body)
+
+
+def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False) -> GaitProblem:
+    """Return the problem with the robot that its gaits are drawn and simulated with.
+
+    Args:
+        problem: without.
+        body: the robot.
+        repeats: a gait is one step, whose mirror image is the next one.
+    """
+    simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
+    model = SimulationModel(robot=simulated, gravity=body.gravity, heat_loss=HEAT_LOSS.name, repeats=repeats)
+    display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
+    return replace(problem, display=display)
+
+
+def start_within_reach(
+    variables: Sequence[str], known: Sequence[str], reach: Callable[[Point], MX], start: Start | None
+) -> Start:
+    """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.
+
+    Args:
+        variables: names.
+        known: parameters that the motion reads besides the margin on the reach.
+        reach: cosines of the knees (2, N + 1) at a point.
+        start: start points to choose from; None for any within the bounds.
+    """
+    read = (REACH_MARGIN, *known)
+
+    @cache
+    def farthest() -> ca.Function:
+        x, p = MX.sym("x", len(variables)), MX.sym("p", len(read))
+        return ca.Function("farthest", [x, p], [ca.mmax(ca.fabs(reach(Point.of(x, p, variables, read))))])
+
+    def draw(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        if start is not None:
+            return start(parameters, rng)
+        return rng.uniform(
+            *(np.array([parameters[f"{name}.{end}"] for name in variables]) for end in ("lower", "upper"))
+        )
+
+    def choose(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        best, least = np.zeros(0), np.inf
+        for _ in range(DRAWS):
+            x = draw(parameters, rng)
+            cosine = float(farthest()(x, [parameters[name] for name in read]))
+            if cosine < least:
+                best, least = x, cosine
+            if least <= 1.0 - parameters[REACH_MARGIN]:
+                break
+        return best
+
+    return choose

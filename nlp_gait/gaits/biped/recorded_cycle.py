@@ -1,0 +1,178 @@
+"""Problems of recorded motions: judged by the limits of the planned phases; their times and their step are the variables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from nlp_gait.formulation import Array, GaitProblem, Grid, Result, Variable
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
+from nlp_gait.gaits.biped.cycle import WalkingCycle, cycle_margins, cycle_problem
+from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, cycle_variables
+from nlp_gait.gaits.biped.double_support import double_support_margins, double_support_mean_margins, support_box
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import Limit
+from nlp_gait.gaits.biped.load_sharing import Division, divided_loads
+from nlp_gait.gaits.biped.phase_problem import phase_limits, phase_problem
+from nlp_gait.gaits.biped.recorded_motion import FINE, Motion
+from nlp_gait.gaits.biped.recorded_phase import HipLimits, RecordedPhase, StandingLimits, SwingLimits
+from nlp_gait.gaits.biped.samples import Loader
+from nlp_gait.gaits.biped.single_support import single_support_loads, single_support_mean_margins
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedGait:
+    """A gait from elsewhere, as a problem whose only variables are its times.
+
+    Attributes:
+        gait: name of the problem whose limits it is judged by.
+        problem: the recorded gait; its variables are the durations of its phases, and of a cycle the step length.
+        x: (n,) its own durations and step.
+        motion: on the left foot.
+        step_m: from foot to foot.
+        lean_deg: of the torso at the beginning.
+        make_planned: makes the planned problem with the same robot, step and durations; InputError if there is none.
+    """
+
+    gait: str
+    problem: GaitProblem
+    x: tuple[float, ...]
+    motion: Motion
+    step_m: float
+    lean_deg: float
+    make_planned: Callable[[], GaitProblem]
+
+
+def on_grids(
+    build: Callable[[Grid], GaitProblem], intervals: int, options: Mapping[str, str | int | float | bool]
+) -> GaitProblem:
+    """Return a problem on the planned one's samples, which can be refined.
+
+    Args:
+        build: the problem on a grid.
+        intervals: of each phase.
+        options: of the problem.
+    """
+
+    def refined(factor: int) -> GaitProblem:
+        grid = Grid(intervals=intervals, samples_per_interval=factor, refined_by="samples_per_interval")
+        return replace(build(grid), options=dict(options), refine=lambda by: refined(factor * by))
+
+    return refined(1)
+
+
+def recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
+    """Return the loads of both phases for any angles, at which no link stays upright."""
+    freed = replace(body, upright=frozenset())
+    return {"ssp": single_support_loads(freed), "dsp": divided_loads(freed, rule)}
+
+
+def recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, grid: Grid) -> GaitProblem:
+    """Return the problem of one recorded phase, whose time is its variable."""
+    height, vz0, vz1, vx0, vx1, vy0, vy1 = body.hip_variables
+    ends = ({"z": height, "vx": vx0, "vy": vy0, "vz": vz0}, {"z": height, "vx": vx1, "vy": vy1, "vz": vz1})
+    left = body.support[:2]
+    own: Limit
+    if name == "ssp":
+        margins, means = body.sole_margins(left), single_support_mean_margins(body.robot.feet["left"])
+        own = SwingLimits(motion, body.lift_variable)
+    else:
+        foot = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))
+        x, y = (foot[:, :2].mean(axis=0) + (0.0, left[1])).tolist()
+        box = support_box(body.robot, {"L": left, "R": (x, y)})
+        margins, means = double_support_margins(box), double_support_mean_margins(box)
+        own = StandingLimits()
+    phase = RecordedPhase(
+        body=body,
+        variables=(body.time_variable(name),),
+        duration=TIMES[name],
+        loads=recorded_loads(body, "printed")[name],
+        grid=grid,
+        limits=(*phase_limits(body, margins, means, solved=False), HipLimits(ends, ("start", "end")), own),
+        goal=Goal(heat=body.heat),
+        recorded=motion,
+    )
+    problem = phase_problem(name, "", phase)
+    title = f"A recorded gait of {body.title}, {'single' if name == 'ssp' else 'double'} support"
+    return replace(problem, name=f"recorded-{name}", title=title)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedCycles:
+    """Recorded cycles of one robot that begin where the right foot leaves the ground, judged by the planned one's limits.
+
+    Attributes:
+        body: the robot.
+        intervals: of each phase, as in the planned problem.
+        options: of the problem that judges.
+    """
+
+    body: Body
+    intervals: int
+    options: Mapping[str, str | int | float | bool]
+
+    def judge(self, t: Array, q: Array, touch_down_s: float) -> Result:
+        """Return a cycle with its own times and step, as a result of the problem that judges it.
+
+        Args:
+            t: (T,) from zero [s].
+            q: (T, J) angles of the body's joints [rad].
+            touch_down_s: when the right foot lands.
+
+        Raises:
+            InputError: a phase has too few samples.
+        """
+        motion = Motion(body=self.body, t=t, q=q)
+        parts = {name: motion.part(*span) for name, span in motion.phases(touch_down_s).items()}
+        step_m = float(motion.right_foot(t[-1:])[0, 0])
+        x = np.array([*(part.duration_s for part in parts.values()), step_m])
+        problem = on_grids(lambda grid: self.problem(parts, grid, motion.repeats), self.intervals, self.options)
+        return Result(problem=problem, x=x)
+
+    def problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:
+        """Return the problem of both phases of a motion and the rows that join them.
+
+        Args:
+            motions: of each phase.
+            grid: of each phase.
+            repeats: another step can follow.
+        """
+        body, margins = self.body, cycle_margins(self.body)
+        known = {variable.name: variable for variable in cycle_variables(body)}
+        variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
+        own: dict[PhaseName, tuple[Limit, ...]] = {
+            "ssp": (
+                HipLimits([_hip_ranges(known, switch) for switch in SWITCHES], SWITCHES),
+                SwingLimits(motions["ssp"], known[LIFT]),
+            ),
+            "dsp": (StandingLimits(),),
+        }
+        phases = {
+            name: RecordedPhase(
+                body=body,
+                variables=variables,
+                duration=TIMES[name],
+                loads=loads,
+                grid=grid,
+                limits=(*phase_limits(body, *margins[name], solved=False), *own[name]),
+                goal=Goal(heat=body.heat),
+                recorded=motions[name],
+            )
+            for name, loads in self._loads.items()
+        }
+        cycle = WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=False)
+        problem = cycle_problem("recorded-cycle", cycle, rows_over_time=False, repeats=repeats)
+        return replace(problem, title=f"A recorded gait of {body.title}, a walking cycle")
+
+    @cached_property
+    def _loads(self) -> dict[PhaseName, Loader]:
+        return recorded_loads(self.body, "lever")
+
+
+def _hip_ranges(known: Mapping[str, Variable], switch: str) -> dict[str, Variable]:
+    """Variables whose ranges limit the hip at a switch."""
+    places = {axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"}
+    return places | {f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"}

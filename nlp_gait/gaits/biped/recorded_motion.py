@@ -1,0 +1,196 @@
+"""A motion that is given as angles over time: its splines on the left foot, its phases, and where the robot's parts are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import DM, SX
+from scipy.interpolate import CubicSpline
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.biped.body import Body, PhaseName
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
+from nlp_gait.robots import Robot
+from nlp_gait.robots.mirror import mirror_sign
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic import trajectories
+from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
+from nlp_gait.symbolic.simplification import simplify
+
+LEAST_ROWS = 5
+SAME_TIME_S = 1e-9
+LIFTED = 2e-3  # [m]; a foot that rises by less stands
+STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed
+LEAST_SHARE = 0.02  # of the time; a shorter phase does not count
+CLOSED = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
+FINE = 400  # instants at which a whole motion is evaluated
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A motion of all joints of the gait on the left foot.
+
+    Attributes:
+        body: the robot.
+        t: (T,) [s], from zero.
+        q: (T, J) angles of the body's joints [rad].
+        mirrored: the file's left is this motion's right.
+        held: joints that the file leaves out.
+    """
+
+    body: Body
+    t: Array
+    q: Array
+    mirrored: bool = False
+    held: tuple[str, ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """Of the whole motion."""
+        return float(self.t[-1])
+
+    @cached_property
+    def spline(self) -> CubicSpline:
+        """Angles over time; continuous accelerations."""
+        return CubicSpline(self.t, self.q)
+
+    def part(self, start_s: float, end_s: float) -> Motion:
+        """Return the motion between two times, from the samples in between alone: accelerations may jump at its ends.
+
+        Raises:
+            InputError: too few samples.
+        """
+        own = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
+        count = np.count_nonzero(own)
+        if count < LEAST_ROWS:
+            raise InputError(f"the phase from {start_s:g} s to {end_s:g} s has {count} samples; it needs {LEAST_ROWS}")
+        rows = self.t[own]
+        inside = rows[(rows > start_s + SAME_TIME_S) & (rows < end_s - SAME_TIME_S)]
+        times = np.array([start_s, *inside, end_s])
+        q = CubicSpline(rows, self.q[own])(times)
+        return replace(self, t=times - start_s, q=q)
+
+    def right_foot(self, times: Array) -> Array:
+        """Return the right sole under its ankle relative to the left one (T, 3): ahead, to the left, and above [m]."""
+        (_, left_y, _), (_, height) = self.body.support, self.body.ankle("R")
+        ankle = places(self.body).map(len(times))(DM(self.spline(times).T))[2].full().T
+        return np.asarray(ankle - (0.0, left_y, height))
+
+    def mirror_image(self) -> Motion:
+        """Exchange left and right."""
+        joints, images = self.body.joints, self.body.images
+        columns = [joints.index(name) for name in images]
+        signs = np.array([mirror_sign(self.body.robot, *pair) for pair in zip(joints, images, strict=True)])
+        return replace(self, q=signs * self.q[:, columns], mirrored=not self.mirrored)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the end is the mirror image of the beginning, so that another step can follow."""
+        return bool(np.abs(self.q[-1] - self.mirror_image().q[0]).max() < CLOSED)
+
+    def phases(self, touch_down_s: float | None = None) -> dict[PhaseName, tuple[float, float]]:
+        """Return start and end [s] of single support ``"ssp"`` and double support ``"dsp"``, or of one if there is only one."""
+        end = self.duration_s
+        if touch_down_s is not None:
+            if not 0.0 < touch_down_s < end:
+                raise InputError(f"touch-down must be within the motion's {end:g} s, got {touch_down_s:g}")
+            return {"ssp": (0.0, touch_down_s), "dsp": (touch_down_s, end)}
+        foot = self.right_foot(self.t)
+        if foot[:, 2].max() < LIFTED and np.ptp(foot[:, :2], axis=0).max() < LIFTED:
+            return {"dsp": (0.0, end)}
+        landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1))
+        if end - landing < LEAST_SHARE * end:
+            return {"ssp": (0.0, end)}
+        return {"ssp": (0.0, landing), "dsp": (landing, end)}
+
+    def _landing(self, distance: Array) -> float:
+        """Estimate when a foot lands from its distance to its last place (T,) [m], a parabola where a swing ends at rest."""
+        last = int(np.flatnonzero(distance >= STILL)[-1])
+        before = max(last - 2, 0)
+        near, far = np.sqrt(distance[[last, before]])
+        late = 0.0 if far <= near else near * (self.t[last] - self.t[before]) / (far - near)
+        return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
+
+
+class FreeParts(NamedTuple):
+    """Places of what does not stand.
+
+    Attributes:
+        torso: (3,) origin of the torso [m].
+        ankle: (3,) of the right foot [m].
+        corners: (3, 4) of the right sole [m].
+        rotation: (3, 3) from the torso's axes.
+    """
+
+    torso: SX
+    ankle: SX
+    corners: SX
+    rotation: SX
+
+
+def free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
+    """Return the places of torso and right foot of a robot on its left foot.
+
+    Args:
+        robot: with links welded that never move.
+        q: angles by joint name [rad].
+        support: (3,) the left ankle, which stands [m].
+    """
+    tree = tree_from(robot, robot.feet["left"].link)
+    found = forward_kinematics(tree, q, SX(DM(support)))
+    poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
+    torso = poses[robot.root]
+    entry = next(body.joint for body in tree if body.link.name == robot.root)
+    assert entry is not None  # the torso is not the fixed link; for the type checker
+    foot = robot.feet["right"]
+    ankle = poses[foot.link]
+    corners = [
+        (along, across, -foot.ankle_height_m)
+        for along in (-foot.back_m, foot.front_m)
+        for across in (-foot.right_m, foot.left_m)
+    ]
+    return FreeParts(
+        torso.position - torso.rotation @ DM(entry.origin_m),
+        ankle.position,
+        ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
+        torso.rotation,
+    )
+
+
+@lru_cache(maxsize=8)
+def places(body: Body) -> ca.Function:
+    """Return a function of the angles (J,) on the left foot.
+
+    Outputs: torso, hip and right ankle (3,), corners of the right sole (3, 4) [m], and the cosine of the lean.
+    """
+    q = SX.sym("q", len(body.joints))
+    parts = free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
+    hip = parts.torso + parts.rotation @ DM(body.hip_m)
+    return ca.Function("places", [q], [parts.torso, hip, parts.ankle, parts.corners, parts.rotation[2, 2]])
+
+
+@lru_cache(maxsize=8)  # the phases of a few robots: every motion of one has the same
+def instant_function(body: Body, loads: Loader) -> ca.Function:
+    """Return a function of angles and both derivatives (J,) on the left foot.
+
+    Outputs: torque (J,), ZMP (2,), torso (3,), hip (3,) and its velocity, right ankle (3,), corners of the right sole (12,),
+    centre of mass (3,), and the ground's wrench (6,) on each sole.
+    """
+    joints, support = body.joints, SX(DM(body.support))
+    q, qd, qdd = (SX.sym(name, len(joints)) for name in ("q", "qd", "qdd"))
+    torso, hip, ankle, corners, _ = places(body)(q)
+    motions = {name: trajectories.Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
+    found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
+    torque = ca.vertcat(*(found.torques[name] for name in joints))
+    angles = dict(zip(joints, ca.vertsplit(q), strict=True))
+    tree = tree_from(body.robot, body.robot.feet["left"].link)
+    com = centre_of_mass(tree, forward_kinematics(tree, angles, support))
+    outputs = [torque, found.zmp, torso, hip, ca.jtimes(hip, q, qd), ankle, ca.vec(corners), com]
+    outputs += [found.wrenches[side] for side in BOTH_FEET]
+    return ca.Function("instant", [q, qd, qdd], simplify(outputs))

@@ -1,0 +1,127 @@
+"""The humanoid problems: single support, double support and walking cycle; options are in ``gaits.humanoid``."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from nlp_gait.formulation import GaitProblem, maker
+from nlp_gait.gaits.biped.curves import Trajectory
+from nlp_gait.gaits.biped.cycle import CycleObjective, planned_cycle
+from nlp_gait.gaits.biped.double_support import planned_double_support
+from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE
+from nlp_gait.gaits.biped.phase_problem import Criterion
+from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
+from nlp_gait.gaits.biped.single_support import planned_single_support
+from nlp_gait.gaits.humanoid.body import make_humanoid
+
+Share = Literal["lever", "free"]
+
+
+@maker
+def humanoid_ssp(
+    *,
+    robot: str = "nao-v5",
+    intervals: int = 10,
+    step_length_m: float = 0.0,
+    samples_per_interval: int = 0,
+    trajectory: Trajectory = "cubic",
+    objective: Criterion = "power",
+    drive_limits: bool = True,
+    motors: str = "",
+) -> GaitProblem:
+    """Single support; the swing foot moves by twice the step length.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
+    """
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    return planned_single_support(
+        body,
+        step_m=body.check_step_length(step_length_m),
+        intervals=intervals,
+        samples_per_interval=samples_per_interval,
+        trajectory=trajectory,
+        objective=objective,
+    )
+
+
+@maker
+def humanoid_dsp(
+    *,
+    robot: str = "nao-v5",
+    intervals: int = 10,
+    torso_share: Share = "lever",
+    step_length_m: float = 0.0,
+    samples_per_interval: int = 0,
+    trajectory: Trajectory = "cubic",
+    objective: Criterion = "power",
+    drive_limits: bool = True,
+    motors: str = "",
+    load_degree: int = LOAD_DEGREE,
+) -> GaitProblem:
+    """Double support, the right foot a step ahead.
+
+    Source:
+        Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
+    """
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    return planned_double_support(
+        body,
+        step_m=body.check_step_length(step_length_m),
+        intervals=intervals,
+        samples_per_interval=samples_per_interval,
+        trajectory=trajectory,
+        objective=objective,
+        torso_share=torso_share,
+        load_degree=load_degree,
+    )
+
+
+@maker
+def humanoid_cycle(
+    *,
+    robot: str = "nao-v5",
+    objective: CycleObjective = "energy-per-metre",
+    intervals: int = 10,
+    torso_share: Share = "lever",
+    samples_per_interval: int = 0,
+    drive_limits: bool = True,
+    motors: str = "",
+    load_degree: int = LOAD_DEGREE,
+) -> GaitProblem:
+    """Walking cycle: one step, whose mirror image is the next one.
+
+    ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
+    parameter: the step length follows from it.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
+        cycle are this package's own.
+    """
+    return planned_cycle(
+        make_humanoid(robot, drive_limits=drive_limits, motors=motors),
+        objective=objective,
+        intervals=intervals,
+        samples_per_interval=samples_per_interval,
+        torso_share=torso_share,
+        load_degree=load_degree,
+    )
+
+
+def humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
+    """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged.
+
+    Args:
+        robot: name or file.
+        intervals: of each phase, as in the planned problem.
+        drive_limits: whether torques and speeds must be within the limits of the robot's file.
+
+    Raises:
+        GaitError: as ``make_humanoid``.
+    """
+    options: dict[str, str | int | float | bool] = {
+        "robot": robot,
+        "intervals": intervals,
+        "drive_limits": drive_limits,
+    }
+    return RecordedCycles(body=make_humanoid(robot, drive_limits=drive_limits), intervals=intervals, options=options)

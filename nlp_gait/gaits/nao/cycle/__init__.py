@@ -1,1 +1,0 @@
-"""The walking cycle: planned by its optimum, or by the textbook."""
