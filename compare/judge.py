@@ -95,7 +95,7 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         dense=None if dense_values is None else dense_values.indexes,
         dense_violations=()
         if dense is None or dense_values is None
-        else build_exact_model(dense).violated(dense_values),
+        else build_exact_model(dense).find_violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
         guaranteed=guarantee(problem, point) if values.violation <= FEASIBILITY_TOLERANCE else None,
     )

@@ -1,4 +1,4 @@
-"""A problem under the exact interpretation, as one CasADi function: what is compiled, searched and judged."""
+"""A problem under the exact interpretation, as one CasADi function that is compiled, searched and judged."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class ExactValues(NamedTuple):
     """Exact values at a point.
 
     Attributes:
-        cost: sign * objective: what is minimised.
-        violation: sum over all rows, each divided by its scale; NaN if a row is.
-        g: (m,) rows, the bounds of the variables last.
+        cost: sign * objective, which is minimised.
+        violation: sum over all rows, each divided by its scale; NaN if a row is NaN.
+        g: (m,) rows, the variables last.
         lower: (m,).
         upper: (m,).
         indexes: performance figures by name.
@@ -45,7 +45,7 @@ class ExactModel:
         function: (x, p) to the parts of ``ExactValues``, in their order.
         row_names: (m,) names of the constraint rows; the last n are the variables' bounds.
         row_units: (m,).
-        row_scales: (m,) violation that counts as 1, in the row's unit.
+        row_scales: (m,) scales of the violations [unit of the row].
         index_names: names of the indexes.
     """
 
@@ -57,7 +57,7 @@ class ExactModel:
 
     @one_at_a_time
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
-        """Values at x (n,) and parameter values p (k,)."""
+        """Return the values at x (n,) and parameter values p (k,)."""
         cost, violation, g, lower, upper, indexes = (
             np.array(value).ravel() for value in self.function(np.asarray(x), p)
         )
@@ -65,23 +65,23 @@ class ExactModel:
         return ExactValues(float(cost[0]), float(violation[0]), g, lower, upper, named)
 
     def rows(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
-        """Every row of these values with its name and unit."""
-        return self._named(values, range(len(self.row_names)))
+        """Return all rows with their names and units."""
+        return self._name_rows(values, range(len(self.row_names)))
 
-    def violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
-        """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
-        return find_violated_rows(self._named(values, np.flatnonzero(~(_excess(values) <= FEASIBILITY_TOLERANCE))))
+    def find_violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
+        """Return the rows that are violated by more than the tolerance, worst first; NaN is the worst."""
+        violated = np.flatnonzero(~(_compute_violations(values) <= FEASIBILITY_TOLERANCE))
+        return find_violated_rows(self._name_rows(values, violated))
 
-    def _named(self, values: ExactValues, chosen: Iterable[int]) -> tuple[ConstraintValue, ...]:
-        """Some rows, by their positions."""
-        excess = _excess(values)
+    def _name_rows(self, values: ExactValues, chosen: Iterable[int]) -> tuple[ConstraintValue, ...]:
+        violations = _compute_violations(values)
         return tuple(
             ConstraintValue(
                 name=self.row_names[k],
                 value=float(values.g[k]),
                 lower=float(values.lower[k]) if math.isfinite(values.lower[k]) else None,
                 upper=float(values.upper[k]) if math.isfinite(values.upper[k]) else None,
-                violation=float(excess[k]),
+                violation=float(violations[k]),
                 unit=self.row_units[k],
             )
             for k in chosen
@@ -89,18 +89,18 @@ class ExactModel:
 
 
 def build_exact_model(problem: GaitProblem) -> ExactModel:
-    """Exact function of a problem, built once for all copies that differ in parameter values only."""
+    """Return the exact function of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_build)
 
 
 def find_violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:
-    """Rows that are violated by more than the tolerance, worst first; one without a value is the worst."""
+    """Return the rows that are violated by more than the tolerance, worst first; NaN is the worst."""
     violated = [row for row in rows if not row.violation <= FEASIBILITY_TOLERANCE]
     return tuple(sorted(violated, key=lambda row: -math.inf if math.isnan(row.violation) else -row.violation))
 
 
-def _excess(values: ExactValues) -> Array:
-    """(m,) by how much each row is outside its bounds, in its unit; NaN if it has no value."""
+def _compute_violations(values: ExactValues) -> Array:
+    """Return (m,) violations in the units of the rows; NaN if a row is NaN."""
     return np.maximum(np.maximum(values.lower - values.g, values.g - values.upper), 0.0)
 
 
@@ -109,16 +109,16 @@ def _build(problem: GaitProblem) -> ExactModel:
     assembly = problem.assemble(point, Exact())
     constraints = assembly.constraints
     rows = [(*c.columns, MX(ca.DM.ones(c.value.shape[0]) * c.scale)) for c in constraints]
-    # The bounds of x are rows too: a candidate outside them is infeasible like any other.
+    # The bounds of x are rows, too: a candidate outside them is infeasible.
     n, k = len(problem.variables), len(problem.parameters)
     rows.append((point.x, point.p[k - 2 * n : k - n], point.p[k - n :], MX(ca.DM(problem.scale))))
     g, lower, upper, scale = (ca.vertcat(*parts) for parts in zip(*rows, strict=True))
-    # fmax takes the other argument for a NaN, and a NaN must not pass for feasible: it is neither above nor below a bound.
+    # fmax returns the other argument for NaN, which must not pass for feasible: it is neither above nor below a bound.
     comparable = (g <= upper) + (g > upper)
-    excess = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable
+    violations = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable
     outputs = {
         "cost": problem.objective.sign * assembly.objective,
-        "violation": ca.sum1(excess / scale),
+        "violation": ca.sum1(violations / scale),
         "g": g,
         "lower": lower,
         "upper": upper,

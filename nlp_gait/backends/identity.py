@@ -1,4 +1,4 @@
-"""What identifies a problem: hashes of its mathematics, its parameter values and its source."""
+"""Identity of a problem: hashes of its mathematics, its parameter values and its source."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A problem under the lifted interpretation, as an NLP over scaled variables.
 
     minimise  sign * objective(x, s)   over z in [0, 1]^n and the lifted variables s
-    subject to the problem's rows, and the rows that tie s to the expressions it stands for,
+    subject to the problem's rows, and the rows that tie s to the expressions it replaces,
 
 with x = default lower bound + z * default range. Samples are mapped, never unrolled.
 """
@@ -9,7 +9,6 @@ with x = default lower bound + z * default range. Samples are mapped, never unro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -22,10 +21,9 @@ from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
 # Sigmoid widths of the stages in which a jump is approached, in units of the switch (metres for a balance margin).
 WIDTHS = (1e-2, 5e-4)
-# A derivative below this is zero for the check of the lifting's sense.
-SENSE_TOLERANCE = 1e-12
-# Points at which that check is made: fixed fractions of the default ranges, away from the bounds.
+# The sense of the lifting is checked at these fractions of the default ranges; a derivative below the tolerance is zero.
 SENSE_POINTS = (0.25, 0.5, 0.75)
+SENSE_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,8 +40,8 @@ class NlpModel:
         lift_start: function (z, p, width) -> s at the exact values.
         lifted: number of lifted variables.
         tie_upper: upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0.
-        smoothed: True if a jump was smoothed, so that the width matters.
-        build_s: time it took to build [s].
+        smoothed: whether a jump is smoothed, so that the width matters.
+        build_s: time of the construction [s].
     """
 
     nlp: dict[str, MX]
@@ -60,20 +58,20 @@ class NlpModel:
 
     @property
     def widths(self) -> tuple[float, ...]:
-        """Sigmoid widths of a solver's stages, each of which starts from the last one; without a jump one stage is enough."""
+        """Sigmoid widths of a solver's stages, each of which starts from the last one; without a jump there is one stage."""
         return WIDTHS if self.smoothed else WIDTHS[-1:]
 
     def start(self, problem: GaitProblem, x: Array, width: float) -> Array:
-        """(z, s) of a point x (n,), with s at the exact values for a sigmoid width."""
+        """Return (z, s) of a point x (n,), with s at the exact values for a sigmoid width."""
         z = (x - self.offset) / self.scale
         return np.concatenate([z, np.array(self.lift_start(z, problem.p, width)).ravel()])
 
     def point(self, w: Array) -> Array:
-        """Decision variables (n,) of (z, s)."""
+        """Return the decision variables (n,) of (z, s)."""
         return np.asarray(self.offset + self.scale * w[: self.variables])
 
     def bounds(self, problem: GaitProblem) -> dict[str, Array]:
-        """Bounds of (z, s) and of g for a problem's parameter values, as CasADi's solvers take them."""
+        """Return the bounds of (z, s) and of g for a problem's parameter values, by CasADi's names."""
         lower, upper = (np.array(bound).ravel() for bound in self.row_bounds(problem.p))
         free = np.full(self.lifted, np.inf)
         return {
@@ -85,10 +83,10 @@ class NlpModel:
 
 
 def build_nlp(problem: GaitProblem) -> NlpModel:
-    """NLP of a problem, built once for all copies that differ in parameter values only.
+    """Return the NLP of a problem, built once for all copies that differ in parameter values only.
 
     Raises:
-        LiftedSenseError: the problem lifts a function where the reformulation would not be exact.
+        LiftedSenseError: the problem lifts a function where the reformulation is not exact.
     """
     return problem.build_once(_build)
 
@@ -120,21 +118,20 @@ def _build(problem: GaitProblem) -> NlpModel:
         offset=offset,
         scale=problem.scale,
         row_bounds=bounds,
-        lift_start=_lift_start(ops.lifts, [z, p, width]),
+        lift_start=_build_lift_start(ops.lifts, [z, p, width]),
         lifted=lifted.shape[0],
-        tie_upper=_per_row(ops.lifts, lambda lift: 0.0 if lift.tight else np.inf),
+        tie_upper=_repeat_per_row(ops.lifts, [0.0 if lift.tight else np.inf for lift in ops.lifts]),
         smoothed=ops.smoothed,
         build_s=time.perf_counter() - started,
     )
 
 
-def _per_row(lifts: list[Lift], value: Callable[[Lift], float]) -> Array:
-    """A number for each row of all lifts."""
-    return np.concatenate([np.zeros(0), *(np.full(lift.rows.shape[0], value(lift)) for lift in lifts)])
+def _repeat_per_row(lifts: list[Lift], values: list[float]) -> Array:
+    return np.repeat(np.array(values, dtype=float), [lift.rows.shape[0] for lift in lifts])
 
 
-def _lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
-    """Function of the inputs to the exact values of all lifted variables; a lift may contain earlier ones."""
+def _build_lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
+    """Return a function of the inputs to the exact values of all lifted variables; a lift may contain earlier ones."""
     values: list[MX] = []
     for i, lift in enumerate(lifts):
         earlier = [other.variable for other in lifts[:i]]
@@ -151,9 +148,9 @@ def _check_sense(
     bounds: ca.Function,
     row_names: tuple[str, ...],
 ) -> None:
-    """Lifting is exact only if moving a lifted variable away from its exact value never helps.
+    """Check that moving a lifted variable away from its exact value never helps; only then is the lifting exact.
 
-    Checked by the sign of the first derivatives of the cost, of each row and of the rows that define the other lifted
+    The check uses the signs of the first derivatives of the cost, of each row and of the rows that define the other lifted
     variables, at points inside the bounds. A tight lift cannot move.
     """
     loose = [i for i, lift in enumerate(lifts) if not lift.tight]
@@ -166,11 +163,11 @@ def _check_sense(
         "slopes", [inputs, variables], [ca.jacobian(outputs, ca.vertcat(*(lifts[i].variable for i in loose)))]
     )
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
-    tight = _per_row(lifts, lambda lift: lift.tight) > 0
+    tight = _repeat_per_row(lifts, [lift.tight for lift in lifts]) > 0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
     hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), tight - 1.0])
     two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])
-    # A lifted variable's own rows let it move away, by definition: they do not count.
+    # The rows that define a lifted variable let it move: they do not count.
     row_owner = np.repeat(np.arange(-1, len(lifts)), [1 + len(lower), *(lift.rows.shape[0] for lift in lifts)])
     row, column = (np.array(part) for part in slopes.sparsity_out(0).get_triplet())
     foreign = row_owner[row] != column_owner[column]
@@ -181,13 +178,9 @@ def _check_sense(
         helps |= two_sided[row] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():
             first = int(row[helps].min())
-            where = (
-                "the objective"
-                if first == 0
-                else "another abs or min"
-                if row_owner[first] >= 0
-                else f"row {row_names[first - 1]}"
-            )
+            where = "another abs or min"
+            if row_owner[first] < 0:
+                where = f"row {row_names[first - 1]}" if first else "the objective"
             raise LiftedSenseError(
                 f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "
                 "NLP would be wrong; use abs only where it is minimised or bounded from above, min only where it is "

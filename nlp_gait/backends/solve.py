@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlp_gait.backends.exact import ExactValues, build_exact_model, find_violated_rows
+from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
@@ -16,7 +16,7 @@ from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 from nlp_gait.interrupts import Interrupted, defer_interrupts
 
-# A bound whose price, times the bound's scale, is below this is numerical noise and not reported.
+# A price below this, times the bound's scale, is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
 MOST_STARTS = 100_000
 MOST_WORKERS = 4096
@@ -33,35 +33,35 @@ def solve(
     progress: Callable[[Outcome], None] | None = None,
     workers: int | None = None,
 ) -> Solution:
-    """Best local optimum from several starts.
+    """Find the best local optimum from several starts.
 
     Args:
         problem: with its current parameter values; a name is loaded with its defaults.
         starts: number of start points, from ``problem.start_point``.
         seed: of the start points.
-        x0: first start point (n,) within the bounds, in order or by name; a fixed variable takes the value at which it is
-            fixed. The remaining ``starts - 1`` are random.
-        fix: variables held at a value.
+        x0: first start point (n,) within the bounds, in order or by name; a fixed variable takes its fixed value. The remaining
+            ``starts - 1`` are random.
+        fix: values of variables that are fixed, by name.
         solver: with its settings; None for IPOPT with its defaults.
-        progress: called after each start, in their order.
-        workers: processes among which the starts are divided; None for all processors where a process can be forked (Linux, in
-            the main thread), 1 for none beside this one. The solution does not depend on it, but for the times in it.
+        progress: called with the outcome of each start, in their order.
+        workers: number of processes that share the starts; None for all processors where a process can be forked (Linux, in the
+            main thread), 1 for this process alone. The solution does not depend on it, except for its times.
 
     Returns:
-        The best start that converged and is feasible for the exact functions; if none did, the best feasible end point, and
-        if there is none, the least infeasible one with the rows that stand in the way.
+        The best start that converged and is feasible for the exact functions; else the best feasible end point; else the least
+        infeasible one with its violated rows.
 
     Raises:
         InputError: no start, x0 or a fixed value that is not allowed, or a solver that does not run here.
-        Interrupted: Ctrl-C; carries the solution from the starts until then, the one in progress where it was.
+        Interrupted: Ctrl-C; carries the solution of the starts so far, and of the interrupted one where it stopped.
     """
     starts = checked_count("starts", starts, at_most=MOST_STARTS)
     workers = None if workers is None else checked_count("workers", workers, at_most=MOST_WORKERS)
     seed = checked_count("seed", seed, at_least=0)
     problem = load(problem) if isinstance(problem, str) else problem
-    _check_kinds(problem, fix, solver, progress)
+    _check_types(problem, fix, solver, progress)
     problem = problem.fix(**(fix or {}))
-    points = _start_points(problem, starts, seed, x0)
+    points = _choose_start_points(problem, starts, seed, x0)
     ready = (solver or IpoptSettings()).prepare(problem, starts)
     outcomes: list[Outcome] = []
     with defer_interrupts() as interrupted:
@@ -76,14 +76,13 @@ def solve(
     return solution
 
 
-def _check_kinds(problem: object, fix: object, solver: object, progress: object) -> None:
-    """Raise InputError where an argument is of another kind."""
+def _check_types(problem: object, fix: object, solver: object, progress: object) -> None:
     if not isinstance(problem, GaitProblem):
         raise InputError(f"problem must be a problem from load, or the name of one, got {shown(problem)}")
     if fix is not None and not (isinstance(fix, Mapping) and all(isinstance(name, str) for name in fix)):
         raise InputError(f"fix must be values by variable name, got {shown(fix)}")
-    makes_runs = all(callable(getattr(solver, method, None)) for method in ("run", "prepare"))
-    if solver is not None and (isinstance(solver, type) or not makes_runs):
+    is_solver = all(callable(getattr(solver, method, None)) for method in ("run", "prepare"))
+    if solver is not None and (isinstance(solver, type) or not is_solver):
         raise InputError(
             f"solver must be made by nlp_gait.make_solver('ipopt'), IpoptSettings() or the like, got {shown(solver)}"
         )
@@ -91,7 +90,7 @@ def _check_kinds(problem: object, fix: object, solver: object, progress: object)
         raise InputError(f"progress must be a function of one start's outcome, got {shown(progress)}")
 
 
-def _start_points(
+def _choose_start_points(
     problem: GaitProblem, starts: int, seed: int, x0: Sequence[float] | Array | Mapping[str, float] | None
 ) -> list[Array]:
     rng = np.random.default_rng(seed)
@@ -102,18 +101,18 @@ def _start_points(
 
 
 def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:
-    """Solution from all starts: the cheapest that succeeded, else the cheapest feasible, else the least infeasible one."""
+    """Make the solution from all starts: the cheapest that converged, else the cheapest feasible, else the least infeasible."""
     best = min(outcomes, key=lambda outcome: outcome.rank)
     exact = build_exact_model(problem)
     values = exact.at(best.x, problem.p)
-    violations = find_violated_rows(exact.rows(values))
+    violations = exact.find_violated(values)
     status = best.status
     if not best.converged:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
         status = f"no start converged; the best feasible one {best.status}"
         if not best.feasible:
             status = f"no start converged to a feasible point; the least infeasible one {best.status}"
-        status += f"; in the way: {names}; relax these limits or widen the bounds" if names else ""
+        status += f"; violated: {names}; relax these limits or widen the bounds" if names else ""
         status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
     return Solution(
         problem=problem.address,
@@ -133,16 +132,16 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         solver=best.solver,
         linear_solver=best.linear_solver,
         functions=best.functions,
-        active_constraints=_active(problem, values, best.guess) if best.converged and best.guess is not None else (),
+        active_constraints=_find_active(problem, values, best.guess) if best.converged and best.guess is not None else (),
         starts=tuple(outcomes),
         seed=seed,
     )
 
 
-def _active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[ActiveConstraint, ...]:
-    """Bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
+def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[ActiveConstraint, ...]:
+    """Return the bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
 
-    Equations of the problem always hold and are left out; a variable that is fixed has a price.
+    Equations of the problem are left out; a fixed variable has a price.
     """
     exact, unit = build_exact_model(problem), problem.objective.unit
     rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last

@@ -7,7 +7,7 @@ from typing import Literal
 
 from casadi import MX
 
-from nlp_gait.backends.exact import build_exact_model, find_violated_rows
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -44,7 +44,7 @@ def toy(
 def row_violations(problem: GaitProblem, x: Array) -> tuple[ConstraintValue, ...]:
     """Rows that the exact functions find violated at x, worst first."""
     exact = build_exact_model(problem)
-    return find_violated_rows(exact.rows(exact.at(x, problem.p)))
+    return exact.find_violated(exact.at(x, problem.p))
 
 
 def row(value: MX, lower: MX | None = None, upper: MX | None = None) -> Constraint:

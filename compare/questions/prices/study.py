@@ -17,7 +17,7 @@ from compare.study.stored_solver import store_runs
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
-from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
+from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -76,7 +76,7 @@ def solved(problem: GaitProblem, starts: int, seed: int, solver: Solver | None =
             f"{problem.name}: none of {starts} starts converged to a feasible point, so there is nothing to differentiate; "
             "try more --starts, or relax the limits that `nlp-gait solve` names"
         )
-    return Solved(near, optimum(problem, near))
+    return Solved(near, find_optimum(problem, near))
 
 
 def prices(

@@ -190,6 +190,6 @@ def _rival(
         return Rival(planner=planner, at=at, indexes={}, broken=(), note=note)
     exact = build_exact_model(result.problem)
     values = exact.at(result.x, result.problem.p)
-    broken = tuple(f"{row.name} by {row.violation:.2g} {row.unit}" for row in exact.violated(values))
+    broken = tuple(f"{row.name} by {row.violation:.2g} {row.unit}" for row in exact.find_violated(values))
     walk = walked(result, steps, drive, store) if steps else None
     return Rival(planner=planner, at=at, indexes=dict(values.indexes), broken=broken, note=note, walk=walk)

@@ -1,4 +1,4 @@
-"""Solve a path of neighbouring problems, each from the end of the last one; nothing is rebuilt between them."""
+"""Solutions of a path of neighbouring problems, each from the last solution; nothing is rebuilt between them."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Continuation:
     solution, if the solver has one; if that fails, cold from the neighbour's x; if that fails too, from random starts.
 
     Args:
-        starts: number of random starts where there is no neighbour, or where it does not help.
+        starts: number of random starts if there is no neighbour, or if it does not help.
         seed: of the random starts.
         solver: with its settings; None for IPOPT with its defaults.
-        solves: how many are planned, which decides whether compiling pays if the settings leave it open.
+        solves: planned number of solves, which decides whether compilation pays if the settings do not.
     """
 
     def __init__(self, *, starts: int = 5, seed: int = 0, solver: Solver | None = None, solves: int = 1) -> None:
@@ -37,18 +37,18 @@ class Continuation:
         self._neighbour: Outcome | None = None
 
     def solve(self, problem: GaitProblem) -> Solution:
-        """Solution of the next problem on the path: a copy of the first one with other parameter values."""
+        """Return the solution of the next problem on the path, a copy of the first one with other parameter values."""
         return make_solution(problem, self.run(problem), self._seed)
 
     def run(
         self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Callable[[], bool] = never
     ) -> list[Outcome]:
-        """Runs of the next problem; the best of these and the earlier ones is the next problem's neighbour.
+        """Return runs of the next problem; the best of these and the earlier runs is the neighbour of the next problem.
 
         Args:
             problem: a copy of the first one with other parameter values.
-            earlier: runs of the same problem from elsewhere. Random starts are not repeated where they were in vain.
-            stop: asked after each iteration whether to end at once.
+            earlier: runs of the same problem on another path; random starts without success are not repeated.
+            stop: called after each iteration; returns whether to end at once.
         """
         solver, near = self._solver.prepare(problem, self._solves), self._neighbour
         outcomes: list[Outcome] = []
@@ -79,20 +79,20 @@ def solve_both_ways(
     solver: Solver | None = None,
     progress: Callable[[], None] | None = None,
 ) -> list[Solution]:
-    """Solutions of a path of neighbouring problems, followed forwards and backwards; the better one counts.
+    """Solve a path of neighbouring problems forwards and backwards, and return the better solution of each.
 
-    Where a local optimum stops being the best one, a path followed in one direction stays on it for a while; followed the
-    other way it arrives on the other one.
+    Where a local optimum ceases to be the best one, a path in one direction stays on it for a while; in the other direction it
+    arrives on the other optimum.
 
     Args:
-        problems: copies of one problem with other parameter values, neighbours side by side.
+        problems: copies of one problem with other parameter values, neighbours next to each other.
         starts: number of random starts at both ends of the path, and where no neighbour helps.
         seed: of the random starts.
         solver: with its settings; None for IPOPT with its defaults.
         progress: called after each problem, twice as often as there are problems.
 
     Raises:
-        Interrupted: Ctrl-C; carries the solutions from the runs until then, None for problems without any.
+        Interrupted: Ctrl-C; carries the solutions so far, None for problems without a run.
     """
     order = range(len(problems))
     outcomes: list[list[Outcome]] = [[] for _ in problems]

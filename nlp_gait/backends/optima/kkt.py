@@ -63,7 +63,7 @@ class KktFunctions:
 
 
 def build_kkt_functions(problem: GaitProblem) -> KktFunctions:
-    """First-order conditions of a problem, built once for all copies that differ in parameter values only."""
+    """Return the first-order conditions of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_build)
 
 
@@ -87,7 +87,7 @@ def _build(problem: GaitProblem) -> KktFunctions:
 
 
 def column(value: DM) -> Array:
-    """A dense vector."""
+    """Return a dense vector."""
     return np.array(value).ravel()
 
 

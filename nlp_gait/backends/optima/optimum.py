@@ -1,8 +1,8 @@
-"""A local optimum to machine precision, with the bounds that hold it and how firmly they do.
+"""A local optimum to machine precision, with its active bounds.
 
-IPOPT stops near an optimum, with every multiplier a little off zero. Here the bounds with a price are taken as equations and the
-first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is released, one that is
-violated is added, until nothing changes.
+IPOPT stops near an optimum, where no multiplier is exactly zero. Here the bounds with a price are taken as equations and the
+first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is released, a violated one is
+added, until nothing changes.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import one_at_a_time
 from nlp_gait.formulation.solution import Guess, Outcome
 
-# Tolerance at which IPOPT distinguishes bounds with a price from those without: at kinks of |power| both are small.
+# IPOPT then distinguishes bounds with and without a price: at kinks of |power| both multipliers are small.
 SHARP = IpoptSettings(tolerance=1e-12)
 ROUNDS = 30
-# The conditions hold to this, in units of cost per range of a variable, and of the rows.
+# Largest violation of the conditions, in units of cost per range of a variable, and of the rows.
 RESIDUAL = 1e-9
-# A multiplier or a slack below this is zero: the bound is weakly active, and x* may move differently to both sides.
+# A multiplier or a slack below this is zero: the bound is weakly active, and x* may move differently to either side.
 WEAK = 1e-8
-# Dense linear algebra: beyond this number of unknowns it takes minutes.
+# Most unknowns: dense linear algebra takes minutes for more.
 LARGEST = 2_500
 
 
@@ -36,13 +36,13 @@ class Optimum:
     """Point that satisfies the first-order conditions.
 
     Attributes:
-        problem: that it belongs to.
+        problem: the problem.
         functions: its first-order conditions.
-        w: scaled variables and lifted ones.
+        w: scaled variables and lifted variables.
         width: of the sigmoid.
         multipliers: (m,) of all rows and bounds; positive at an upper bound.
-        side: (m,) 1 where a row holds at its upper bound, -1 at its lower one, else 0.
-        weak: names of the bounds that hold without a price, or nearly hold.
+        side: (m,) 1 where a row is at its upper bound, -1 at its lower one, else 0.
+        weak: names of the bounds that are active without a price, or nearly active.
         residual: largest violation of the conditions.
         freedom: dimension of the space in which x* and the lifted variables could move along the active bounds.
         dependent: number of active rows that follow from the others: their multipliers are not unique.
@@ -69,12 +69,12 @@ class Optimum:
     @property
     @one_at_a_time
     def objective(self) -> float:
-        """In the problem's own sense."""
+        """Objective in the problem's sense."""
         return self.problem.objective.sign * float(self.functions.values(self.w, self.parameters)[0])
 
     @property
     def active(self) -> np.ndarray[Any, np.dtype[np.intp]]:
-        """Indexes of the rows that hold as equations."""
+        """Indices of the active rows."""
         return np.asarray(np.flatnonzero(self.side))
 
     @cached_property
@@ -98,29 +98,28 @@ class Optimum:
 
 
 @one_at_a_time
-def optimum(problem: GaitProblem, near: Outcome) -> Optimum:
-    """The optimum near which a solver ended.
+def find_optimum(problem: GaitProblem, near: Outcome) -> Optimum:
+    """Find the optimum near which a solver ended.
 
     Raises:
-        InputError: the solver gives no multipliers, or the problem has too many variables for dense linear algebra.
+        InputError: the solver returns no multipliers, or the problem has too many variables for dense linear algebra.
     """
     if near.guess is None:
         raise InputError(
-            f"{problem.name}: prices and sensitivities need multipliers, which {near.solver} does not give; solve with ipopt"
+            f"{problem.name}: prices and sensitivities need multipliers, which {near.solver} does not return; solve with ipopt"
         )
     functions, unknowns = build_kkt_functions(problem), len(near.guess.primal)
     if unknowns > LARGEST:
         raise InputError(
-            f"{problem.name} has {unknowns} variables; prices and sensitivities are made for at most {LARGEST}: "
-            "fewer intervals may help"
+            f"{problem.name} has {unknowns} variables; prices and sensitivities support at most {LARGEST}; use fewer intervals"
         )
     sharper = SHARP.run_from(problem, near)
     guess = near.guess if sharper is None or sharper.guess is None or not sharper.converged else sharper.guess
-    return _with_flat_lifts_held(_converged(problem, functions, guess))
+    return _fix_flat_lifts(_converge(problem, functions, guess))
 
 
-def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Optimum:
-    """Newton's method on the active rows, which change until all signs are right."""
+def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Optimum:
+    """Apply Newton's method to the active rows, which change until all signs are right."""
     w, p = guess.primal.copy(), np.append(problem.p, guess.width)
     lam = np.concatenate([guess.rows, guess.bounds[: functions.model.variables]])
     _, values, lower, upper = (column(part) for part in functions.values(w, p))
@@ -142,9 +141,9 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
         w, lam[active] = w + step.w, lam[active] + step.multipliers
         _, values, lower, upper = (column(part) for part in functions.values(w, p))
         wrong = (lam * side < -WEAK) & ~equation
-        beyond = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
-        if wrong.any() or beyond.any():
-            side = np.where(wrong, 0, side + beyond)
+        violated = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
+        if wrong.any() or violated.any():
+            side = np.where(wrong, 0, side + violated)
             continue
         gap = (np.where(side > 0, upper, lower) - values)[active]
         slope = column(functions.gradient(w, p, lam))
@@ -154,7 +153,7 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
             break
     slack = np.minimum(upper - values, values - lower)
     weak = np.where(side == 0, np.abs(slack) < WEAK, np.abs(lam) < WEAK) & ~equation
-    names = row_names(problem, functions)
+    names = list_row_names(problem, functions)
     return Optimum(
         problem=problem,
         functions=functions,
@@ -170,10 +169,10 @@ def _converged(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> O
     )
 
 
-def _with_flat_lifts_held(found: Optimum) -> Optimum:
-    """Lifted variables that nothing holds, for no bound on them has a price, set to the values that they stand for.
+def _fix_flat_lifts(found: Optimum) -> Optimum:
+    """Set lifted variables that nothing determines, because no bound on them has a price, to their exact values.
 
-    The row that ties such a one to its value then counts as an equation, so that it follows x.
+    The row that ties such a variable to its value then counts as an equation, so that it follows x.
     """
     model, n = found.functions.model, found.functions.model.variables
     if found.reason is not None or model.lifted == 0:
@@ -191,13 +190,13 @@ def _with_flat_lifts_held(found: Optimum) -> Optimum:
     first, last = len(model.row_names), len(model.row_names) + len(model.tie_upper)
     ties = np.arange(first, last)
     for j in loose:
-        own = ties[(jacobian[first:last, n + j] != 0.0) & (side[first:last] == 0)]
-        if own.size:
-            side[own[np.argmin((values - lower)[own])]] = -1
+        tie = ties[(jacobian[first:last, n + j] != 0.0) & (side[first:last] == 0)]
+        if tie.size:
+            side[tie[np.argmin((values - lower)[tie])]] = -1
     return replace(moved, side=side)
 
 
-def row_names(problem: GaitProblem, functions: KktFunctions) -> tuple[str, ...]:
-    """Names of all rows: the problem's, those that tie lifted variables, and the variables' bounds."""
+def list_row_names(problem: GaitProblem, functions: KktFunctions) -> tuple[str, ...]:
+    """Return the names of all rows: the problem's, those that tie lifted variables, and the variables' bounds."""
     ties = (f"lifted[{i}]" for i in range(len(functions.model.tie_upper)))
     return (*functions.model.row_names, *ties, *(f"bounds[{name}]" for name in problem.names))

@@ -1,7 +1,7 @@
-"""How an optimum responds to its parameters and to another model: derivatives of the objective and of x*.
+"""Derivatives of an optimum, its objective and x*, with respect to parameters and to the model.
 
 The objective's derivative is that of the Lagrangian at fixed x* and multipliers (envelope theorem); x* moves by the linearised
-first-order conditions with the active bounds held (implicit function theorem).
+first-order conditions with the active bounds as equations (implicit function theorem).
 
 Source:
     Fiacco (1983), Introduction to Sensitivity and Stability Analysis in Nonlinear Programming, theorem 3.2.2.
@@ -23,20 +23,20 @@ from nlp_gait.formulation.locking import one_at_a_time
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
-# A bound that is approached more slowly than this for each unit of a quantity is not approached.
+# A bound that is approached more slowly than this per unit of a quantity is not approached.
 STILL = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives at an optimum, one column for each quantity that may change.
+    """Derivatives at an optimum, one column for each quantity.
 
     Attributes:
-        objective: (k,) of the optimal objective, in the problem's own sense.
+        objective: (k,) of the optimal objective, in the problem's sense.
         x: (n, k) of x*.
         defined: (k,) False where dependent active bounds contradict each other: no derivative exists.
         reach: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes
-            active or an active one is released: beyond it x* changes direction.
+            active or an active one is released: there x* changes direction.
     """
 
     objective: Array
@@ -46,7 +46,7 @@ class Sensitivities:
 
 
 class _Change(NamedTuple):
-    """Derivatives at fixed w and multipliers, one column for each quantity: of cost, rows, their bounds, gradient of L."""
+    """Derivatives of cost, rows, their bounds and gradient of L at fixed w and multipliers, one column for each quantity."""
 
     cost: Array
     values: Array
@@ -57,80 +57,80 @@ class _Change(NamedTuple):
 
 @one_at_a_time
 def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
-    """Derivatives with respect to every parameter of the problem, in their order and units.
+    """Return derivatives with respect to all parameters of the problem, in their order and units.
 
     Raises:
-        InputError: the optimum has none; the message says why.
+        InputError: the optimum has no derivatives; the message says why.
     """
-    _require(optimum)
+    _require_derivatives(optimum)
     parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
     cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
-    return _sensitivities(optimum, _Change(cost[0], *others))
+    return _differentiate(optimum, _Change(cost[0], *others))
 
 
 @one_at_a_time
 def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
-    """Derivatives with respect to what the problem was built with, for example a robot's masses.
+    """Return derivatives with respect to the data of the model, for example a robot's masses.
 
-    By central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
-    problems are evaluated, not solved. Their own parameter values are not used.
+    They are central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
+    problems are evaluated, not solved, and not at their own parameter values.
 
     Args:
         optimum: of the unchanged problem.
-        pairs: for each quantity the problem with more of it, with less of it, and the difference in that quantity.
+        pairs: for each quantity the problem with more of it, the problem with less of it, and the difference.
 
     Raises:
         InputError: the optimum has no sensitivities, or another model has other constraints.
     """
-    _require(optimum)
+    _require_derivatives(optimum)
     columns = []
     for more, less, difference in pairs:
-        high, low = (_evaluated(optimum, problem) for problem in (more, less))
+        high, low = (_evaluate(optimum, problem) for problem in (more, less))
         columns.append([(a - b) / difference for a, b in zip(high, low, strict=True)])
     cost, *others = (np.array(part).T for part in zip(*columns, strict=True))
-    return _sensitivities(optimum, _Change(cost, *others))
+    return _differentiate(optimum, _Change(cost, *others))
 
 
-def _evaluated(optimum: Optimum, problem: GaitProblem) -> _Change:
-    """What a change is the difference of, for another model at the same x, multipliers and parameter values."""
+def _evaluate(optimum: Optimum, problem: GaitProblem) -> _Change:
+    """Evaluate another model at the same x, multipliers and parameter values."""
     functions = build_kkt_functions(problem)
     own, other, n = optimum.functions.model, functions.model, optimum.functions.model.variables
     if own.row_names != other.row_names or own.lifted != other.lifted:
         raise InputError(f"{problem.name}: the other model has other constraints; sensitivities need the same ones")
-    stretch = own.scale / other.scale  # its variables may be scaled to another range
+    ratio = own.scale / other.scale  # its variables may be scaled to another range
     w, lam = optimum.w.copy(), optimum.multipliers.copy()
     w[:n] = (optimum.x - other.offset) / other.scale
-    lam[-n:] /= stretch
+    lam[-n:] /= ratio
     cost, values, lower, upper = (column(part) for part in functions.values(w, optimum.parameters))
     gradient = column(functions.gradient(w, optimum.parameters, lam))
-    gradient[:n] *= stretch
+    gradient[:n] *= ratio
     for part in (values, lower, upper):  # x and its bounds are the same
         part[-n:] = 0.0
         part[~np.isfinite(part)] = 0.0
     return _Change(cost[0], values, lower, upper, gradient)
 
 
-def _sensitivities(optimum: Optimum, change: _Change) -> Sensitivities:
+def _differentiate(optimum: Optimum, change: _Change) -> Sensitivities:
     model, side, active = optimum.functions.model, optimum.side, optimum.active
     hessian, jacobian = optimum.matrices
-    held = (change.values - np.where(side[:, None] > 0, change.upper, change.lower))[active]
-    step = solve_kkt(hessian, jacobian[active], -change.gradient, -held, model.variables)
+    shift = (change.values - np.where(side[:, None] > 0, change.upper, change.lower))[active]
+    step = solve_kkt(hessian, jacobian[active], -change.gradient, -shift, model.variables)
     return Sensitivities(
-        objective=optimum.problem.objective.sign * (change.cost + optimum.multipliers[active] @ held),
+        objective=optimum.problem.objective.sign * (change.cost + optimum.multipliers[active] @ shift),
         x=model.scale[:, None] * step.w[: model.variables],
-        defined=step.inconsistent <= CONTRADICTION * np.maximum(1.0, np.abs(held).max(axis=0, initial=0.0)),
-        reach=_reach(optimum, change, jacobian @ step.w, step.multipliers),
+        defined=step.inconsistent <= CONTRADICTION * np.maximum(1.0, np.abs(shift).max(axis=0, initial=0.0)),
+        reach=_find_reach(optimum, change, jacobian @ step.w, step.multipliers),
     )
 
 
-def _reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) -> Array:
-    """How far each quantity may change, down and up, before the set of active bounds does.
+def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) -> Array:
+    """Return how far each quantity may change, down and up, before the set of active bounds changes.
 
     Args:
-        optimum: where it starts.
+        optimum: at which the change begins.
         change: of rows and bounds at fixed w.
-        moved: (m, k) change of the rows by that of w.
-        multipliers: (a, k) change of the active rows' multipliers.
+        moved: (m, k) change of the rows by the change of w.
+        multipliers: (a, k) change of the multipliers of the active rows.
     """
     values, lower, upper = optimum.rows
     inactive, active = optimum.side == 0, optimum.active
@@ -154,6 +154,6 @@ def _reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) 
     return np.array([down, up])
 
 
-def _require(optimum: Optimum) -> None:
+def _require_derivatives(optimum: Optimum) -> None:
     if optimum.reason is not None:
         raise InputError(f"{optimum.problem.name}: no sensitivities at this point: {optimum.reason}")

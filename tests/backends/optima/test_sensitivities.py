@@ -10,7 +10,7 @@ from casadi import MX
 from nlp_gait import load
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
-from nlp_gait.backends.optima.optimum import SHARP, Optimum, optimum
+from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem
@@ -32,7 +32,7 @@ def found(problem: GaitProblem) -> Optimum:
 def solved(problem: GaitProblem) -> tuple[Outcome, Optimum]:
     end = find_cheapest_feasible(Continuation(starts=3).run(problem))
     assert end is not None
-    return end, optimum(problem, end)
+    return end, find_optimum(problem, end)
 
 
 def sharp(problem: GaitProblem, near: Outcome) -> Outcome:

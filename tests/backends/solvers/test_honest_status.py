@@ -45,7 +45,7 @@ def test_contradicting_limits_are_called_local_infeasibility() -> None:
     solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(x**2 + y**2, upper=-2 * limit),))))
     assert not solution.converged
     assert (
-        "the least infeasible one converged to a point of local infeasibility; in the way: row (by 1 m)"
+        "the least infeasible one converged to a point of local infeasibility; violated: row (by 1 m)"
         in solution.status
     )
 

@@ -124,7 +124,7 @@ def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
     solution = solve(problem, starts=1, solver=IpoptSettings(iterations=60))
     assert not solution.converged
     assert solution.status.startswith("no start converged to a feasible point; the least infeasible one ")
-    assert "in the way: " in solution.status
+    assert "violated: " in solution.status
     assert "dbm_y_mean" in [row.name for row in solution.worst_violations]
     assert solution.active_constraints == ()
     assert solution.violation == min(start.violation for start in solution.starts)

@@ -13,7 +13,7 @@ import pytest
 from compare.questions.certainty.multistart import multistart
 from compare.study.store import Store
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible, solve_both_ways
-from nlp_gait.backends.optima.optimum import optimum
+from nlp_gait.backends.optima.optimum import find_optimum
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.nlpsol import CasadiSolver, probe
 from nlp_gait.backends.solvers.registry import SOLVERS, make_solver
@@ -86,8 +86,8 @@ def test_what_needs_multipliers_says_which_solver_gives_none() -> None:
     problem = toy(corner, limit=1.5)
     near = find_cheapest_feasible(Continuation(starts=1, solver=Corners()).run(problem))
     assert near is not None
-    with pytest.raises(InputError, match="need multipliers, which corners does not give; solve with ipopt"):
-        optimum(problem, near)
+    with pytest.raises(InputError, match="need multipliers, which corners does not return; solve with ipopt"):
+        find_optimum(problem, near)
 
 
 def test_unknown_names_and_settings_are_refused() -> None:
