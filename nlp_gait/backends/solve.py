@@ -132,7 +132,9 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         solver=best.solver,
         linear_solver=best.linear_solver,
         functions=best.functions,
-        active_constraints=_find_active(problem, values, best.guess) if best.converged and best.guess is not None else (),
+        active_constraints=_find_active(problem, values, best.guess)
+        if best.converged and best.guess is not None
+        else (),
         starts=tuple(outcomes),
         seed=seed,
     )
