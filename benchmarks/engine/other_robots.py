@@ -14,7 +14,7 @@ from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import engine_step
 from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
-from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, row_of
+from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, find_row
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.walk12 import simulation_model as walk12_model
 from nlp_gait.simulation.drive import Drive
@@ -83,7 +83,7 @@ def stairs() -> Iterator[str]:
 def other_gains() -> Iterator[str]:
     """How both fare with other gains, feed-forward, friction and steps of the engine."""
     climb = make_plan(optimal_climb(nlp_gait.load("stairs-plan")))
-    fast, slow = row_of(0.15), TABLE_4[0]
+    fast, slow = find_row(0.15), TABLE_4[0]
     yield header(
         "variant",
         "stairs-plan J",
@@ -156,7 +156,7 @@ def walks() -> dict[str, Result]:
         )
         found[f"optimum, {name}"] = _at(variant, nlp_gait.solve(variant, starts=5, seed=0).x)
     turning = problem.with_values(turn_rad=math.radians(8.0))
-    return found | {"paper, lambda 0.9, on a circle of 8 degrees a step": _at(turning, row_of(0.9).x)}
+    return found | {"paper, lambda 0.9, on a circle of 8 degrees a step": _at(turning, find_row(0.9).x)}
 
 
 def climbs() -> Iterator[tuple[str, Result]]:

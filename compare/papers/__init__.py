@@ -1,1 +1,32 @@
-"""The seed papers' tables and figures, next to ours."""
+"""Reproductions of papers: their tables, figures and claims next to ours."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from nlp_gait.errors import unknown
+
+if TYPE_CHECKING:
+    from compare.papers.reproduction import Reproduction
+
+# Modules with a REPRODUCTION, by name of the paper.
+REPRODUCTIONS = {
+    "nao": "compare.papers.nao.nao_reproduction",
+    "nao-pareto": "compare.papers.nao_pareto.nao_pareto_reproduction",
+    "walk12": "compare.papers.walk12.walk12_reproduction",
+    "stairs": "compare.papers.stairs.stairs_reproduction",
+    "nao-claims": "compare.papers.nao_walk.nao_walk_reproduction",
+}
+
+
+def load_reproduction(paper: str) -> Reproduction[Any, Any]:
+    """Return the reproduction of a paper.
+
+    Raises:
+        UnknownNameError: there is no reproduction of that name.
+    """
+    if paper not in REPRODUCTIONS:
+        raise unknown("reproduction", paper, REPRODUCTIONS)
+    reproduction: Reproduction[Any, Any] = import_module(REPRODUCTIONS[paper]).REPRODUCTION
+    return reproduction

@@ -1,19 +1,21 @@
-"""Runs of a reproduction as tasks and records of a study, and what its tables need to know of several records."""
+"""Runs of a reproduction, stored in its folder, and what its tables need to know about several records."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from compare.study.record import RunRecord
 from compare.study.runner import Run, run_task
+from compare.study.store import Computation, Store
 from compare.study.study import Study, record_file, run_study
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
-from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.progress import Progress
 
@@ -21,8 +23,63 @@ Runs = dict[tuple[str, str], list[RunRecord]]
 """Records in the order of their runs, by title of the problem and of the solver."""
 
 
-def starts(problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping[str, Any] | None = None) -> list[Task]:
-    """IPOPT from random points that are drawn one after another from one seed, as ``nlp_gait.solve`` draws them."""
+@dataclass(frozen=True)
+class Effort:
+    """How much a reproduction computes; each one adds its numbers of runs, evaluations and so on."""
+
+    @property
+    def steps(self) -> int | None:
+        """Number of calls of progress; None if it is not known before."""
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runner:
+    """Runs tasks and other computations of a reproduction; results that an earlier call has stored in its folder are read.
+
+    Attributes:
+        folder: of the reproduction.
+        progress: receives a line for each run and each computation.
+        jobs: worker processes; 1 runs in this process.
+    """
+
+    folder: Path
+    progress: Progress
+    jobs: int
+
+    def run_tasks(self, tasks: Iterable[Task], run: Run = run_task) -> Runs:
+        """Run tasks with different titles by a function that performs one run, and return their records.
+
+        Raises:
+            InputError: a run failed before it had a point, or the folder holds runs of other tasks.
+        """
+        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, run=run)
+
+        def report_stored(count: int) -> None:
+            for _ in range(count):
+                self.progress("stored by an earlier run")
+
+        runs: Runs = {}
+        records = run_study(
+            study, lambda task, _: self.progress(f"{task.problem.title}, {task.title} {task.run}"), report_stored
+        )
+        for task, record in zip(study.tasks, records, strict=True):
+            if not record.x:
+                file = record_file(self.folder, task)
+                raise InputError(f"{file.parent.name}/{file.stem} {record.status}; fix this and delete {str(file)!r}")
+            runs.setdefault((record.problem, record.solver), []).append(record)
+        return runs
+
+    def compute(self, computations: Sequence[Computation], code: Sequence[ModuleType]) -> dict[str, Any]:
+        """Return results by name; they are recomputed when their inputs or the text of the code have changed."""
+        store = Store(self.folder)
+        return store.compute_all(computations, jobs=self.jobs, code=code, progress=self.progress)
+
+
+def make_start_tasks(
+    problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping[str, Any] | None = None
+) -> list[Task]:
+    """Return tasks of IPOPT from random points, drawn from one seed as by ``nlp_gait.solve``."""
     model, rng = problem.load(), np.random.default_rng(seed)
     points = [model.by_name(model.start_point(rng)) for _ in range(count)]
     return [
@@ -31,42 +88,16 @@ def starts(problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping
     ]
 
 
-def searches(problem: ProblemSpec, label: str, algorithm: Algorithm, runs: int, evaluations: int) -> list[Task]:
-    """Runs of a search algorithm; run k has seed k."""
+def make_search_tasks(
+    problem: ProblemSpec, label: str, algorithm: Algorithm, runs: int, evaluations: int
+) -> list[Task]:
+    """Return tasks of a search; run k has seed k."""
     stop = Stop(evaluations=evaluations)
     return [Task(problem=problem, solver=algorithm, label=label, stop=stop, run=run) for run in range(runs)]
 
 
-def run_all(folder: Path, tasks: Iterable[Task], progress: Progress, run: Run = run_task) -> Runs:
-    """Run all tasks and return their records; a run that an earlier call has finished is read from its file.
-
-    Args:
-        folder: of the reproduction.
-        tasks: with different titles.
-        progress: told of each run.
-        run: does one run.
-
-    Raises:
-        InputError: a run failed before it had a point, or the folder holds runs of other tasks.
-    """
-    study = Study(tasks=tuple(tasks), folder=folder, jobs=available_cores(), run=run)
-
-    def keep(count: int) -> None:
-        for _ in range(count):
-            progress("stored by an earlier run")
-
-    found: Runs = {}
-    records = run_study(study, lambda task, _: progress(f"{task.problem.title}, {task.title} {task.run}"), keep)
-    for task, record in zip(study.tasks, records, strict=True):
-        if not record.x:
-            file = record_file(folder, task)
-            raise InputError(f"{file.parent.name}/{file.stem} {record.status}; mend that and delete {str(file)!r}")
-        found.setdefault((record.problem, record.solver), []).append(record)
-    return found
-
-
-def best(records: Iterable[RunRecord]) -> RunRecord:
-    """The best run: successful ones come first, then feasible ones, both by objective, then the others by violation."""
+def choose_best(records: Iterable[RunRecord]) -> RunRecord:
+    """Return the best run: claimed ones come first, then feasible ones, both by objective, then the others by violation."""
     return min(records, key=_rank)
 
 
@@ -76,11 +107,17 @@ def _rank(record: RunRecord) -> tuple[bool, bool, float]:
     return not record.claimed, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
 
 
-def objectives(records: Iterable[RunRecord]) -> list[float]:
-    """Exact objective at the end of each run, in the problem's sense."""
+def list_objectives(records: Iterable[RunRecord]) -> list[float]:
+    """Return the exact objective at the end of each run, in the problem's sense."""
     return [record.verdict.objective for record in records]
 
 
-def point(record: RunRecord) -> list[float]:
-    """x in the problem's order."""
+def get_point(record: RunRecord) -> list[float]:
+    """Return x in the problem's order."""
     return list(record.x.values())
+
+
+def compute_range(values: Iterable[float]) -> tuple[float, float]:
+    """Return the least and the greatest value."""
+    known = [float(value) for value in values]
+    return min(known), max(known)

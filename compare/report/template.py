@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from compare.report.document import Document, Figure, Part, Prose, Rows, Section, Table
@@ -13,11 +13,17 @@ if TYPE_CHECKING:
 
 HEADING = re.compile(r"(#+) (.+)")
 TABLE = re.compile(r"\{([\w-]+)\}\n\|(.+)\|\n\|(.+)\|")
+WHOLE_TABLE = re.compile(r"\{([\w-]+)\}")
 FIGURE = re.compile(r"!\[(.*)\]\((.+)\.png\)", re.DOTALL)
 
 
 def fill_template(
-    text: str, *, values: Mapping[str, Any], tables: Mapping[str, Rows], figures: Mapping[str, Drawing]
+    text: str,
+    *,
+    values: Mapping[str, Any],
+    tables: Mapping[str, Rows],
+    figures: Mapping[str, Drawing],
+    whole_tables: Sequence[Table] = (),
 ) -> Document:
     """Return the document of a text.
 
@@ -30,11 +36,15 @@ def fill_template(
         | solver | power [W] |
         | | .3f |
 
+    ``{name}`` alone is one of the whole tables, which have their own headings.
+
     Raises:
         KeyError: the text names a value, table or drawing that is missing.
     """
     title, *blocks = re.split(r"\n{2,}", text.strip())
     open_sections: list[tuple[str, list[Part]]] = [(title.removeprefix("# "), [])]
+
+    whole = {table.name: table for table in whole_tables}
 
     def close(level: int) -> None:
         while len(open_sections) > level:
@@ -48,6 +58,8 @@ def fill_template(
             open_sections.append((heading[2].format_map(values), []))
         elif table := TABLE.fullmatch(block):
             parts.append(_table(tables[table[1]], table[1], *(line.format_map(values) for line in table.groups()[1:])))
+        elif (place := WHOLE_TABLE.fullmatch(block)) and place[1] in whole:
+            parts.append(whole[place[1]])
         elif figure := FIGURE.fullmatch(block):
             parts.append(Figure(name=figure[2], caption=figure[1].format_map(values), drawing=figures[figure[2]]))
         else:

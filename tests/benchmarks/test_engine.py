@@ -8,7 +8,7 @@ pytest.importorskip("mujoco")
 import nlp_gait  # noqa: E402
 from benchmarks.engine import agreement, gaits, other_robots  # noqa: E402
 from compare.judge import evaluate  # noqa: E402
-from compare.papers.walk12.walk12_paper import row_of  # noqa: E402
+from compare.papers.walk12.walk12_paper import find_row  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.formulation import Result  # noqa: E402
 from nlp_gait.gaits.walk12.robot import point_mass_biped  # noqa: E402
@@ -56,7 +56,7 @@ def test_point_masses_are_built_otherwise_only_within_the_block():
 @pytest.mark.slow
 def test_a_row_of_the_walk_says_share_fate_and_steps(monkeypatch):
     problem = nlp_gait.load("walk12")
-    gait = Result(problem=problem, x=problem.check_x(row_of(1.0).x))
+    gait = Result(problem=problem, x=problem.check_x(find_row(1.0).x))
     monkeypatch.setattr(other_robots, "walks", lambda: {"paper, lambda 1": gait})
     monkeypatch.setattr(other_robots, "STEPS", 5)
     cells = list(other_robots.walk12())[-1].strip("| ").split(" | ")

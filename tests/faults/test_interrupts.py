@@ -10,8 +10,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -19,8 +19,10 @@ from typer.testing import CliRunner, Result
 
 import nlp_gait
 from compare.cli import app
+from compare.papers import load_reproduction
+from compare.papers.paper_runs import Effort, Runner
 from compare.study.record import read_record
-from compare.study.store import Store
+from compare.study.store import Computation
 from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.backends.solvers.iteration_watch import IterationWatch
@@ -177,17 +179,15 @@ def test_compare_with_worker_processes_is_continued_with_resume(tmp_path: Path) 
     assert not list(tmp_path.rglob("*.tmp*")) and not (tmp_path / "report.html").exists()
 
 
-def test_reproduce_names_the_steps_that_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = ModuleType("reproduction")
+def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run_two(runner: Runner, _: Effort) -> None:
+        runner.compute([Computation(name="one", inputs={}, function=lambda: 1)], code=())
+        runner.compute(
+            [Computation(name="two", inputs={}, function=lambda: signal.raise_signal(signal.SIGINT))], code=()
+        )
 
-    def reproduce(out: Path, *, progress: Callable[[str], None]) -> None:
-        store = Store(out)
-        store.compute("one", {}, lambda: 1)
-        store.compute("two", {}, lambda: signal.raise_signal(signal.SIGINT))
-
-    module.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "reproduction", module)
-    monkeypatch.setitem(sys.modules["compare.cli.reproduce"].REPRODUCTIONS, "nao", "reproduction")
+    module = sys.modules[load_reproduction("nao").run.__module__]
+    monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), run=run_two))
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
     assert [path.name for path in (tmp_path / "store").iterdir()] == ["one.json"]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compare.drawing.animation import plot_poses
-from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.labels import axis_label
 from compare.drawing.skeletons import make_skeleton
-from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings, Points
+from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
 from compare.papers.nao.nao_paper import SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS
-from compare.papers.paper_runs import point
+from compare.papers.paper_runs import get_point
 from nlp_gait.formulation import Array, Result
 
 if TYPE_CHECKING:
@@ -25,112 +24,115 @@ PAPER_COLOUR = "#E69F00"
 POWER_TICKS_W = (0.5, 0.6, 0.7, 0.85, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 # Points that fall into one cell of a panel look like one; the grid is finer than the print.
 CELLS = 400
-POSES_EVERY_S = {"nao-ssp": 1.0, "nao-dsp": 0.25}  # Fig. 20
 POSE_SAMPLES = 40
 READING_TOLERANCE_M = 5e-4  # within which a solution counts as having a swing height
 
 
-def all_figures(findings: Findings) -> Iterator[tuple[str, Figure]]:
-    """File name without suffix, and figure."""
+def draw_figures(findings: NaoFindings) -> dict[str, Figure]:
+    """Return the figures by name."""
+    figures = {"swing-height": _draw_swing(findings)}
     for letter, phase in zip("ab", findings.phases, strict=True):
-        yield f"fig{phase.paper.plot_convergence:02d}", plot_convergence(phase)
+        figures[f"fig{phase.paper.convergence_figure:02d}"] = _draw_convergence(phase)
         for number, positions in phase.paper.scatter_figures.items():
-            yield f"fig{number}", scatter_figure(phase, positions)
-        yield f"fig20{letter}", gait_figure(phase)
-    yield "swing-height", swing_figure(findings)
+            figures[f"fig{number}"] = _draw_scatter(phase, positions)
+        figures[f"fig20{letter}"] = _draw_gait(phase)
+    return figures
 
 
-def plot_convergence(phase: PhaseFindings) -> Figure:
+def _draw_convergence(phase: PhaseFindings) -> Figure:
     """Figs. 9, 15: least, mean and greatest of the runs' best power so far in each generation.
 
     A line begins where every run has found a feasible solution.
     """
-    with style():
-        figure = new_figure(6.3, 2.9)
-        for axes, name in zip(figure.subplots(1, 2, sharey=True), ALGORITHMS, strict=True):
-            best = np.array([run.history.objective for run in phase.searches[name]], dtype=float)
-            generations = np.arange(1, best.shape[1] + 1)
-            colour = COLOURS[name]
-            axes.fill_between(generations, best.min(axis=0), best.max(axis=0), color=colour, alpha=0.15, linewidth=0)
-            for label, values, line in (
-                ("greatest of the best", best.max(axis=0), ":"),
-                ("mean of the best", best.mean(axis=0), "-"),
-                ("least of the best", best.min(axis=0), "-."),
-            ):
-                axes.plot(generations, values, line, color=colour, label=label)
-            axes.axhline(phase.best, color=COLOURS["ipopt"], linestyle="--", linewidth=1.0, label="IPOPT's optimum")
-            axes.set_title(f"{NAMES[name]}, {len(best)} runs")
-            axes.set_xlabel("generation")
-            _power_scale(axes)
-            axes.legend()
-        figure.axes[1].set_ylabel("")
+    figure = new_figure(6.3, 2.9)
+    for axes, name in zip(figure.subplots(1, 2, sharey=True), ALGORITHMS, strict=True):
+        best = np.array([run.history.objective for run in phase.searches[name]], dtype=float)
+        generations = np.arange(1, best.shape[1] + 1)
+        colour = COLOURS[name]
+        axes.fill_between(generations, best.min(axis=0), best.max(axis=0), color=colour, alpha=0.15, linewidth=0)
+        for label, values, line in (
+            ("greatest of the best", best.max(axis=0), ":"),
+            ("mean of the best", best.mean(axis=0), "-"),
+            ("least of the best", best.min(axis=0), "-."),
+        ):
+            axes.plot(generations, values, line, color=colour, label=label)
+        axes.axhline(phase.best, color=COLOURS["ipopt"], linestyle="--", linewidth=1.0, label="IPOPT's optimum")
+        axes.set_title(f"{NAMES[name]}, {len(best)} runs")
+        axes.set_xlabel("generation")
+        _scale_power(axes)
+        axes.legend()
+    figure.axes[1].set_ylabel("")
     return figure
 
 
-def scatter_figure(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
+def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
     """Figs. 10 to 14, 16 to 19: power against each variable over all feasible solutions, with IPOPT's optimum as a line."""
-    with style():
-        figure = new_figure(6.3, 0.5 + 2.1 * len(positions))
-        grid = figure.subplots(len(positions), 2, sharey=True, sharex="row", squeeze=False)
-        for row, position in zip(grid, positions, strict=True):
-            variable = phase.problem.variables[position]
-            label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
-            for axes, name in zip(row, ALGORITHMS, strict=True):
-                _scatter(axes, phase.points[name], position, name)
-                _envelope(axes, phase, position)
-                axes.set_xlabel(label)
-                axes.locator_params(axis="x", nbins=6)
-                _power_scale(axes)
-                axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=2, handletextpad=0.4)
-            row[1].set_ylabel("")
+    figure = new_figure(6.3, 0.5 + 2.1 * len(positions))
+    grid = figure.subplots(len(positions), 2, sharey=True, sharex="row", squeeze=False)
+    for row, position in zip(grid, positions, strict=True):
+        variable = phase.problem.variables[position]
+        label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
+        for axes, name in zip(row, ALGORITHMS, strict=True):
+            _plot_solutions(axes, phase.points[name], position, name)
+            _plot_optima(axes, phase, position)
+            axes.set_xlabel(label)
+            axes.locator_params(axis="x", nbins=6)
+            _scale_power(axes)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=2, handletextpad=0.4)
+        row[1].set_ylabel("")
     return figure
 
 
-def _scatter(axes: Axes, points: Points, position: int, name: str) -> None:
-    """Feasible solutions, thinned to what can be told apart."""
+def _plot_solutions(axes: Axes, points: Points, position: int, name: str) -> None:
+    """Plot feasible solutions, thinned to those that can be distinguished."""
     x, power = points.x[:, position], points.power_W
-    cells = np.stack([_cell(x), _cell(np.log(power))])
+    cells = np.stack([_assign_cells(x), _assign_cells(np.log(power))])
     shown = np.unique(cells, axis=1, return_index=True)[1]
     label = f"{NAMES[name]}: {len(power)} feasible solutions"
     axes.plot(x[shown], power[shown], ".", color=COLOURS[name], markersize=1.5, alpha=0.4, rasterized=True)
     axes.plot([], [], ".", color=COLOURS[name], markersize=5, label=label)
 
 
-def _cell(values: Array) -> Array:
+def _assign_cells(values: Array) -> Array:
     span = float(np.ptp(values)) or 1.0
     return np.round((values - values.min()) / span * CELLS)
 
 
-def _envelope(axes: Axes, phase: PhaseFindings, position: int) -> None:
+def _plot_optima(axes: Axes, phase: PhaseFindings, position: int) -> None:
     sweep = phase.sweeps[position]
     power = [held.power_W if held.feasible else np.nan for held in sweep]
     axes.plot([held.at for held in sweep], power, color=COLOURS["ipopt"], label="IPOPT", linewidth=1.2)
 
 
-def swing_figure(findings: Findings) -> Figure:
-    """Price of a higher swing foot: the true sweep, the paper's reading of its search histories, and ours of our own."""
+def _draw_swing(findings: NaoFindings) -> Figure:
+    """Price of a higher swing foot: the true sweep, and what the search histories of the paper and ours show."""
     phase = findings.ssp
-    with style():
-        figure = new_figure(5.2, 3.2)
-        axes = figure.subplots()
-        heights = [held.at for held in findings.swing]
+    figure = new_figure(5.2, 3.2)
+    axes = figure.subplots()
+    heights = [held.at for held in findings.swing]
+    axes.plot(
+        heights,
+        _divide_by_first([held.power_W for held in findings.swing]),
+        "o-",
+        color=COLOURS["ipopt"],
+        label="IPOPT",
+    )
+    for name, marker in zip(ALGORITHMS, "sv", strict=True):
+        printed = SWING_POWER_W[name]
+        label = f"paper, {NAMES[name]}"
         axes.plot(
-            heights, _relative([held.power_W for held in findings.swing]), "o-", color=COLOURS["ipopt"], label="IPOPT"
+            list(printed), _divide_by_first(list(printed.values())), f"{marker}--", color=PAPER_COLOUR, label=label
         )
-        for name, marker in zip(ALGORITHMS, "sv", strict=True):
-            printed = SWING_POWER_W[name]
-            label = f"paper, {NAMES[name]}"
-            axes.plot(list(printed), _relative(list(printed.values())), f"{marker}--", color=PAPER_COLOUR, label=label)
-            read = read_swing_powers(phase, name, phase.median_run(name))
-            label = f"ours, read off the {NAMES[name]} run of median power"
-            axes.plot(heights, _relative(read), f"{marker}:", color=COLOURS[name], label=label)
-        axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / power at 0.015 m [1]")
-        axes.legend()
+        read = read_swing_powers(phase, name, phase.median_run(name))
+        label = f"ours, read off the {NAMES[name]} run of median power"
+        axes.plot(heights, _divide_by_first(read), f"{marker}:", color=COLOURS[name], label=label)
+    axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / power at 0.015 m [1]")
+    axes.legend()
     return figure
 
 
 def read_swing_powers(phase: PhaseFindings, algorithm: str, run: int | None) -> list[float]:
-    """Least power found within 0.5 mm of each of the paper's swing heights [W]: what a search history shows.
+    """Return the least power found within 0.5 mm of each of the paper's swing heights [W], as read off a search history.
 
     Args:
         phase: single support.
@@ -141,20 +143,20 @@ def read_swing_powers(phase: PhaseFindings, algorithm: str, run: int | None) -> 
     return [phase.points[algorithm].cheapest_near(SWING_HEIGHT, height, READING_TOLERANCE_M, run) for height in heights]
 
 
-def _relative(values: list[float]) -> Array:
+def _divide_by_first(values: list[float]) -> Array:
     return np.array(values) / values[0]
 
 
-def gait_figure(phase: PhaseFindings) -> Figure:
+def _draw_gait(phase: PhaseFindings) -> Figure:
     """Fig. 20: IPOPT's gait from behind and from the side."""
-    x = np.array(point(phase.optimum))
-    duration = float(x[phase.paper.duration])
+    x = np.array(get_point(phase.optimum))
+    duration, every_s = float(x[phase.paper.duration]), phase.paper.poses_every_s
     skeleton = make_skeleton(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)
-    count = int(duration / POSES_EVERY_S[phase.problem.name] + 1e-6) + 1
-    return plot_poses(skeleton, [k * POSES_EVERY_S[phase.problem.name] for k in range(count)], ("front", "side"))
+    times = [k * every_s for k in range(int(duration / every_s + 1e-6) + 1)]
+    return plot_poses(skeleton, times, ("front", "side"))
 
 
-def _power_scale(axes: Axes) -> None:
+def _scale_power(axes: Axes) -> None:
     """Logarithmic axis with plain numbers."""
     from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 

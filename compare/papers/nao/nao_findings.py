@@ -1,4 +1,4 @@
-"""All results of the reproduced NAO paper, and what tables, figures and claims read from them."""
+"""Findings of the reproduction of the NAO paper: all results, and what tables, figures and claims read from them."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ import numpy as np
 from compare.analysis.statistics.inference import RankSum, rank_sum_normal
 from compare.judge import evaluate
 from compare.papers.nao.nao_paper import PrintedPhase
-from compare.papers.nao.nao_runs import Held, power_with_legs_twice
-from compare.papers.paper_runs import best
+from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice
+from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord, Verdict
 from nlp_gait.formulation import Array, GaitProblem
 
 NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read
-# Solutions that cost at most this share more than the best one lie where IPOPT's line bends most.
+# IPOPT's line bends most where solutions cost at most this share more than the best one.
 CHEAP = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Points:
-    """Feasible solutions that all runs of one algorithm evaluated: x (m, n) and power (m,) [W], run (m,)."""
+    """Feasible solutions that all runs of one search evaluated: x (m, n), power (m,) [W] and run (m,)."""
 
     x: Array
     power_W: Array
     run: Array
 
     def cheapest_near(self, position: int, value: float, tolerance: float, run: int | None = None) -> float:
-        """Least power of the solutions whose variable lies within a tolerance of a value; NaN if there are none."""
+        """Return the least power of the solutions whose variable lies within a tolerance of a value; NaN if there is none."""
         near = np.abs(self.x[:, position] - value) <= tolerance
         if run is not None:
             near &= self.run == run
@@ -44,65 +44,65 @@ class PhaseFindings:
     """Results of one support phase.
 
     Attributes:
-        paper: what is printed.
-        problem: as it is here.
-        searches: runs by algorithm, in the order of their seeds; equal runs start from the same population.
+        paper: numbers in print.
+        problem: our problem.
+        searches: runs by search, in the order of their seeds; equal runs start from the same population.
         starts: of IPOPT.
-        sweeps: by position in x, IPOPT's optima over that variable.
-        points: by algorithm.
+        sweeps: IPOPT's optima over each variable, by its position in x.
+        points: by search.
     """
 
     paper: PrintedPhase
     problem: GaitProblem
     searches: Mapping[str, Sequence[RunRecord]]
     starts: Sequence[RunRecord]
-    sweeps: Mapping[int, Sequence[Held]]
+    sweeps: Mapping[int, Sequence[SweepPoint]]
     points: Mapping[str, Points]
 
     @cached_property
     def optimum(self) -> RunRecord:
         """Best start of IPOPT."""
-        return best(self.starts)
+        return choose_best(self.starts)
 
     @cached_property
     def converged(self) -> int:
-        """Starts of IPOPT that end within 1e-5 of the best."""
+        """Number of IPOPT's starts that end within 1e-5 of the best."""
         return sum(start.claimed and start.verdict.objective <= self.best * (1 + 1e-5) for start in self.starts)
 
     def final_powers(self, algorithm: str) -> list[float]:
-        """Power at the end of each run [W]; infinite without a feasible solution."""
+        """Return the power at the end of each run [W]; infinite without a feasible solution."""
         return [run.verdict.objective if run.verdict.feasible else math.inf for run in self.searches[algorithm]]
 
     def median_run(self, algorithm: str) -> int:
-        """Number of the run of median power, which the paper tables."""
+        """Return the number of the run of median power, which the paper's tables show."""
         powers = self.final_powers(algorithm)
         return int(np.argsort(powers, kind="stable")[(len(powers) - 1) // 2])
 
     def median(self, algorithm: str) -> RunRecord:
-        """Run of median power."""
+        """Return the run of median power."""
         return self.searches[algorithm][self.median_run(algorithm)]
 
     def median_index(self, algorithm: str, name: str) -> float:
-        """Median of a performance figure over the final solutions of all runs."""
+        """Return the median of a performance figure over the final solutions of all runs."""
         return float(np.median([run.verdict.indexes[name] for run in self.searches[algorithm]]))
 
     @cached_property
     def printed_here(self) -> dict[str, Verdict]:
-        """The paper's solutions as the judge finds them here, by algorithm."""
+        """The judge's verdicts on the paper's solutions, by search."""
         return {name: Verdict.of(evaluate(self.problem, optimum.x)) for name, optimum in self.paper.optima.items()}
 
     @cached_property
     def printed_with_legs_twice(self) -> dict[str, float]:
-        """Power of the paper's solutions if the legs' mechanical term counted twice [W]."""
-        return {name: power_with_legs_twice(self.problem, o.x) for name, o in self.paper.optima.items()}
+        """Power of the paper's solutions with the legs' mechanical term counted twice [W], by search."""
+        return {name: compute_power_with_legs_twice(self.problem, o.x) for name, o in self.paper.optima.items()}
 
     @cached_property
     def test(self) -> RankSum:
-        """PSO against GA."""
+        """Rank-sum test of PSO's powers against GA's."""
         return rank_sum_normal(self.final_powers("pso"), self.final_powers("ga"))
 
     def range_within(self, position: int, share: float) -> tuple[float, float]:
-        """Least and greatest value of a variable at which IPOPT's line is at most a share above the best."""
+        """Return the least and the greatest value of a variable at which IPOPT's line is at most a share above the best."""
         at, power = self._line(position)
         fine = np.linspace(at[0], at[-1], FINE)
         good = fine[np.interp(fine, at, power) <= self.best * (1 + share)]
@@ -114,9 +114,9 @@ class PhaseFindings:
         return self.optimum.verdict.objective
 
     def share_below(self, position: int) -> float:
-        """How far a feasible solution of a search lies below IPOPT's line at most, relative to it; 0 if none does.
+        """Return how far a feasible solution of a search lies below IPOPT's line at most, relative to it; 0 if none does.
 
-        Between the points of the sweep the line is straight, so that it may cut off the inside of a curve.
+        Between the points of the sweep the line is straight, so it may cut off the inside of a curve.
         """
         at, power = self._line(position)
         below = [1 - (p.power_W / np.interp(p.x[:, position], at, power)).min() for p in self.points.values()]
@@ -130,7 +130,7 @@ class PhaseFindings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Findings:
+class NaoFindings:
     """All results.
 
     Attributes:
@@ -143,24 +143,26 @@ class Findings:
 
     ssp: PhaseFindings
     dsp: PhaseFindings
-    swing: Sequence[Held]
-    durations: Sequence[Held]
+    swing: Sequence[SweepPoint]
+    durations: Sequence[SweepPoint]
     lever: Sequence[RunRecord]
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:
-        """Both phases."""
+        """Single and double support."""
         return self.ssp, self.dsp
 
 
-def sweep_values(points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]) -> list[float]:
-    """Values of a variable for a sweep, ascending.
+def choose_sweep_values(
+    points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]
+) -> list[float]:
+    """Return values of a variable for a sweep, ascending.
 
     Args:
-        points: feasible solutions by algorithm.
+        points: feasible solutions by search.
         position: of the variable in x.
-        optimum: value at IPOPT's optimum, which is one of them.
-        counts: how many over the whole range of the solutions, and how many over the range of the cheap ones.
+        optimum: value at IPOPT's optimum, which is added.
+        counts: number of values over the range of all solutions, and over that of the cheap ones.
     """
     values = np.concatenate([p.x[:, position] for p in points.values()])
     power = np.concatenate([p.power_W for p in points.values()])

@@ -1,4 +1,4 @@
-"""What the NAO paper prints: Tables 6 to 9, section 5.3, and the numbers in its text.
+"""Tables 6 to 9, section 5.3 and the numbers in the text of the NAO paper, as printed.
 
 Source:
     Gupta, Pratihar, Deb (2023), Analysis and optimization of gait cycle of 25-DOF NAO robot using particle swarm optimization
@@ -38,7 +38,7 @@ class PrintedTest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedPhase:
-    """What the paper prints of one support phase.
+    """Numbers of one support phase as printed, and where they are.
 
     Attributes:
         problem: name of the problem here.
@@ -46,9 +46,14 @@ class PrintedPhase:
         optima: by search algorithm (Tables 6 and 8, 7 and 9).
         test: section 5.3.
         tables: numbers of the tables of variables and of indexes.
-        plot_convergence: number of the figure of best per generation.
+        convergence_figure: number of the figure of best per generation.
         scatter_figures: number of each figure of the objective against variables, to the positions of these in x.
         duration: position of the phase's time in x.
+        poses_every_s: time between the poses of Fig. 20.
+        better: section that says that PSO is better than GA.
+        steadier: that its runs differ less.
+        higher_hip: that a higher hip saves power.
+        slower: that a longer phase does.
     """
 
     problem: str
@@ -56,9 +61,14 @@ class PrintedPhase:
     optima: Mapping[str, PrintedOptimum]
     test: PrintedTest
     tables: tuple[int, int]
-    plot_convergence: int
+    convergence_figure: int
     scatter_figures: Mapping[int, tuple[int, ...]]
     duration: int
+    poses_every_s: float
+    better: str
+    steadier: str
+    higher_hip: str
+    slower: str
 
 
 def _indexes(*values: float) -> dict[str, float]:
@@ -83,9 +93,14 @@ SSP = PrintedPhase(
     },
     test=PrintedTest(rank_sum=70.0, z=-3.6772, p_two_sided=0.000235, p_less=0.000117),
     tables=(6, 7),
-    plot_convergence=9,
+    convergence_figure=9,
     scatter_figures={10: (0, 1, 2), 11: (3, 4), 12: (5, 6), 13: (7,), 14: (8,)},
     duration=8,
+    poses_every_s=1.0,
+    better="5.3.1",
+    steadier="5.1",
+    higher_hip="5.1.2",
+    slower="5.1.6",
 )
 DSP = PrintedPhase(
     problem="nao-dsp",
@@ -104,9 +119,14 @@ DSP = PrintedPhase(
     },
     test=PrintedTest(rank_sum=90.0, z=-2.3639, p_two_sided=0.0181, p_less=None),
     tables=(8, 9),
-    plot_convergence=15,
+    convergence_figure=15,
     scatter_figures={16: (0, 1, 2), 17: (3, 4), 18: (5, 6), 19: (7,)},
     duration=7,
+    poses_every_s=0.25,
+    better="5.3.2",
+    steadier="5.2",
+    higher_hip="5.2.2",
+    slower="5.2.5",
 )
 PHASES = (SSP, DSP)
 
@@ -116,21 +136,13 @@ SWING_POWER_W: Mapping[str, Mapping[float, float]] = {
     "pso": {0.015: 1.283, 0.018: 1.292, 0.022: 1.308, 0.024: 1.317, 0.026: 1.588, 0.028: 2.453},
     "ga": {0.015: 1.303, 0.018: 1.333, 0.022: 1.439, 0.024: 1.667, 0.026: 2.605, 0.028: 3.152},
 }
-# Durations at which the reproduction tables the least power of single support (the paper has a picture only, Fig. 14) [s].
+# Durations of single support for a table of least power; the paper has a picture only (Fig. 14) [s].
 DURATIONS_S = (0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VelocityRange:
-    """A range of velocities that the text gives for the solutions found.
-
-    Attributes:
-        phase: which phase.
-        section: where it is stated.
-        variables: positions in x.
-        low: [m/s].
-        high: [m/s].
-    """
+    """A range of velocities [m/s] that a section gives for the solutions of a phase, with the variables' positions in x."""
 
     phase: PrintedPhase
     section: str

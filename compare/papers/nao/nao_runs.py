@@ -1,4 +1,4 @@
-"""Runs and sweeps behind the reproduction of the NAO paper."""
+"""Runs and sweeps of the reproduction of the NAO paper."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
+from compare.papers.paper_runs import Effort
 from compare.study.record import RunRecord
 from compare.study.runner import run_task
 from compare.study.store import Computation, Store
@@ -27,11 +28,11 @@ SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much is computed.
+class NaoEffort(Effort):
+    """Effort of the reproduction of the NAO paper.
 
     Attributes:
-        runs: of each search algorithm, as in the paper.
+        runs: of each search, as in the paper.
         evaluations: of a search, as in the paper.
         starts: of IPOPT.
         lever_starts: of IPOPT with the lever rule for the torso's share.
@@ -50,92 +51,92 @@ class Effort:
 
     @property
     def steps(self) -> int:
-        """Runs, sweeps over two sets of values and over each variable, and the report."""
+        """Runs, two special sweeps and one over each variable, and the report."""
         variables = sum(len(phase.optima["pso"].x) for phase in PHASES)
         return len(PHASES) * (len(ALGORITHMS) * self.runs + self.starts) + self.lever_starts + 2 + variables + 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
-    """IPOPT's optimum with a variable held at a value."""
+class SweepPoint:
+    """IPOPT's optimum with a variable fixed at a value."""
 
     at: float
     power_W: float
     feasible: bool
 
 
-def tasks(effort: Effort) -> list[Task]:
-    """Searches and starts of IPOPT; equal runs of the searches start from the same population."""
+def make_tasks(effort: NaoEffort) -> list[Task]:
+    """Return searches and starts of IPOPT; equal runs of the searches start from the same population."""
     stop = Stop(evaluations=effort.evaluations)
-    specs = [spec_of(phase.problem, effort) for phase in PHASES]
+    specs = [make_spec(phase.problem, effort) for phase in PHASES]
     lever = replace(specs[1].with_options(torso_share="lever"), label=LEVER)
-    found = [
+    tasks = [
         Task(problem=spec, solver=name, stop=stop, run=k)
         for spec in specs
         for name in ALGORITHMS
         for k in range(effort.runs)
     ]
     for spec, starts in (*((spec, effort.starts) for spec in specs), (lever, effort.lever_starts)):
-        found += [Task(problem=spec, solver=IPOPT, run=k) for k in range(starts)]
-    return found
+        tasks += [Task(problem=spec, solver=IPOPT, run=k) for k in range(starts)]
+    return tasks
 
 
-def spec_of(problem: str, effort: Effort) -> ProblemSpec:
-    """A phase of the paper."""
+def make_spec(problem: str, effort: NaoEffort) -> ProblemSpec:
+    """Return a phase of the paper."""
     return ProblemSpec(name=problem, options={"intervals": effort.intervals})
 
 
-def run_storing_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
-    """Do one run, and store every feasible solution that a search evaluated, see ``load_points``."""
+def run_and_store_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
+    """Perform a run, and store every feasible solution that a search evaluated, see ``load_points``."""
     if not task.is_search:
         return run_task(task, start)
     feasible: list[tuple[Array, Array]] = []
 
-    def add(X: Array, f: Array, violation: Array) -> None:
+    def add_feasible(X: Array, f: Array, violation: Array) -> None:
         good = violation == 0.0
         feasible.append((X[good], f[good]))
 
-    record = run_task(task, callback=add)
-    x, power = (np.concatenate(part) for part in zip(*feasible, strict=True))
-    Store(folder).save_arrays(_points_name(task), task.definition(), {"x": x, "power_W": power})
+    record = run_task(task, callback=add_feasible)
+    x, power = (np.concatenate(arrays) for arrays in zip(*feasible, strict=True))
+    Store(folder).save_arrays(_name_points(task), task.definition(), {"x": x, "power_W": power})
     return record
 
 
 def load_points(store: Store, task: Task) -> tuple[Array, Array] | None:
     """Return the feasible solutions of a search: x (m, n) and power (m,) [W]; None if they are not stored."""
-    arrays = store.load_arrays(_points_name(task), task.definition())
+    arrays = store.load_arrays(_name_points(task), task.definition())
     return None if arrays is None else (arrays["x"], arrays["power_W"])
 
 
-def _points_name(task: Task) -> str:
+def _name_points(task: Task) -> str:
     return f"points/{task.problem.title}-{task.title}-{task.run:02d}"
 
 
-def special_sweeps(effort: Effort) -> list[Computation]:
-    """IPOPT over the paper's swing heights, and over durations of single support."""
+def make_special_sweeps(effort: NaoEffort) -> list[Computation]:
+    """Return IPOPT over the paper's swing heights, and over durations of single support."""
     values = {SWING_SWEEP: (SWING_HEIGHT, SWING_POWER_W["pso"]), DURATION_SWEEP: (SSP.duration, DURATIONS_S)}
     return [
-        sweep_step(name, spec_of(SSP.problem, effort), position, list(at), effort.sweep_starts)
+        make_sweep(name, make_spec(SSP.problem, effort), position, list(at), effort.sweep_starts)
         for name, (position, at) in values.items()
     ]
 
 
-def sweep_step(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
-    """Sweep over a variable, kept as a step: its optima lead to each other and are no runs of their own."""
+def make_sweep(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
+    """Return a sweep over a variable as a step: its optima lead to each other, so they are not runs by themselves."""
     problem = spec.load()
     variable = problem.names[position]
+    settings = {"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts}
     return Computation(
         name=name,
-        inputs={
-            **fingerprint(problem),
-            **{"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts},
-        },
-        function=partial(sweep, spec, variable, values, starts),
+        inputs={**fingerprint(problem), **settings},
+        function=partial(solve_sweep, spec, variable, values, starts),
     )
 
 
-def sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int) -> list[dict[str, float | bool]]:
-    """Fields of ``Held`` for each of some values, ascending; infeasible points are kept."""
+def solve_sweep(
+    spec: ProblemSpec, variable: str, values: Sequence[float], starts: int
+) -> list[dict[str, float | bool]]:
+    """Return the fields of ``SweepPoint`` at ascending values, infeasible points included."""
     problem = spec.load()
     solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
     return [
@@ -144,11 +145,10 @@ def sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int
     ]
 
 
-def power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
-    """Power if the mechanical term of the leg joints that move counted twice [W]; see the remark in the report."""
+def compute_power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
+    """Return the power with the mechanical term of the moving leg joints counted twice [W]; see the note in the report."""
     signals = problem.signals(problem.check_x(x))
     legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
     mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
-    share = np.diff(signals.arrays["t"]) / signals.arrays["t"][-1]
-    mean = float(np.sum(share * (mechanical[1:] + mechanical[:-1]) / 2))
-    return float(evaluate(problem, x).objective["value"]) + mean
+    mean = np.trapezoid(mechanical, signals.arrays["t"]) / signals.arrays["t"][-1]
+    return float(evaluate(problem, x).objective["value"] + mean)

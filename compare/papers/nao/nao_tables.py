@@ -7,20 +7,18 @@ import math
 import numpy as np
 
 from compare.analysis.statistics.inference import a12
-from compare.papers.nao.nao_claims import claims
 from compare.papers.nao.nao_figures import read_swing_powers
-from compare.papers.nao.nao_findings import NAMES, Findings, PhaseFindings
+from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS, DURATION_SWEEP, SWING_SWEEP
 from compare.report.document import Rows, Value
 
 
-def all_tables(findings: Findings) -> dict[str, Rows]:
-    """Rows by name; headings and formats stand in ``report.md``."""
+def make_tables(findings: NaoFindings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
     tables = {
-        "claims": [(claim.section, claim.text, claim.verdict, claim.evidence) for claim in claims(findings)],
         SWING_SWEEP: _swing(findings),
-        DURATION_SWEEP: [(held.at, held.power_W) for held in findings.durations],
+        DURATION_SWEEP: [(point.at, point.power_W) for point in findings.durations],
         "rank-sum-tests": [row for phase in findings.phases for row in _tests(phase)],
         "power-gap": [row for phase in findings.phases for row in _gap(phase)],
     }
@@ -58,7 +56,7 @@ def _indexes(phase: PhaseFindings) -> Rows:
     return rows
 
 
-def _swing(findings: Findings) -> Rows:
+def _swing(findings: NaoFindings) -> Rows:
     """Table 7, rows 6 to 11: least power at a swing height; true optima, and what search histories show."""
     phase = findings.ssp
     read = [read_swing_powers(phase, name, run) for name in ALGORITHMS for run in (phase.median_run(name), None)]
@@ -91,13 +89,21 @@ def _tests(phase: PhaseFindings) -> Rows:
     p_less = "not given" if printed.p_less is None else printed.p_less
     effect = a12(phase.final_powers("pso"), phase.final_powers("ga"))
     return [
-        (phase.paper.title, "paper", printed.rank_sum, printed.z, printed.p_two_sided, p_less, implied_a12(phase)),
+        (
+            phase.paper.title,
+            "paper",
+            printed.rank_sum,
+            printed.z,
+            printed.p_two_sided,
+            p_less,
+            compute_implied_a12(phase),
+        ),
         (phase.paper.title, "here", found.rank_sum, found.z, found.p_two_sided, found.p_less, effect),
     ]
 
 
-def implied_a12(phase: PhaseFindings) -> float:
-    """Effect size that follows from the paper's rank sum: share of pairs of runs in which PSO's is better."""
+def compute_implied_a12(phase: PhaseFindings) -> float:
+    """Return the effect size that follows from the paper's rank sum: the share of pairs of runs in which PSO's is better."""
     runs = len(phase.searches["pso"])
     return 1.0 - (phase.paper.test.rank_sum - runs * (runs + 1) / 2) / runs**2
 

@@ -1,4 +1,4 @@
-"""What the runs of both phases found, measured against the true front, and what tables, figures and claims read from it."""
+"""Findings of power against stability: all runs, measured against the true front."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Effort, FrontRun
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, FrontRun, ParetoEffort
 from compare.questions.pareto.compare import Challenge
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, nondominated
 from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.report import SEARCH_NAMES
 from compare.questions.pareto.search import REFERENCE, Scale
-from compare.questions.pareto.study import ParetoStudy
 from metaheuristics.array import Array
 from nlp_gait.formulation import GaitProblem
 
@@ -25,20 +24,20 @@ NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
-    """R runs of one algorithm with one budget, measured at L looks.
+class Measures:
+    """Measures of R runs of one search with one budget at L looks.
 
     Attributes:
-        algorithm: its name.
-        budget: evaluations.
-        evaluations: (L,) used at each look.
+        algorithm: name of the search.
+        budget: allowed evaluations.
+        evaluations: (L,) before each look.
         hypervolume: (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point.
         igd: (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without
             one.
-        feasible: (R,) share of the evaluated points that meet all constraints.
+        feasible: (R,) share of the evaluated points that are feasible.
         first_feasible: (R,) number of the first of these; infinite without one.
         time_s: (R,) processor time [s].
-        objective_time_s: (R,) part of it in the objectives [s].
+        objective_time_s: (R,) of it in the objectives [s].
     """
 
     algorithm: str
@@ -52,13 +51,13 @@ class Measured:
     objective_time_s: Array
 
     def until(self, share: float) -> Array:
-        """(R,) evaluations at the first look with so great a share of the hypervolume; infinite if never."""
+        """Return (R,) evaluations at the first look with at least a share of the hypervolume; infinite if never."""
         reached = self.hypervolume >= share
         at = np.where(reached.any(axis=1), self.evaluations[reached.argmax(axis=1)], np.inf)
         return np.asarray(at)
 
-    def look(self, evaluations: float) -> int:
-        """Number of the last look within some evaluations; the first one where there is none."""
+    def find_look(self, evaluations: float) -> int:
+        """Return the number of the last look within some evaluations, or of the first look."""
         return max(0, int(np.count_nonzero(self.evaluations <= evaluations)) - 1)
 
 
@@ -67,11 +66,11 @@ class PhaseFindings:
     """Results of one support phase.
 
     Attributes:
-        problem: with its demand on the criterion dropped.
-        criterion: beside power.
-        first_front: of the gradient method alone, whose ranges the searches saw as 1.
-        answer: the front with what the searches' best points added to it.
-        runs: of all algorithms.
+        problem: the phase, without its constraint on the criterion.
+        criterion: the second objective.
+        first_front: of the gradient method alone, whose ranges count as 1 in the searches.
+        answer: the front after solving from the searches' best points.
+        runs: of all searches.
     """
 
     problem: GaitProblem
@@ -82,43 +81,43 @@ class PhaseFindings:
 
     @property
     def front(self) -> tuple[FrontPoint, ...]:
-        """The true front, as far as it is known."""
+        """The best known front."""
         return self.answer.front
 
     @cached_property
     def bends(self) -> Bends:
-        """Its knees."""
+        """Knees of the front."""
         return bends(self.front)
 
     @cached_property
     def budgets(self) -> tuple[int, ...]:
-        """Of the runs."""
+        """Budgets of the runs."""
         return tuple(dict.fromkeys(run.budget for run in self.runs))
 
     @cached_property
-    def measured(self) -> dict[tuple[str, int], Measured]:
-        """By algorithm and budget."""
+    def measures(self) -> dict[tuple[str, int], Measures]:
+        """Measures by search and budget."""
         return {(name, budget): self._measure(name, budget) for budget in self.budgets for name in ALGORITHMS}
 
     def points(self, algorithm: str, budget: int) -> tuple[Array, Array]:
-        """Criterion and power [W] of all points at the ends of all runs."""
+        """Return criterion and power [W] of all points at the ends of all runs."""
         scale = Scale(self.first_front)
         F = [run.looks[-1].F for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
         return scale.back(np.concatenate(F))
 
-    def _measure(self, algorithm: str, budget: int) -> Measured:
+    def _measure(self, algorithm: str, budget: int) -> Measures:
         from pymoo.indicators.hv import HV
         from pymoo.indicators.igd import IGD
 
         first, scale = Scale(self.first_front), Scale(self.front)
         values, powers = (np.array([getattr(p, key) for p in self.front]) for key in ("value", "power_W"))
         true = scale(values, powers)
-        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(evenly(true))
+        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(spread_evenly(true))
         whole = float(hypervolume(true))
         runs = [run for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
         fronts = [[scale(*first.back(look.F)) for look in run.looks] for run in runs]
         ends = [run.looks[-1] for run in runs]
-        return Measured(
+        return Measures(
             algorithm=algorithm,
             budget=budget,
             evaluations=np.array([look.evaluations for look in runs[0].looks], dtype=float),
@@ -132,7 +131,7 @@ class PhaseFindings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Findings:
+class ParetoFindings:
     """All results.
 
     Attributes:
@@ -141,19 +140,19 @@ class Findings:
     """
 
     phases: tuple[PhaseFindings, ...]
-    effort: Effort
+    effort: ParetoEffort
 
 
-def evenly(front: Array) -> Array:
-    """(EVEN_POINTS, 2) points evenly along the lines between a front's (k, 2): its own crowd where the searches' best were."""
+def spread_evenly(front: Array) -> Array:
+    """Return (EVEN_POINTS, 2) points evenly along the lines between a front's (k, 2), which crowd near the searches' best."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(front, axis=0).T))])
     places = np.linspace(0.0, along[-1], EVEN_POINTS)
     return np.column_stack([np.interp(places, along, column) for column in front.T])
 
 
-def points_found(study: ParetoStudy, runs: Sequence[FrontRun]) -> list[FrontPoint]:
-    """Points of all runs that none of them betters."""
-    scale = Scale(study.front)
+def collect_points(front: Sequence[FrontPoint], runs: Sequence[FrontRun]) -> list[FrontPoint]:
+    """Return the points of all runs that no other point dominates."""
+    scale = Scale(front)
     found = []
     for run in runs:
         values, powers = scale.back(run.looks[-1].F)

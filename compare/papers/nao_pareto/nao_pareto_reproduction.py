@@ -1,65 +1,45 @@
-"""Gupta, Pratihar, Deb (2025), as far as its abstract tells: four algorithms on power against stability, and its claims."""
+"""Gupta, Pratihar, Deb (2025), as far as the abstract says: four searches on power against stability, and its claims."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
+from typing import Any
 
-from compare.papers.nao_pareto import nao_pareto_runs as nao_pareto_runs
-from compare.papers.nao_pareto.nao_pareto_findings import Findings, PhaseFindings, points_found
-from compare.papers.nao_pareto.nao_pareto_runs import CRITERION, PHASES, Effort, FrontRun, searches, spec_of
-from compare.papers.nao_pareto.report import document
+from compare.analysis.units import join_words
+from compare.papers.nao_pareto import nao_pareto_runs
+from compare.papers.nao_pareto.nao_pareto_claims import NEAR, check_claims
+from compare.papers.nao_pareto.nao_pareto_figures import draw_figures
+from compare.papers.nao_pareto.nao_pareto_findings import EVEN_POINTS, ParetoFindings, PhaseFindings, collect_points
+from compare.papers.nao_pareto.nao_pareto_runs import (
+    CRITERION,
+    PHASES,
+    ParetoEffort,
+    make_run,
+    make_searches,
+    make_spec,
+)
+from compare.papers.nao_pareto.nao_pareto_tables import make_tables
+from compare.papers.paper_runs import Runner
+from compare.papers.reproduction import Reproduction, Verdict
 from compare.questions.pareto.compare import Challenge, challenge
-from compare.questions.pareto.study import ParetoStudy, pareto_study
-from compare.report.writing import write_document
-from compare.study.store import Store
+from compare.questions.pareto.search import REFERENCE
+from compare.questions.pareto.study import pareto_study
+from compare.study.store import Computation, Store
 from compare.study.stored_solver import store_runs
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decoded
-from nlp_gait.files import writable_folder
-from nlp_gait.progress import Progress
-
-FULL = Effort()
 
 
-def reproduce(out: Path, *, progress: Progress, effort: Effort = FULL) -> None:
-    """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG).
-
-    Args:
-        out: folder; finished results in it are reused.
-        progress: told about each solve and each run.
-        effort: how much is computed.
-
-    Raises:
-        OutputError: the folder cannot be written to.
-    """
-    folder = writable_folder(out)
-    stores = {phase: Store(folder / phase, progress) for phase in PHASES}
-    fronts = {phase: _front(phase, effort, stores[phase], progress) for phase in PHASES}
-    todo = {phase: searches(phase, fronts[phase].front, effort) for phase in PHASES}
-    computations = [computation for phase in PHASES for computation, _ in todo[phase]]
-    results = Store(folder).compute_all(computations, code=[nao_pareto_runs], progress=progress)
-    made = {phase: [run_of(results[computation.name]) for computation, run_of in todo[phase]] for phase in PHASES}
-    found = tuple(
-        PhaseFindings(
-            problem=fronts[phase].problem,
-            criterion=fronts[phase].criterion,
-            first_front=fronts[phase].front,
-            answer=_answer(folder, fronts[phase], made[phase], stores[phase], progress),
-            runs=tuple(made[phase]),
-        )
-        for phase in PHASES
-    )
-    progress("figures, tables and report")
-    write_document(folder, document(Findings(phases=found, effort=effort)))
+def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
+    """Solve for the true front of each phase, run the searches on it, and solve again from their best points."""
+    return ParetoFindings(phases=tuple(_run_phase(runner, phase, effort) for phase in PHASES), effort=effort)
 
 
-def _front(phase: str, effort: Effort, store: Store, progress: Progress) -> ParetoStudy:
-    """The true front of a phase, from the gradient method alone."""
-    return pareto_study(
-        spec_of(phase, effort).load(),
+def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
+    store = Store(runner.folder / phase, runner.progress)
+    study = pareto_study(
+        make_spec(phase, effort).load(),
         CRITERION,
         points=effort.points,
         starts=effort.starts,
@@ -67,19 +47,62 @@ def _front(phase: str, effort: Effort, store: Store, progress: Progress) -> Pare
         runs=effort.runs,
         seed=0,
         store=store,
-        progress=progress,
+        progress=runner.progress,
+    )
+    results = runner.compute(make_searches(phase, study.front, effort), code=(nao_pareto_runs,))
+    runs = tuple(make_run(result) for result in results.values())
+    points = collect_points(study.front, runs)
+    solve = partial(challenge, study.problem, study.criterion, study.front, points, store_runs(store), runner.progress)
+    step = Computation(
+        name=f"{phase}-challenge",
+        inputs={
+            **fingerprint(study.problem),
+            "criterion": CRITERION,
+            "front": [asdict(point) for point in study.front],
+            "points": [asdict(point) for point in points],
+        },
+        function=lambda: asdict(solve()),
+    )
+    (answer,) = runner.compute([step], code=()).values()
+    return PhaseFindings(
+        problem=study.problem,
+        criterion=study.criterion,
+        first_front=study.front,
+        answer=decoded(Challenge, answer),
+        runs=runs,
     )
 
 
-def _answer(folder: Path, study: ParetoStudy, made: Sequence[FrontRun], store: Store, progress: Progress) -> Challenge:
-    """Solves from the best points of all runs, which may move the front."""
-    points = points_found(study, made)
-    inputs = {
-        **fingerprint(study.problem),
-        "criterion": CRITERION,
-        "front": [asdict(point) for point in study.front],
-        "points": [asdict(point) for point in points],
+def compute_values(findings: ParetoFindings) -> dict[str, Any]:
+    """Return the values of the places in the report's text."""
+    ssp, dsp = findings.phases
+    effort, verdicts = findings.effort, [claim.verdict for claim in check_claims(findings)]
+    return {
+        "runs": effort.runs,
+        "budgets": join_words(f"{budget:,}" for budget in effort.budgets),
+        "largest": f"{effort.budgets[-1]:,}",
+        "points": effort.points,
+        "samples": effort.intervals + 1,
+        "reference": REFERENCE,
+        "even": EVEN_POINTS,
+        "near": 100 * NEAR,
+        "criterion": ssp.criterion.name,
+        "claims": len(verdicts),
+        "held": verdicts.count(Verdict.HOLDS),
+        "refuted": verdicts.count(Verdict.FAILS),
+        "robot": ssp.problem.options["robot"],
+        "ssp": {"variables": len(ssp.problem.names)},
+        "dsp": {"variables": len(dsp.problem.names)},
     }
-    solve = partial(challenge, study.problem, study.criterion, study.front, points, store_runs(store), progress)
-    name = f"{study.problem.name}-challenge"
-    return decoded(Challenge, Store(folder).compute(name, inputs, lambda: asdict(solve()), progress=progress))
+
+
+REPRODUCTION = Reproduction(
+    template="nao_pareto/nao_pareto_report.md",
+    full=ParetoEffort(),
+    quick=ParetoEffort(runs=1, budgets=(200,), points=5, starts=1, intervals=4),
+    run=run_pareto,
+    values=compute_values,
+    tables=make_tables,
+    figures=draw_figures,
+    claims=check_claims,
+)

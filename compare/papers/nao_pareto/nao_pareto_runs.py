@@ -1,14 +1,15 @@
-"""Runs behind the reproduction: the true front of each phase, and four algorithms on it."""
+"""Runs of four searches on the true front of each phase."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from compare.papers.paper_runs import Effort
 from compare.questions.pareto.competing import MARGINS, competing_objective
 from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.search import PowerAndCompeting, Scale
@@ -26,13 +27,13 @@ FIRST_LOOK = 100  # evaluations, one generation
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much is computed.
+class ParetoEffort(Effort):
+    """Effort of the reproduction of power against stability.
 
     Attributes:
-        runs: of each algorithm, as in the paper.
-        budgets: evaluations, rising; each has runs of its own, for DCNSGA-III plans for its budget. The first is that of the same
-            authors' paper of 2023; the abstract gives none.
+        runs: of each search, as in the paper.
+        budgets: evaluations, rising; each has separate runs, since DCNSGA-III plans for its budget. The first is that of the
+            same authors' paper of 2023; the abstract gives none.
         points: of the true front.
         starts: random starts at some of its points.
         intervals: between the samples of a phase, as in the paper of 2023.
@@ -47,13 +48,13 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True)
 class FrontRun:
-    """One run.
+    """Run of a search.
 
     Attributes:
-        algorithm: its name.
-        run: its number.
-        budget: evaluations that it was given.
-        looks: in the order of their evaluations; the last is the end, and only that one keeps its points.
+        algorithm: name of the search.
+        run: number of the run.
+        budget: allowed evaluations.
+        looks: in the order of their evaluations; only the last one, the end, has points.
     """
 
     algorithm: str
@@ -62,66 +63,61 @@ class FrontRun:
     looks: tuple[Snapshot, ...]
 
 
-def spec_of(phase: str, effort: Effort) -> ProblemSpec:
-    """A phase as in the paper of 2023."""
+def make_spec(phase: str, effort: ParetoEffort) -> ProblemSpec:
+    """Return a phase as in the paper of 2023."""
     return ProblemSpec(name=phase, options={"intervals": effort.intervals})
 
 
-def looks_of(budget: int) -> list[int]:
-    """Evaluations after which a run is looked at: whole generations, evenly spread over their logarithm."""
+def choose_looks(budget: int) -> list[int]:
+    """Return the evaluations after which a run is looked at: whole generations, evenly spread over their logarithm."""
     count = 1 + round(LOOKS_PER_DECADE * np.log10(budget / FIRST_LOOK))
     generations = np.rint(np.geomspace(1, budget // FIRST_LOOK, max(count, 1))).astype(int)
     return [int(g) * FIRST_LOOK for g in np.unique([*generations, budget // FIRST_LOOK])]
 
 
-def searches(
-    phase: str, front: Sequence[FrontPoint], effort: Effort
-) -> list[tuple[Computation, Callable[[Any], FrontRun]]]:
-    """Every run of a phase as a step, and what makes the run of its result."""
-    spec = spec_of(phase, effort)
+def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> list[Computation]:
+    """Return every run of a phase as a computation; ``make_run`` takes its result."""
+    spec, ends = make_spec(phase, effort), (front[0], front[-1])
     problem = spec.load()
     free = competing_objective(CRITERION, problem).freed(problem)
-    found: list[tuple[Computation, Callable[[Any], FrontRun]]] = []
-    for budget in effort.budgets:
-        for name in ALGORITHMS:
-            for run in range(effort.runs):
-                step = Computation(
-                    name=f"{phase}-{name.lower()}-{budget}-{run:02d}",
-                    inputs={
-                        **fingerprint(free),
-                        "criterion": CRITERION,
-                        "front": [[p.value, p.power_W] for p in (front[0], front[-1])],
-                        "algorithm": repr(front_algorithm(name)),
-                        "looks": looks_of(budget),
-                        "seed": run,
-                    },
-                    function=partial(search, spec, (front[0], front[-1]), name, looks_of(budget), run),
-                )
-                found.append((step, partial(run_of, name, run, budget)))
-    return found
+    return [
+        Computation(
+            name=f"{phase}-{name.lower()}-{budget}-{run:02d}",
+            inputs={
+                **fingerprint(free),
+                "criterion": CRITERION,
+                "front": [[end.value, end.power_W] for end in ends],
+                "algorithm": repr(front_algorithm(name)),
+                "looks": choose_looks(budget),
+                "seed": run,
+            },
+            function=partial(run_search, spec, ends, name, budget, run),
+        )
+        for budget in effort.budgets
+        for name in ALGORITHMS
+        for run in range(effort.runs)
+    ]
 
 
-def search(spec: ProblemSpec, ends: Sequence[FrontPoint], name: str, looks: Sequence[int], seed: int) -> dict[str, Any]:
-    """One run, as plain data; ``ends`` are those of the front, whose ranges count as 1."""
+def run_search(spec: ProblemSpec, ends: Sequence[FrontPoint], name: str, budget: int, run: int) -> dict[str, Any]:
+    """Return a run as plain data; ``ends`` are those of the front, whose ranges count as 1."""
     problem = spec.load()
     criterion = competing_objective(CRITERION, problem)
     objectives = PowerAndCompeting(
         compile_objective(criterion.freed(problem), threads=1), criterion, Scale([ends[0], ends[-1]])
     )
-    snapshots = minimize_many(objectives, front_algorithm(name), evaluations=looks, seed=seed)
+    snapshots = minimize_many(objectives, front_algorithm(name), evaluations=choose_looks(budget), seed=run)
     points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
-    return {
-        "looks": [
-            {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()}
-            for snapshot, X in zip(snapshots, points, strict=True)
-        ]
-    }
+    looks = [
+        {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()} for snapshot, X in zip(snapshots, points, strict=True)
+    ]
+    return {"algorithm": name, "run": run, "budget": budget, "looks": looks}
 
 
-def run_of(name: str, run: int, budget: int, kept: dict[str, Any]) -> FrontRun:
-    """The run of a step's result."""
+def make_run(result: Mapping[str, Any]) -> FrontRun:
+    """Return the run of a computation's result."""
     looks = tuple(
         Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)})
-        for look in kept["looks"]
+        for look in result["looks"]
     )
-    return FrontRun(algorithm=name, run=run, budget=budget, looks=looks)
+    return FrontRun(**{**result, "looks": looks})

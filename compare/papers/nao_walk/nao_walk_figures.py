@@ -1,11 +1,11 @@
-"""Figures: who draws the energy, what speed costs, what softer servos do."""
+"""Figures about NAO's walk: energy by joint, cost over speed, softer drives."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from compare.drawing.figures import COLOURS, new_figure, style
-from compare.papers.nao_walk.nao_walk_findings import Findings
+from compare.drawing.figures import COLOURS, new_figure
+from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S
 
@@ -15,77 +15,69 @@ if TYPE_CHECKING:
 BARS = (  # gait, where, label
     ("own", "model", "own walk,\nmodel"),
     ("own", "engine", "own walk,\nengine"),
-    ("own-plain", "engine", "plain servos,\nengine"),
+    ("own-plain", "engine", "plain drives,\nengine"),
     ("optimum-sheet", "model", "optimum,\nmodel"),
     ("optimum-sheet", "engine", "optimum,\nengine"),
 )
 PALETTE = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#CC79A7", "#999999")
 
 
-def all_figures(findings: Findings) -> dict[str, Figure]:
-    """By name."""
-    return {"joints": joints_figure(findings), "speeds": speeds_figure(findings), "servos": servos_figure(findings)}
+def draw_figures(findings: NaoWalkFindings) -> dict[str, Figure]:
+    """Return the figures by name."""
+    return {"joints": _draw_joints(findings), "speeds": _draw_speeds(findings), "drives": _draw_drives(findings)}
 
 
-def joints_figure(findings: Findings) -> Figure:
+def _draw_joints(findings: NaoWalkFindings) -> Figure:
     """Energy by kind of joint; full colour is heat, pale is mechanical."""
-    with style():
-        figure = new_figure(6.3, 3.4)
-        axes = figure.subplots()
-        for place, (gait, where, _) in enumerate(BARS):
-            bottom = 0.0
-            for kind, colour in zip(KINDS, PALETTE, strict=True):
-                parts = findings.joints[gait][where][kind]
-                axes.bar(place, parts["sheet"], 0.7, bottom, color=colour, label=None if place else KINDS[kind])
-                bottom += parts["sheet"]
-                axes.bar(place, parts["mechanical"], 0.7, bottom, color=colour, alpha=0.45)
-                bottom += parts["mechanical"]
-        axes.set_axisbelow(True)
-        axes.set_xticks(range(len(BARS)), [label for *_, label in BARS])
-        axes.set_ylabel("energy [J/m]")
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)
+    figure = new_figure(6.3, 3.4)
+    axes = figure.subplots()
+    for place, (gait, where, _) in enumerate(BARS):
+        bottom = 0.0
+        for kind, colour in zip(KINDS, PALETTE, strict=True):
+            energies = findings.joints[gait][where][kind]
+            axes.bar(place, energies["sheet"], 0.7, bottom, color=colour, label=None if place else KINDS[kind])
+            bottom += energies["sheet"]
+            axes.bar(place, energies["mechanical"], 0.7, bottom, color=colour, alpha=0.45)
+            bottom += energies["mechanical"]
+    axes.set_axisbelow(True)
+    axes.set_xticks(range(len(BARS)), [label for *_, label in BARS])
+    axes.set_ylabel("energy [J/m]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)
     return figure
 
 
-def speeds_figure(findings: Findings) -> Figure:
+def _draw_speeds(findings: NaoWalkFindings) -> Figure:
     """Cost of transport over speed, and the default speed."""
-    with style():
-        figure = new_figure(4.6, 3.0)
-        axes = figure.subplots()
-        for heat, colour in ((PAPER_HEAT, COLOURS["pso"]), (SHEET_HEAT, COLOURS["ga"])):
-            curve = findings.curve(heat)
-            speeds = [100.0 * point["speed_m_s"] for point in curve]
-            axes.plot(
-                speeds, [point["cost_of_transport"] for point in curve], "o-", color=colour, label=f"optimum, {heat}"
-            )
-        axes.axvline(100.0 * SPEED_M_S, color="#808080", ls="--", label="default speed")
-        axes.set(xlabel="speed [cm/s]", ylabel="cost of transport P / (m g v)")
-        axes.set_ylim(bottom=0.0)
-        axes.legend()
+    figure = new_figure(4.6, 3.0)
+    axes = figure.subplots()
+    for heat, colour in ((PAPER_HEAT, COLOURS["pso"]), (SHEET_HEAT, COLOURS["ga"])):
+        curve = findings.curve(heat)
+        speeds = [100.0 * point["speed_m_s"] for point in curve]
+        axes.plot(speeds, [point["cost_of_transport"] for point in curve], "o-", color=colour, label=f"optimum, {heat}")
+    axes.axvline(100.0 * SPEED_M_S, color="#808080", ls="--", label="default speed")
+    axes.set(xlabel="speed [cm/s]", ylabel="cost of transport P / (m g v)")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
     return figure
 
 
-def servos_figure(findings: Findings) -> Figure:
-    """Energy, falls and largest speed of the robot's own walk over the stiffness of its servos."""
-    with style():
-        figure = new_figure(6.3, 2.8)
-        energy, falls, speed = figure.subplots(1, 3)
-        for name, label, colour in (("none", "plain", COLOURS["ga"]), ("torque", "torque fed forward", COLOURS["pso"])):
-            points = list(zip(findings.stiffnesses, findings.servos[name], strict=True))
-            up = [(share, point["sheet_J_per_m"]) for share, point in points if not point["fell"]]
-            energy.plot(*zip(*up, strict=True), "o-", color=colour, label=label) if up else None
-            falls.plot([share for share, _ in points], [point["falls"] for _, point in points], "o-", color=colour)
-            speed.plot(
-                [share for share, _ in points],
-                [100.0 * point["fastest_m_s"] for _, point in points],
-                "o-",
-                color=colour,
-            )
-        energy.set_ylabel("energy [J/m]")
-        falls.set_ylabel(f"falls of {findings.servos['none'][0]['disturbances']}")
-        speed.set_ylabel("fastest walk [cm/s]")
-        for axes in (energy, falls, speed):
-            axes.set_ylim(0.0, 1.05 * axes.dataLim.y1 or 1.0)
-            axes.set_xlabel("stiffness, share of full")
-        energy.legend()
+def _draw_drives(findings: NaoWalkFindings) -> Figure:
+    """Energy, falls and largest speed of the robot's own walk over the stiffness of its drives."""
+    figure = new_figure(6.3, 2.8)
+    energy, falls, speed = figure.subplots(1, 3)
+    shares = findings.effort.stiffnesses
+    for name, label, colour in (("none", "plain", COLOURS["ga"]), ("torque", "torque fed forward", COLOURS["pso"])):
+        points = findings.drives[name]
+        up = [(share, point["sheet_J_per_m"]) for share, point in zip(shares, points, strict=True) if not point["fell"]]
+        if up:
+            energy.plot(*zip(*up, strict=True), "o-", color=colour, label=label)
+        falls.plot(shares, [point["falls"] for point in points], "o-", color=colour)
+        speed.plot(shares, [100.0 * point["fastest_m_s"] for point in points], "o-", color=colour)
+    energy.set_ylabel("energy [J/m]")
+    falls.set_ylabel(f"falls of {findings.drives['none'][0]['disturbances']}")
+    speed.set_ylabel("fastest walk [cm/s]")
+    for axes in (energy, falls, speed):
+        axes.set_ylim(0.0, 1.05 * axes.dataLim.y1 or 1.0)
+        axes.set_xlabel("stiffness, share of full")
+    energy.legend()
     return figure

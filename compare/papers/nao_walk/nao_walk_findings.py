@@ -1,4 +1,4 @@
-"""All results behind the claims, and what verdicts, tables and figures read from them."""
+"""Findings about NAO's walk: all results, and what claims, tables and figures read from them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from compare.papers.nao_walk.nao_walk_runs import KINDS, total
+from compare.papers.nao_walk.nao_walk_runs import KINDS, NaoWalkEffort, sum_energy
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S
 
 Point = Mapping[str, Any]
@@ -15,47 +15,47 @@ SAGITTAL = (KNEE, "HipPitch", "AnklePitch")  # kinds of joints that turn in the 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Findings:
-    """Results of all runs.
+class NaoWalkFindings:
+    """All results.
 
     Attributes:
+        effort: what was computed.
         speeds: by heat constant, the cheapest gaits in the order of their speeds.
         torsos: the robot's own walk in the order of its heights.
         straighter: by heat constant, cheapest gaits at the default speed.
-        joints: by gait, what its joints draw.
-        servos: by feed-forward, the robot's own walk from full stiffness downwards.
-        stiffnesses: of ``servos``.
+        joints: by gait, energy of its joints.
+        drives: by feed-forward, the robot's own walk from full stiffness downwards.
     """
 
+    effort: NaoWalkEffort
     speeds: Mapping[str, Sequence[Point]]
     torsos: Sequence[Point]
     straighter: Mapping[str, Point]
     joints: Mapping[str, Point]
-    servos: Mapping[str, Sequence[Point]]
-    stiffnesses: tuple[float, ...]
+    drives: Mapping[str, Sequence[Point]]
 
     def curve(self, heat: str) -> list[Point]:
-        """Feasible gaits over speed."""
+        """Return the feasible gaits over speed."""
         return [point for point in self.speeds[heat] if point["feasible"]]
 
     def cheapest(self, heat: str) -> Point:
-        """The one of least cost of transport."""
+        """Return the gait of least cost of transport."""
         return min(self.curve(heat), key=lambda point: float(point["cost_of_transport"]))
 
     def at_default(self, heat: str) -> Point:
-        """The one at the default speed."""
+        """Return the gait at the default speed."""
         return next(point for point in self.curve(heat) if point["speed_m_s"] == SPEED_M_S)
 
     def share(self, gait: str, where: str, heat: str, kind: str = KNEE) -> float:
-        """Share of a kind of joint in mechanical energy and heat; ``where`` is ``model`` or ``engine``."""
+        """Return the share of a kind of joint in mechanical energy and heat; ``where`` is ``model`` or ``engine``."""
         kinds = self.joints[gait][where]
-        return float((kinds[kind]["mechanical"] + kinds[kind][heat]) / total(kinds.values(), heat))
+        return float((kinds[kind]["mechanical"] + kinds[kind][heat]) / sum_energy(kinds.values(), heat))
 
     def largest(self, gait: str, where: str, heat: str, kinds: Iterable[str] = KINDS) -> str:
-        """Kind of joint that draws most."""
+        """Return the kind of joint that draws most."""
         return max(kinds, key=lambda kind: self.share(gait, where, heat, kind))
 
     def engine_J_per_m(self, gait: str, heat: str) -> float | None:
-        """Energy in the engine for each metre walked [J/m]; None after a fall."""
+        """Return the energy in the engine per metre walked [J/m]; None after a fall."""
         found = self.joints[gait]
-        return None if found["fell_at_s"] is not None else total(found["engine"].values(), heat)
+        return None if found["fell_at_s"] is not None else sum_energy(found["engine"].values(), heat)

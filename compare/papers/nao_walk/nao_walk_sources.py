@@ -1,4 +1,4 @@
-"""Who says what of NAO's walk, what of it could be read, and the walk that the maker documents."""
+"""Sources of claims about NAO's walk, and the walk that the maker documents."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from nlp_gait.gaits.biped.cart_table import Footsteps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """Where a claim stands.
-
-    Attributes:
-        reference: authors, title, where it appeared.
-        read: the part that could be read here.
-    """
+    """Source of a claim: authors, title and publication, and the part that could be read here."""
 
     reference: str
     read: str
+
+    def __str__(self) -> str:
+        """Reference, with the part that was read."""
+        return f"{self.reference} (read: {self.read})"
 
 
 KNEES = Source(
@@ -54,8 +53,8 @@ BATTERY_WH, ACTIVE_MIN = 62.5, 60.0  # DATA_SHEET
 STRETCHED_M = 0.334  # greatest height of the hip, with stretched legs: Gupta, Pratihar, Deb (2023), section 4.1
 
 
-def documented(step_m: float = STEP_M, torso_m: float = TORSO_M) -> Footsteps:
-    """Footsteps of the robot's own walk, which plans the ZMP of an inverted pendulum (MANUAL)."""
+def make_footsteps(step_m: float = STEP_M, torso_m: float = TORSO_M) -> Footsteps:
+    """Return the footsteps of the robot's own walk, which plans the ZMP of an inverted pendulum (MANUAL)."""
     period_s = STEP_M / SPEED_M_S
     return Footsteps(
         step_m=step_m,

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import add_legend_below, new_figure, style
-from compare.papers.paper_runs import point
+from compare.drawing.figures import add_legend_below, new_figure
+from compare.papers.paper_runs import get_point
 from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
 from compare.papers.stairs.stairs_paper import TABLE_4
-from compare.papers.stairs.stairs_runs import complete, plan_spec, tracked
-from compare.papers.stairs.stairs_tables import Findings
+from compare.papers.stairs.stairs_runs import complete_plan, make_plan_spec, roll_out
+from compare.papers.stairs.stairs_tables import StairsFindings
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -27,32 +27,31 @@ DRAWN_CASE = 2  # where the paper draws one case only
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 
-def all_figures(findings: Findings) -> dict[str, Figure]:
-    """By the stem of their files."""
-    plans = {case: complete(findings.effort, case, findings.plan(case)) for case in findings.cases}
-    followed = {case: tracked(case, plans[case], point(findings.best_track(case))) for case in findings.cases}
+def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
+    """Return the figures by name."""
+    plans = {case: complete_plan(findings.effort, case, findings.plan(case)) for case in findings.cases}
+    followed = {case: roll_out(case, plans[case], get_point(findings.best_track(case))) for case in findings.cases}
     plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
     size = TABLE_4[DRAWN_CASE].stair_length_m / 2
     step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
     first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
     following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
-    with style():
-        return {
-            "fig03": _segments(arrays, plan, step),
-            "fig06-07": _sticks(first, step, "first step", from_ground=True),
-            "fig08-09": _sticks(following, step, "next steps", from_ground=False),
-            "fig10-11": _ankle(arrays),
-            "fig12": _stairs_compared(plans),
-            "fig13": _pose_times(findings.steps["network"], findings.cases[0]),
-            "fig14-20": _tracking(followed, "q", "angle [rad]"),
-            "fig21-27": _tracking(followed, "qd", "rate [rad/s]"),
-            "fig28": _zmp(followed, plans),
-            "fig29": _torques(followed),
-        }
+    return {
+        "fig03": _draw_segments(arrays, plan, step),
+        "fig06-07": _draw_sticks(first, step, "first step", from_ground=True),
+        "fig08-09": _draw_sticks(following, step, "next steps", from_ground=False),
+        "fig10-11": _draw_ankle(arrays),
+        "fig12": _draw_stairs_compared(plans),
+        "fig13": _draw_pose_times(findings.steps["network"], findings.cases[0]),
+        "fig14-20": _draw_tracking(followed, "q", "angle [rad]"),
+        "fig21-27": _draw_tracking(followed, "qd", "rate [rad/s]"),
+        "fig28": _draw_zmp(followed, plans),
+        "fig29": _draw_torques(followed),
+    }
 
 
-def _planned(findings: Findings, case: int) -> Mapping[str, Array]:
-    problem = plan_spec(findings.effort, case).load().dense(DENSITY)
+def _planned(findings: StairsFindings, case: int) -> Mapping[str, Array]:
+    problem = make_plan_spec(findings.effort, case).load().dense(DENSITY)
     if problem is None:
         raise TypeError("the planner has samples and signals")
     return problem.signals(findings.plan(case)).arrays
@@ -73,7 +72,7 @@ def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
     axes.set_xlabel("x [m]")
 
 
-def _segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tuple[float, float]) -> Figure:
+def _draw_segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tuple[float, float]) -> Figure:
     figure = new_figure(height_in=3.6)
     axes = figure.subplots()
     _draw_stair(axes, step, 3)
@@ -89,7 +88,7 @@ def _segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tupl
     return figure
 
 
-def _sticks(legs: tuple[Leg, Leg], step: tuple[float, float], start: str, *, from_ground: bool) -> Figure:
+def _draw_sticks(legs: tuple[Leg, Leg], step: tuple[float, float], start: str, *, from_ground: bool) -> Figure:
     figure = new_figure(height_in=3.4)
     for axes, leg, name in zip(figure.subplots(1, 2, sharey=True), legs, ("swing", "stance"), strict=True):
         _draw_stair(axes, step, 2 if from_ground else 3)
@@ -108,7 +107,7 @@ def _shade(share: float) -> tuple[float, float, float]:
     return 0.75 * (1 - share), 0.85 - 0.4 * share, 0.95 - 0.25 * share
 
 
-def _ankle(arrays: Mapping[str, Array]) -> Figure:
+def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
     figure = new_figure(height_in=4.4)
     t, place = arrays["t"], arrays["ankle"]
     keep = np.concatenate([[True], np.diff(t) > 1e-9])
@@ -130,7 +129,7 @@ def _ankle(arrays: Mapping[str, Array]) -> Figure:
     return figure
 
 
-def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
+def _draw_stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
     figure = new_figure(height_in=2.9)
     for axes, (case, plan) in zip(
         figure.subplots(1, len(plans), sharey=True, squeeze=False)[0], plans.items(), strict=True
@@ -147,7 +146,7 @@ def _stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
     return figure
 
 
-def _pose_times(network: Mapping[str, Any], case: int) -> Figure:
+def _draw_pose_times(network: Mapping[str, Any], case: int) -> Figure:
     figure = new_figure()
     axes = figure.subplots()
     for rule, found in network.items():
@@ -158,7 +157,7 @@ def _pose_times(network: Mapping[str, Any], case: int) -> Figure:
     return figure
 
 
-def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str) -> Figure:
+def _draw_tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str) -> Figure:
     figure = new_figure(height_in=7.0)
     panels = figure.subplots(4, 2, sharex=True).ravel()
     for i, link in enumerate(TRACKED_LINKS):
@@ -176,7 +175,7 @@ def _tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str)
     return figure
 
 
-def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
+def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
     figure = new_figure()
     axes = figure.subplots()
     foot = toe_foot_biped().foot_m
@@ -193,7 +192,7 @@ def _zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mappin
     return figure
 
 
-def _torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
+def _draw_torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
     figure = new_figure(height_in=2.9)
     for axes, (case, arrays) in zip(
         figure.subplots(1, len(followed), sharey=True, squeeze=False)[0], followed.items(), strict=True

@@ -1,4 +1,4 @@
-"""Findings of the stairs reproduction, and its tables."""
+"""Findings and tables of the stairs reproduction."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from compare.papers.paper_runs import Runs, best, objectives, point
+from compare.papers.paper_runs import Runs, choose_best, get_point, list_objectives
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_runs import ALGORITHMS, Effort, best_track, other_spec, plan_of
+from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, choose_best_track, choose_plan, make_other_spec
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
 
-MATCH = 1e-3  # a start that ends within this of the best is counted as having found it (relative)
+MATCH = 1e-3  # relative: a start that ends this close to the best has found it
 # Name of a table of one step's results in each case: the step, and keys of its result.
 PICKED = {
     "printed-scheme": (
@@ -46,8 +46,8 @@ QUANTITIES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Findings:
-    """All results.
+class StairsFindings:
+    """All results of the reproduction.
 
     Attributes:
         effort: what was computed.
@@ -55,7 +55,7 @@ class Findings:
         steps: results of the other steps by name.
     """
 
-    effort: Effort
+    effort: StairsEffort
     runs: Runs
     steps: Mapping[str, Any]
 
@@ -65,20 +65,20 @@ class Findings:
         return self.effort.cases
 
     def best(self, what: str, case: int, solver: str = IPOPT) -> RunRecord:
-        """Best run of a solver on the ``plan``, ``jerk``, ``ideal`` or ``track`` of a case."""
-        return best(self.runs[f"{what}-{case}", solver])
+        """Return the best run of a solver on the ``plan``, ``jerk``, ``ideal`` or ``track`` of a case."""
+        return choose_best(self.runs[f"{what}-{case}", solver])
 
     def plan(self, case: int) -> dict[str, float]:
-        """Plan of least energy."""
-        return plan_of(self.runs, case)
+        """Return the plan of least energy."""
+        return choose_plan(self.runs, case)
 
     def best_track(self, case: int) -> RunRecord:
-        """Best run of any solver on the track."""
-        return best_track(self.runs, case)
+        """Return the best run of any solver on the track."""
+        return choose_best_track(self.runs, case)
 
 
-def all_tables(findings: Findings) -> dict[str, Rows]:
-    """Rows by name; headings and formats stand in ``report.md``."""
+def make_tables(findings: StairsFindings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
     return {
         "table3": _table_3(findings),
         "plans": [row for case in findings.cases for row in _plans(findings, case)],
@@ -94,12 +94,12 @@ def all_tables(findings: Findings) -> dict[str, Rows]:
     }
 
 
-def _of_step(findings: Findings, step: str, keys: Sequence[str]) -> Rows:
+def _of_step(findings: StairsFindings, step: str, keys: Sequence[str]) -> Rows:
     """Results of a step in each case."""
     return [[case, *(findings.steps[f"{step}-{case}"][key] for key in keys)] for case in findings.cases]
 
 
-def _table_3(findings: Findings) -> Rows:
+def _table_3(findings: StairsFindings) -> Rows:
     plans = [findings.plan(case) for case in findings.cases]
     rows = []
     for name in [variable.name for variable in GOVERNING_VARIABLES]:
@@ -108,14 +108,14 @@ def _table_3(findings: Findings) -> Rows:
     return rows
 
 
-def _plans(findings: Findings, case: int) -> Rows:
+def _plans(findings: StairsFindings, case: int) -> Rows:
     """Best plan of each solver, with the ends of all its runs."""
     rows: list[Sequence[Value]] = []
     for solver in (IPOPT, *ALGORITHMS):
         runs, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
-        every = ", ".join(f"{value:.2f}" for value in objectives(runs))
+        every = ", ".join(f"{value:.2f}" for value in list_objectives(runs))
         if solver == IPOPT:
-            ends = objectives(run for run in runs if run.claimed)
+            ends = list_objectives(run for run in runs if run.claimed)
             hits = sum(value <= verdict.objective * (1 + MATCH) for value in ends)
             every = f"{hits} of {len(runs)} starts, {len(ends)} converged"
         between = "feasible" if verdict.dense_feasible else verdict.violated[0]
@@ -127,7 +127,7 @@ def _time_s(runs: Sequence[RunRecord]) -> float:
     return float(np.mean([run.time_s.solve for run in runs]))
 
 
-def _table_4(findings: Findings) -> Rows:
+def _table_4(findings: StairsFindings) -> Rows:
     """The paper's quantities in each case, then ours: of the desired angles, and of the best tracked step."""
     rows = []
     for words, name, where in QUANTITIES:
@@ -145,7 +145,7 @@ def _table_4(findings: Findings) -> Rows:
     return rows
 
 
-def _tracks(findings: Findings, case: int) -> Rows:
+def _tracks(findings: StairsFindings, case: int) -> Rows:
     """Best run of each solver beside the ideal."""
     ideal = findings.best("ideal", case).verdict.indexes["energy_J"]
     rows: list[Sequence[Value]] = []
@@ -153,12 +153,12 @@ def _tracks(findings: Findings, case: int) -> Rows:
         run = findings.best("track", case, solver)
         verdict, own = run.verdict, run.verdict.indexes
         energies = [own["energy_J"], ideal, own["energy_J"] - ideal]
-        others = [own["zmp_margin_min_m"], own["largest_error_rad"], *point(run)]
+        others = [own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]
         rows.append([case, solver, verdict.objective, verdict.feasible, *energies, *others])
     return rows
 
 
-def _ideal(findings: Findings, case: int) -> Sequence[Value]:
+def _ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
     """Full trajectory optimisation."""
     runs, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
     every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in runs)
@@ -167,35 +167,35 @@ def _ideal(findings: Findings, case: int) -> Sequence[Value]:
     return [case, verdict.objective, every, *energies, *others, _time_s(runs)]
 
 
-def _jerk(findings: Findings, case: int) -> Sequence[Value]:
+def _jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
     """Plan of least peak jerk."""
     verdict = findings.best("jerk", case).verdict
     return [case, TABLE_4[case].jerk, verdict.objective, verdict.indexes["energy_J"]]
 
 
-def _fixed_hip(findings: Findings, case: int) -> Sequence[Value]:
+def _fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
     """Plans with the paper's hip height."""
     runs, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
     feasible = sum(run.verdict.feasible for run in runs)
     return [case, f"{feasible} of {len(runs)}", "; ".join(verdict.violated[:3]) or "nothing"]
 
 
-def _differences(findings: Findings, case: int) -> Sequence[Value]:
+def _differences(findings: StairsFindings, case: int) -> Sequence[Value]:
     """Largest acceleration and jerk by differences over 0.01 s: the paper's, and those of both plans."""
     plans = [findings.steps[f"differences-{least}-{case}"] for least in ("energy", "jerk")]
     of_kind = [(getattr(TABLE_4[case], kind), *(plan[kind] for plan in plans)) for kind in ("acceleration", "jerk")]
     return [case, *of_kind[0], *of_kind[1]]
 
 
-def _other(findings: Findings) -> Rows:
+def _other(findings: StairsFindings) -> Rows:
     """Stairs that the paper did not try."""
     rows = []
     for tread, rise in findings.effort.other_stairs:
         cells: list[Value] = [tread, rise]
         for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
-            run = best(findings.runs[other_spec(findings.effort, name, tread, rise).title, IPOPT])
+            run = choose_best(findings.runs[make_other_spec(findings.effort, name, tread, rise).title, IPOPT])
             worst = ", ".join(run.verdict.violated[:3])
-            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; in the way: {worst}")
+            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; violated: {worst}")
         rows.append(cells)
     return rows
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, new_figure, style
-from compare.papers.paper_runs import point
-from compare.papers.walk12.walk12_paper import row_of
+from compare.drawing.figures import COLOURS, new_figure
+from compare.papers.paper_runs import get_point
+from compare.papers.walk12.walk12_paper import find_row
 from compare.papers.walk12.walk12_runs import GA, PAPER, PathPoint
-from compare.papers.walk12.walk12_tables import Findings
+from compare.papers.walk12.walk12_tables import Walk12Findings
 from compare.study.record import RunRecord
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped
@@ -33,87 +33,84 @@ TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
 Gaits = Mapping[str, Sequence[float]]
 
 
-def all_figures(findings: Findings) -> dict[str, Figure]:
-    """By the stem of their files."""
+def draw_figures(findings: Walk12Findings) -> dict[str, Figure]:
+    """Return the figures by name."""
     gaits = _gaits(findings, 0.15)
     return {
-        "fig08": fitness_figure(findings.of(PAPER, 0.15, "ga"), findings.optimum(PAPER, 0.15)),
-        "fig09": angles_figure(gaits, FIGURE_9),
-        "fig10": angles_figure(gaits, FIGURE_10),
-        **{name: zmp_figure(_gaits(findings, weight)) for name, weight in ZMP_FIGURES.items()},
-        "tradeoff": tradeoff_figure(findings.front, findings.weighted),
-        "circle": circle_figure(point(findings.optimum(PAPER, TURNING_WEIGHT)), TURN_RAD),
+        "fig08": _draw_fitness(findings.records(PAPER, 0.15, "ga"), findings.optimum(PAPER, 0.15)),
+        "fig09": _draw_angles(gaits, FIGURE_9),
+        "fig10": _draw_angles(gaits, FIGURE_10),
+        **{name: _draw_zmp(_gaits(findings, weight)) for name, weight in ZMP_FIGURES.items()},
+        "tradeoff": _draw_tradeoff(findings.front, findings.weighted),
+        "circle": _draw_circle(get_point(findings.optimum(PAPER, TURNING_WEIGHT)), TURN_RAD),
     }
 
 
-def _gaits(findings: Findings, weight: float) -> Gaits:
+def _gaits(findings: Walk12Findings, weight: float) -> Gaits:
     """The paper's gait and IPOPT's at a lambda, by label."""
-    return {"paper's gait": row_of(weight).x, "IPOPT": point(findings.optimum(PAPER, weight))}
+    return {"paper's gait": find_row(weight).x, "IPOPT": get_point(findings.optimum(PAPER, weight))}
 
 
 def _colour(label: str) -> str:
     return PAPER_COLOUR if label.startswith("paper") else COLOURS["ipopt"]
 
 
-def fitness_figure(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
+def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
     """Fig. 8: best f so far after each epoch of the GA of Table II, all seeds."""
-    with style():
-        figure = new_figure(4.2, 2.8)
-        axes = figure.subplots()
-        runs = np.array([run.history.objective for run in ga], dtype=float)
-        epochs = np.arange(runs.shape[1])
-        axes.step(epochs, runs.T, where="post", color=COLOURS["ga"], alpha=0.3, linewidth=0.8)
-        axes.step(
-            epochs, np.median(runs, axis=0), where="post", color=COLOURS["ga"], label=f"GA, median of {len(runs)} runs"
-        )
-        axes.axhline(optimum.verdict.objective, color=COLOURS["ipopt"], linestyle="--", label="IPOPT")
-        axes.axvline(15, color="0.5", linewidth=0.8, linestyle=":", label="the paper: converged")
-        axes.set(xlabel=f"epoch ({GA.population} evaluations each)", ylabel="best f so far [1]")
-        axes.legend(loc="lower right")
+    figure = new_figure(4.2, 2.8)
+    axes = figure.subplots()
+    runs = np.array([run.history.objective for run in ga], dtype=float)
+    epochs = np.arange(runs.shape[1])
+    axes.step(epochs, runs.T, where="post", color=COLOURS["ga"], alpha=0.3, linewidth=0.8)
+    axes.step(
+        epochs, np.median(runs, axis=0), where="post", color=COLOURS["ga"], label=f"GA, median of {len(runs)} runs"
+    )
+    axes.axhline(optimum.verdict.objective, color=COLOURS["ipopt"], linestyle="--", label="IPOPT")
+    axes.axvline(15, color="0.5", linewidth=0.8, linestyle=":", label="the paper: converged")
+    axes.set(xlabel=f"epoch ({GA.population} evaluations each)", ylabel="best f so far [1]")
+    axes.legend(loc="lower right")
     return figure
 
 
-def angles_figure(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10) -> Figure:
+def _draw_angles(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10) -> Figure:
     """Figs. 9, 10: joint angles over some steps, the left leg's joint above the right leg's."""
-    with style():
-        figure = new_figure(6.3, 5.2)
-        grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
-        for label, x in gaits.items():
-            arrays = locomotion(point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
-            for row, pair in zip(grid, pairs, strict=True):
-                for axes, joint in zip(row, pair, strict=True):
-                    degrees = np.degrees(arrays["q"][:, joint - 1])
-                    axes.plot(arrays["t"], degrees, color=_colour(label), label=label, linewidth=1.0)
-                    axes.set(ylabel=rf"$\theta_{{{joint}}}$ [deg]")
-                    if not degrees.any():  # else noise would fill the axes
-                        axes.set_ylim(-1.0, 1.0)
-        for axes in grid[-1]:
-            axes.set_xlabel("time [s]")
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    figure = new_figure(6.3, 5.2)
+    grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
+    for label, x in gaits.items():
+        arrays = locomotion(point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
+        for row, pair in zip(grid, pairs, strict=True):
+            for axes, joint in zip(row, pair, strict=True):
+                degrees = np.degrees(arrays["q"][:, joint - 1])
+                axes.plot(arrays["t"], degrees, color=_colour(label), label=label, linewidth=1.0)
+                axes.set(ylabel=rf"$\theta_{{{joint}}}$ [deg]")
+                if not degrees.any():  # else noise would fill the axes
+                    axes.set_ylim(-1.0, 1.0)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
 
 
-def zmp_figure(gaits: Gaits) -> Figure:
+def _draw_zmp(gaits: Gaits) -> Figure:
     """Figs. 12 to 17: the ZMP over one step, in the plane of the sole and over time."""
     robot = point_mass_biped()
-    with style():
-        figure = new_figure(6.3, 3.0)
-        plane, time = figure.subplots(1, 2)
-        _sole(plane, robot)
-        for label, x in gaits.items():
-            arrays = locomotion(robot, np.array(x), steps=1, intervals=400).arrays
-            zmp = MILLIMETRES * arrays["zmp_foot"]
-            colour = _colour(label)
-            plane.plot(zmp[:, 0], zmp[:, 1], color=colour, label=label)
-            plane.plot(*zmp[0], color=colour, marker="o")
-            time.plot(arrays["t"], zmp[:, 0], color=colour, linestyle=":", label=f"x, {label}")
-            time.plot(arrays["t"], zmp[:, 1], color=colour, label=f"y, {label}")
-        plane.set(xlabel="x of the ZMP [mm]", ylabel="y of the ZMP [mm]", aspect="equal")
-        plane.set_xlim(-50, 80)
-        plane.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
-        time.set(xlabel="time [s]", ylabel="ZMP from the stance ankle [mm]")
-        time.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
+    figure = new_figure(6.3, 3.0)
+    plane, time = figure.subplots(1, 2)
+    _sole(plane, robot)
+    for label, x in gaits.items():
+        arrays = locomotion(robot, np.array(x), steps=1, intervals=400).arrays
+        zmp = MILLIMETRES * arrays["zmp_foot"]
+        colour = _colour(label)
+        plane.plot(zmp[:, 0], zmp[:, 1], color=colour, label=label)
+        plane.plot(*zmp[0], color=colour, marker="o")
+        time.plot(arrays["t"], zmp[:, 0], color=colour, linestyle=":", label=f"x, {label}")
+        time.plot(arrays["t"], zmp[:, 1], color=colour, label=f"y, {label}")
+    plane.set(xlabel="x of the ZMP [mm]", ylabel="y of the ZMP [mm]", aspect="equal")
+    plane.set_xlim(-50, 80)
+    plane.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
+    time.set(xlabel="time [s]", ylabel="ZMP from the stance ankle [mm]")
+    time.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
     return figure
 
 
@@ -126,43 +123,41 @@ def _sole(axes: Axes, robot: PointMassBiped) -> None:
     axes.plot(0, 0, color="0.4", marker="+")
 
 
-def tradeoff_figure(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
+def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
     """The Pareto front of Q and s beside the optima of the weighted sum, and the latter over lambda."""
 
     def plane_of(path: Sequence[PathPoint]) -> tuple[list[float], list[float]]:
         return [MILLIMETRES * at.step_length_m for at in path], [1e3 * at.Q_m2s for at in path]
 
-    with style():
-        figure = new_figure(6.3, 3.0)
-        plane, sweep = figure.subplots(1, 2)
-        plane.plot(*plane_of(front), color=COLOURS["pso"], label="Pareto front")
-        points = [at for at in weighted if at.at > 0.0]  # at zero Q does not count
-        s, Q = plane_of(points)
-        plane.plot(s, Q, "o", color=COLOURS["ga"], fillstyle="none", label="weighted sum")
-        for end, offset, align in ((min(s), (12, -4), "left"), (max(s), (-8, -2), "right")):
-            here = [k for k, length in enumerate(s) if abs(length - end) < 0.01]
-            text = rf"$\lambda$ = {points[here[0]].at:.3g} to {points[here[-1]].at:.3g}"
-            at = (end, Q[here[0]])
-            plane.annotate(text, at, xytext=offset, textcoords="offset points", ha=align, fontsize=8)
-        plane.set(xlabel="step length s [mm]", ylabel=r"Q [$10^{-3}$ m$^2$ s]")
-        plane.legend(loc="center left", bbox_to_anchor=(0.0, 0.7))
-        sweep.plot([at.at for at in weighted], plane_of(weighted)[0], color=COLOURS["ga"])
-        sweep.set(xlabel=r"$\lambda$ [1]", ylabel="optimal step length s [mm]")
+    figure = new_figure(6.3, 3.0)
+    plane, sweep = figure.subplots(1, 2)
+    plane.plot(*plane_of(front), color=COLOURS["pso"], label="Pareto front")
+    points = [at for at in weighted if at.at > 0.0]  # at zero Q does not count
+    s, Q = plane_of(points)
+    plane.plot(s, Q, "o", color=COLOURS["ga"], fillstyle="none", label="weighted sum")
+    for end, offset, align in ((min(s), (12, -4), "left"), (max(s), (-8, -2), "right")):
+        here = [k for k, length in enumerate(s) if abs(length - end) < 0.01]
+        text = rf"$\lambda$ = {points[here[0]].at:.3g} to {points[here[-1]].at:.3g}"
+        at = (end, Q[here[0]])
+        plane.annotate(text, at, xytext=offset, textcoords="offset points", ha=align, fontsize=8)
+    plane.set(xlabel="step length s [mm]", ylabel=r"Q [$10^{-3}$ m$^2$ s]")
+    plane.legend(loc="center left", bbox_to_anchor=(0.0, 0.7))
+    sweep.plot([at.at for at in weighted], plane_of(weighted)[0], color=COLOURS["ga"])
+    sweep.set(xlabel=r"$\lambda$ [1]", ylabel="optimal step length s [mm]")
     return figure
 
 
-def circle_figure(x: Sequence[float], turn_rad: float) -> Figure:
+def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     """Footprints and the waist's path over one full circle, seen from above."""
     robot = point_mass_biped()
     steps = int(np.ceil(2 * np.pi / turn_rad))
     arrays = locomotion(robot, np.array(x), steps=steps, intervals=20, turn_rad=turn_rad).arrays
-    with style():
-        figure = new_figure(3.6, 3.4)
-        axes = figure.subplots()
-        axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")
-        for side, stands, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
-            prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stands], 9), axis=0)
-            axes.plot(prints[:, 0], prints[:, 1], "s", markersize=3, color=colour, label=f"{side} foot")
-        axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        axes.legend(loc="center")
+    figure = new_figure(3.6, 3.4)
+    axes = figure.subplots()
+    axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")
+    for side, stands, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
+        prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stands], 9), axis=0)
+        axes.plot(prints[:, 0], prints[:, 1], "s", markersize=3, color=colour, label=f"{side} foot")
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.legend(loc="center")
     return figure

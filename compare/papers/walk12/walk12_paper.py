@@ -1,4 +1,4 @@
-"""What the paper on the 12-joint walk prints: Tables III and IV.
+"""Tables III and IV of the paper on the 12-joint walk, as printed.
 
 Source:
     Goswami, Vadakkepat, Phung (2008), section 7.
@@ -21,7 +21,7 @@ class PaperRow:
         step_time_s: T.
         x: s, n, H, h [m].
         f1max: f1 that counts as 1 [1/(m^2 s)].
-        f: the paper's objective.
+        f: the objective as printed.
     """
 
     weight: float
@@ -32,7 +32,7 @@ class PaperRow:
 
     @property
     def implied_f1(self) -> float:
-        """f1 that makes (11) give the printed f."""
+        """The f1 with which (11) gives the printed f."""
         return (self.f - (1 - self.weight) * self.x[0] / F2MAX) / self.weight * self.f1max
 
 
@@ -54,6 +54,6 @@ TABLE_4 = (
 )
 
 
-def row_of(weight: float) -> PaperRow:
-    """Row of Table III with a lambda."""
+def find_row(weight: float) -> PaperRow:
+    """Return the row of Table III with a lambda."""
     return next(row for row in TABLE_3 if row.weight == weight)

@@ -1,4 +1,4 @@
-"""Runs behind the reproduction of the 12-joint walk, and the two paths of neighbouring optima."""
+"""Runs of the reproduction of the 12-joint walk, and two paths of neighbouring optima."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.paper_runs import Runs, best, searches, starts
+from compare.papers.paper_runs import Effort, Runs, choose_best, make_search_tasks, make_start_tasks
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
@@ -26,16 +26,15 @@ HORIZONS: tuple[Horizon, ...] = get_args(Horizon)
 GA, GA_EVALUATIONS = GeneticAlgorithm.goswami2008(), 930
 CORNER_M = 0.13
 MOMENT_FREE_WEIGHTS = (0.15, 1.0)
-WEIGHTED, FRONT = "weighted-sum", "front"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much is computed.
+class Walk12Effort(Effort):
+    """Effort of the reproduction of the 12-joint walk.
 
     Attributes:
         starts: of IPOPT on each problem.
-        runs: of each search algorithm.
+        runs: of each search.
         pso_evaluations: of a run of PSO; the GA has the paper's.
         weights: of the trade-off curve, dense where the optimum moves from one plateau to the other.
         lengths_m: step lengths of the Pareto front.
@@ -58,14 +57,7 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True)
 class PathPoint:
-    """Optimum at a point of a path.
-
-    Attributes:
-        at: the weight, or the step length [m].
-        step_length_m: s at the optimum.
-        Q_m2s: Q there.
-        iterations: of IPOPT.
-    """
+    """Optimum at a weight or step length [m] of a path: s [m], Q [m^2 s] and IPOPT's iterations."""
 
     at: float
     step_length_m: float
@@ -73,97 +65,99 @@ class PathPoint:
     iterations: int
 
 
-def title(label: str, weight: float) -> str:
-    """Title of a row of Table III under a normalisation."""
+def title_table_3(label: str, weight: float) -> str:
+    """Return the title of a row of Table III under a normalisation."""
     return f"table3-{label}-{weight:g}"
 
 
-def title_of_table_4(row: PaperRow, horizon: Horizon, most_stable: bool = False) -> str:
-    """Title of a row of Table IV under a horizon of Q: its optimum, or its most stable gait, which gives f1max."""
+def title_table_4(row: PaperRow, horizon: Horizon, most_stable: bool = False) -> str:
+    """Return the title of a row of Table IV under a horizon of Q: its optimum, or its most stable gait, which gives f1max."""
     return f"table4-{row.step_time_s:g}s-Q{horizon}" + "-stable" * most_stable
 
 
-def walk(**options: str) -> GaitProblem:
-    """The problem with its default parameters."""
+def load_walk12(**options: str) -> GaitProblem:
+    """Return the problem with its default parameters."""
     return ProblemSpec(name="walk12", options=options).load()
 
 
-def first_tasks(effort: Effort) -> Iterator[Task]:
-    """Table III under the paper's f1max, the most stable gaits of Table IV, and the runs that errata are measured with."""
+def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
+    """Yield Table III under the paper's f1max, the most stable gaits of Table IV, and the runs for the errata."""
     yield from _table_3(effort, PAPER, F1MAX)
     for row in TABLE_4:
         for horizon in HORIZONS:
-            yield from starts(_row_of_table_4(row, horizon), effort.starts)
+            yield from make_start_tasks(_row_of_table_4(row, horizon), effort.starts)
     for weight in MOMENT_FREE_WEIGHTS:
         free = _spec(f"moment-free-{weight:g}", {"zmp": "moment-free"}, {"lambda": weight, "f1max": F1MAX})
-        yield from starts(free, effort.starts)
+        yield from make_start_tasks(free, effort.starts)
     corner = _spec("corner", {}, {"lambda": 0.15, "f1max": F1MAX})
     yield Task(problem=corner, solver=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
 
 
-def second_tasks(effort: Effort, runs: Runs) -> Iterator[Task]:
-    """What needs the model's own f1max: Table III under it, and Table IV."""
-    yield from _table_3(effort, MODEL, own_f1max(runs))
+def make_second_tasks(effort: Walk12Effort, runs: Runs) -> Iterator[Task]:
+    """Yield the tasks that need the model's own f1max: Table III under it, and Table IV."""
+    yield from _table_3(effort, MODEL, find_own_f1max(runs))
     for row in TABLE_4:
         for horizon in HORIZONS:
-            yield from starts(_row_of_table_4(row, horizon, f1max_of_table_4(runs, row, horizon)), effort.starts)
+            yield from make_start_tasks(
+                _row_of_table_4(row, horizon, find_f1max_of_row(runs, row, horizon)), effort.starts
+            )
 
 
-def own_f1max(runs: Runs) -> float:
-    """Largest f1 of the model [1/(m^2 s)]: with ``--set f1max=...`` f of the most stable gait is 1."""
-    return best(runs[title(PAPER, 1.0), IPOPT]).verdict.objective * F1MAX
+def find_own_f1max(runs: Runs) -> float:
+    """Return the largest f1 of the model [1/(m^2 s)]: with ``--set f1max=...`` f of the most stable gait is 1."""
+    return choose_best(runs[title_table_3(PAPER, 1.0), IPOPT]).verdict.objective * F1MAX
 
 
-def f1max_of_table_4(runs: Runs, row: PaperRow, horizon: Horizon) -> float:
-    """Likewise at a step time and a horizon of Q."""
-    return best(runs[title_of_table_4(row, horizon, most_stable=True), IPOPT]).verdict.objective * F1MAX
+def find_f1max_of_row(runs: Runs, row: PaperRow, horizon: Horizon) -> float:
+    """Return the largest f1 of the model at a step time and a horizon of Q [1/(m^2 s)]."""
+    return choose_best(runs[title_table_4(row, horizon, most_stable=True), IPOPT]).verdict.objective * F1MAX
 
 
-def f1_of_gait(row: PaperRow, **options: str) -> float:
-    """f1 of a printed gait at its step time [1/(m^2 s)], on the dense grid."""
-    verdict = evaluate(walk(**options).with_values(step_time_s=row.step_time_s), row.x)
+def compute_f1(row: PaperRow, **options: str) -> float:
+    """Return f1 of a printed gait at its step time [1/(m^2 s)], on the dense grid."""
+    verdict = evaluate(load_walk12(**options).with_values(step_time_s=row.step_time_s), row.x)
     return (verdict.dense or {})["f1_per_m2s"]
 
 
-def _table_3(effort: Effort, label: str, f1max: float) -> Iterator[Task]:
+def _table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:
     for row in TABLE_3:
-        spec = _spec(title(label, row.weight), {}, {"lambda": row.weight, "f1max": f1max})
-        yield from starts(spec, effort.starts)
-        yield from searches(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
-        yield from searches(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
+        spec = _spec(title_table_3(label, row.weight), {}, {"lambda": row.weight, "f1max": f1max})
+        yield from make_start_tasks(spec, effort.starts)
+        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from make_search_tasks(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
 
 
 def _row_of_table_4(row: PaperRow, horizon: Horizon, f1max: float | None = None) -> ProblemSpec:
     weight, normalisation = (1.0, F1MAX) if f1max is None else (row.weight, f1max)
     values = {"step_time_s": row.step_time_s, "lambda": weight, "f1max": normalisation}
-    return _spec(title_of_table_4(row, horizon, most_stable=f1max is None), {"horizon": horizon}, values)
+    return _spec(title_table_4(row, horizon, most_stable=f1max is None), {"horizon": horizon}, values)
 
 
 def _spec(label: str, options: dict[str, str], values: dict[str, float]) -> ProblemSpec:
     return ProblemSpec(name="walk12", options=options, values=values, label=label)
 
 
-def paths(effort: Effort) -> list[Computation]:
-    """The weighted sum and the front, kept as steps: each optimum begins at the end of the last one and is no run of its own."""
-    computed = {WEIGHTED: (weighted_sum, effort.weights), FRONT: (front, effort.lengths_m)}
+def make_paths(effort: Walk12Effort) -> list[Computation]:
+    """Return the weighted sum and the front: each optimum starts at the last one, so it is not a run by itself."""
+    computed = {"weighted-sum": (solve_weighted_sum, effort.weights), "front": (solve_front, effort.lengths_m)}
     return [
         Computation(
             name=name,
-            inputs={**fingerprint(walk()), "starts": effort.starts, "at": list(at)},
+            inputs={**fingerprint(load_walk12()), "starts": effort.starts, "at": list(at)},
             function=partial(compute, at, effort.starts),
         )
         for name, (compute, at) in computed.items()
     ]
 
 
-def weighted_sum(weights: Sequence[float], count: int) -> list[dict[str, Any]]:
-    """Fields of ``PathPoint`` at every weight."""
-    return _follow([(w, walk().with_values(**{"lambda": w, "f1max": F1MAX})) for w in weights], count)
+def solve_weighted_sum(weights: Sequence[float], count: int) -> list[dict[str, Any]]:
+    """Return the fields of ``PathPoint`` at each weight."""
+    return _follow([(w, load_walk12().with_values(**{"lambda": w, "f1max": F1MAX})) for w in weights], count)
 
 
-def front(lengths_m: Sequence[float], count: int) -> list[dict[str, Any]]:
-    """Fields of ``PathPoint`` at every step length, of the largest f1 there: the Pareto front of Q and s."""
-    most_stable = walk().with_values(**{"lambda": 1.0})
+def solve_front(lengths_m: Sequence[float], count: int) -> list[dict[str, Any]]:
+    """Return the fields of ``PathPoint`` at each step length, of the largest f1 there: the Pareto front of Q and s."""
+    most_stable = load_walk12().with_values(**{"lambda": 1.0})
     return _follow([(s, most_stable.fix(step_length_m=s)) for s in lengths_m], count)
 
 

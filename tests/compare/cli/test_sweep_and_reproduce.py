@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-from importlib import import_module
-from inspect import signature
+from importlib import resources
 from pathlib import Path
 
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.cli.reproduce import REPRODUCTIONS
+from compare.papers import REPRODUCTIONS, load_reproduction
 
 RUN = CliRunner()
 
@@ -36,9 +35,11 @@ def test_sweep_over_nonsense_is_one_sentence(tmp_path: Path) -> None:
     assert done.stdout == "" and done.stderr.startswith("nlp-gait: --over takes")
 
 
-def test_every_reproduction_can_be_called_alike() -> None:
-    for name in REPRODUCTIONS.values():
-        assert list(signature(import_module(name).reproduce).parameters)[:2] == ["out", "progress"]
+def test_every_reproduction_has_its_template_and_knows_its_steps() -> None:
+    for name in REPRODUCTIONS:
+        reproduction = load_reproduction(name)
+        assert (resources.files("compare.papers") / reproduction.template).is_file()
+        assert (reproduction.full.steps is None) == (name == "nao-pareto")
 
 
 def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:

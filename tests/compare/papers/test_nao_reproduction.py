@@ -2,65 +2,40 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.papers.nao import nao_reproduction as nao
-from compare.papers.nao import report as nao_report
-from compare.papers.nao.nao_claims import claims
-from compare.papers.nao.nao_findings import Findings, PhaseFindings, Points, sweep_values
+from compare.papers.nao.nao_claims import check_claims
+from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PHASES, SSP
-from compare.papers.nao.nao_runs import Effort, Held, power_with_legs_twice
-from compare.papers.nao.nao_tables import implied_a12
-from compare.report.document import Document
+from compare.papers.nao.nao_reproduction import REPRODUCTION
+from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice
+from compare.papers.nao.nao_tables import compute_implied_a12
 from compare.study.record import RunRecord, read_record
-from nlp_gait.errors import OutputError
-
-SMALL = Effort(runs=3, evaluations=1000, starts=1, lever_starts=1, intervals=4, sweep_starts=1, sweep_points=(0, 0))
+from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Findings, list[str]]:
-    """Folder, findings and notes of a finished reproduction."""
-    out = tmp_path_factory.mktemp("nao")
-    kept: list[Findings] = []
-    told: list[str] = []
-
-    def document(findings: Findings) -> Document:
-        kept.append(findings)
-        return nao_report.document(findings)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nao, "document", document)
-        nao.reproduce(out, progress=told.append, effort=SMALL)
-    return out, kept[0], told
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    return reproduce("nao", tmp_path_factory.mktemp("nao"))
 
 
-def test_everything_is_there_and_in_the_report(done: tuple[Path, Findings, list[str]]) -> None:
-    out, _, told = done
-    report = (out / "report.md").read_text()
-    assert "{" not in report and "nan" not in report
-    figures = re.findall(r"\((\S+)\.png\)", report)
-    assert figures[:7] == ["fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig20a"]
-    assert figures[7:] == ["swing-height", "fig15", "fig16", "fig17", "fig18", "fig19", "fig20b"]
-    for name in figures:
-        assert (out / f"{name}.png").stat().st_size > 0
-    names = ("table6", "table7", "table7-swing-heights", "table8", "table9", "rank-sum-tests", "power-gap", "claims")
-    assert all(len((out / f"{table}.csv").read_text().splitlines()) > 1 for table in names)
-    assert (out / "report.html").read_text().count("<svg") == len(figures)
-    assert len(told) == SMALL.steps
+def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
+    check_report(
+        finished,
+        "fig09 fig10 fig11 fig12 fig13 fig14 fig20a swing-height fig15 fig16 fig17 fig18 fig19 fig20b",
+        "table6 table7 table7-swing-heights table8 table9 rank-sum-tests power-gap claims durations runs-nao-ssp runs-nao-dsp",
+    )
 
 
-def test_every_feasible_solution_is_kept(done: tuple[Path, Findings, list[str]]) -> None:
-    out, findings, _ = done
-    with np.load(out / "store" / "points" / "nao-dsp-ga-02.npz") as archive:
+def test_every_feasible_solution_is_stored(finished: Finished) -> None:
+    findings = finished.findings
+    with np.load(finished.folder / "store" / "points" / "nao-dsp-ga-02.npz") as archive:
         x, power = archive["x"], archive["power_W"]
     f, violation = nlp_gait.compile_objective(findings.dsp.problem)(x)
     assert len(x) > 100 and np.all(violation == 0.0)
@@ -68,75 +43,48 @@ def test_every_feasible_solution_is_kept(done: tuple[Path, Findings, list[str]])
     assert power.min() == pytest.approx(findings.dsp.searches["ga"][2].verdict.objective, rel=1e-9)
 
 
-def test_paired_runs_start_alike(done: tuple[Path, Findings, list[str]]) -> None:
-    for phase in done[1].phases:
+def test_paired_runs_start_alike(finished: Finished) -> None:
+    for phase in finished.findings.phases:
         for pso, ga in zip(phase.searches["pso"], phase.searches["ga"], strict=True):
             assert pso.history.objective[0] == ga.history.objective[0]
 
 
-def test_nothing_lies_below_ipopts_optimum(done: tuple[Path, Findings, list[str]]) -> None:
+def test_nothing_lies_below_ipopts_optimum(finished: Finished) -> None:
     """Neither where a search ends, nor an optimum with a variable held."""
-    for phase in done[1].phases:
+    for phase in finished.findings.phases:
         assert min(phase.final_powers("pso") + phase.final_powers("ga")) > phase.best
         for sweep in phase.sweeps.values():
             assert all(held.power_W > phase.best * (1 - 1e-6) for held in sweep if held.feasible)
 
 
-def test_interrupted_and_started_again_it_continues(done: tuple[Path, Findings, list[str]]) -> None:
-    out, findings, _ = done
-    step = out / "store" / "nao-dsp-sweep-x1.json"
-    swept = step.read_text()
-    (out / "records" / "nao-ssp" / "pso-0001.json").unlink()
-    (out / "store" / "points" / "nao-dsp-ga-00.npz").unlink()
-    step.write_text(swept[: len(swept) // 2])  # torn by a crash
-    told: list[str] = []
-
-    def stop_at_news(note: str) -> None:
-        told.append(note)
-        if "stored" not in note:
-            raise KeyboardInterrupt
-
+def test_an_interrupted_reproduction_continues(finished: Finished) -> None:
+    record = finished.folder / "records" / "nao-ssp" / "pso-0001.json"
+    points, path = (finished.folder / "store" / name for name in ("points/nao-dsp-ga-00.npz", "nao-dsp-sweep-x1.json"))
+    swept = path.read_text()
+    record.unlink()
+    points.unlink()
+    path.write_text(swept[: len(swept) // 2])  # torn by a crash
     for news in ("nao-dsp, ga 0", "nao-ssp, pso 1", "nao-dsp-sweep-x1"):
-        with pytest.raises(KeyboardInterrupt):
-            nao.reproduce(out, progress=stop_at_news, effort=SMALL)
-        assert told[-1] == news
-    told.clear()
-
-    def stop_at_figures(note: str) -> None:
-        told.append(note)
-        if note.startswith("figures"):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        nao.reproduce(out, progress=stop_at_figures, effort=SMALL)
-    assert [note for note in told if "stored" not in note] == ["nao-dsp-sweep-x1", "figures, tables and report"]
-    assert step.read_text() == swept
-    again = read_record(out / "records" / "nao-ssp" / "pso-0001.json")
-    assert again.x == findings.ssp.searches["pso"][1].x
-    assert (out / "store" / "points" / "nao-dsp-ga-00.npz").exists()
+        assert recompute(finished, news) == [news]
+    assert recompute(finished) == ["nao-dsp-sweep-x1", "figures, tables and report"]
+    assert path.read_text() == swept and points.exists()
+    assert read_record(record).x == finished.findings.ssp.searches["pso"][1].x
 
 
-def test_progress_is_told_as_often_as_announced() -> None:
-    jobs = len(PHASES) * (2 * 11 + 20) + 5
-    sweeps = 2 + 9 + 8
-    assert jobs + sweeps + 1 == 109
-    assert nao.STEPS == 109
+def test_the_full_effort_counts_all_its_steps() -> None:
+    assert REPRODUCTION.full.steps == len(PHASES) * (2 * 11 + 20) + 5 + 2 + 9 + 8 + 1 == 109
 
 
-def test_a_folder_that_cannot_be_written_to_fails_before_the_work(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError):
-        nao.reproduce(tmp_path / "file", progress=print)
+def verdict(findings: NaoFindings, start: str) -> str:
+    (claim,) = [claim for claim in check_claims(findings) if claim.text.startswith(start)]
+    return f"{claim.verdict} {claim.detail}".rstrip()
 
 
-def verdict(findings: Findings, start: str) -> str:
-    (found,) = [claim.verdict for claim in claims(findings) if claim.text.startswith(start)]
-    return found
-
-
-def with_sweep(findings: Findings, position: int, powers: Sequence[float]) -> Findings:
+def with_sweep(findings: NaoFindings, position: int, powers: Sequence[float]) -> NaoFindings:
     """With a line of IPOPT in single support that has these powers; infinity where nothing is feasible."""
-    line = [Held(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)]
+    line = [
+        SweepPoint(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)
+    ]
     phases = [replace(phase, sweeps={**phase.sweeps, position: line}) for phase in findings.phases]
     return replace(findings, ssp=phases[0], dsp=phases[1])
 
@@ -151,8 +99,8 @@ def with_powers(phase: PhaseFindings, powers: Mapping[str, Sequence[float]]) -> 
     return replace(phase, searches={name: [run(power) for power in ends] for name, ends in powers.items()})
 
 
-def test_claims_follow_the_numbers(done: tuple[Path, Findings, list[str]]) -> None:
-    findings = done[1]
+def test_claims_follow_the_numbers(finished: Finished) -> None:
+    findings = finished.findings
     ssp = findings.ssp
     low = [0.85, 0.86, 0.87, 0.88, 0.89]
     high = [power + 0.1 for power in low]
@@ -171,26 +119,26 @@ def test_claims_follow_the_numbers(done: tuple[Path, Findings, list[str]]) -> No
     assert verdict(gap, "For some durations") == "holds"
 
 
-def test_infeasible_runs_rank_last(done: tuple[Path, Findings, list[str]]) -> None:
-    phase = with_powers(done[1].ssp, {"pso": [np.inf, 0.9, 0.8]})
+def test_infeasible_runs_rank_last(finished: Finished) -> None:
+    phase = with_powers(finished.findings.ssp, {"pso": [np.inf, 0.9, 0.8]})
     assert phase.final_powers("pso") == [float("inf"), 0.9, 0.8]
     assert phase.median_run("pso") == 1
 
 
-def test_the_remark_on_the_gap_is_computed() -> None:
+def test_the_note_on_the_gap_is_computed() -> None:
     """Verified values of the paper's solutions, and the power with the legs' mechanical term counted twice."""
     here, twice = [], []
     for phase in PHASES:
         problem = nlp_gait.load(phase.problem)
         here += [evaluate(problem, optimum.x).objective["value"] for optimum in phase.optima.values()]
-        twice += [power_with_legs_twice(problem, optimum.x) for optimum in phase.optima.values()]
+        twice += [compute_power_with_legs_twice(problem, optimum.x) for optimum in phase.optima.values()]
     assert here == pytest.approx([0.866844, 0.891966, 0.626506, 0.626492], abs=2e-6)
     assert twice == pytest.approx([1.306, 1.355, 1.084, 1.084], abs=5e-4)
 
 
-def test_effect_size_of_the_printed_rank_sums(done: tuple[Path, Findings, list[str]]) -> None:
-    eleven = with_powers(done[1].ssp, {"pso": [1.0] * 11})
-    found = [implied_a12(replace(eleven, paper=paper)) for paper in (SSP, DSP)]
+def test_effect_size_of_the_printed_rank_sums(finished: Finished) -> None:
+    eleven = with_powers(finished.findings.ssp, {"pso": [1.0] * 11})
+    found = [compute_implied_a12(replace(eleven, paper=paper)) for paper in (SSP, DSP)]
     assert found == pytest.approx([117 / 121, 97 / 121])  # W = 66 would be a win in all 121 pairs
 
 
@@ -204,4 +152,4 @@ def test_reading_a_history_and_choosing_where_to_sweep() -> None:
     assert points.cheapest_near(0, 0.1, 0.0005, run=0) == 3.0
     assert np.isnan(points.cheapest_near(0, 0.5, 0.0005))
     dear = Points(x=np.array([[-1.0], [2.0]]), power_W=np.array([5.0, 5.0]), run=np.zeros(2))
-    assert sweep_values({"pso": points, "ga": dear}, 0, 0.3, (3, 2)) == [-1.0, 0.0, 0.3, 0.5, 1.0, 2.0]
+    assert choose_sweep_values({"pso": points, "ga": dear}, 0, 0.3, (3, 2)) == [-1.0, 0.0, 0.3, 0.5, 1.0, 2.0]

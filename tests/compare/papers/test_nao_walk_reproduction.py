@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from compare.papers.nao_walk import nao_walk_reproduction as nao_claims
 from compare.papers.nao_walk import nao_walk_runs
-from compare.papers.nao_walk.effort import Effort
-from compare.papers.nao_walk.nao_walk_claims import claims
-from compare.papers.nao_walk.nao_walk_findings import Findings
-from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT, by_joint, own_walk, total
-from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, documented
+from compare.papers.nao_walk.nao_walk_claims import check_claims
+from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
+from compare.papers.nao_walk.nao_walk_reproduction import REPRODUCTION
+from compare.papers.nao_walk.nao_walk_runs import (
+    KINDS,
+    PAPER_HEAT,
+    SHEET_HEAT,
+    plan_own_walk,
+    simulate_joints,
+    sum_energy,
+)
+from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, make_footsteps
+from compare.papers.reproduction import Verdict
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import predict_power
 from nlp_gait.simulation.plan import make_plan
-
-SMALL = Effort(speeds_m_s=(0.08, SPEED_M_S), torsos_m=(0.315, 0.32), heats=(0.025, 0.5), stiffnesses=(1.0, 0.5))
+from tests.compare.papers.finished import check_report, recompute, reproduce
 
 
 def drawn(knees: float, others: float = 1.0) -> dict[str, Any]:
-    """What joints draw [J/m], half of it heat."""
+    """Energy of the joints [J/m], half of it heat."""
     kinds = {kind: {name: others for name in ("mechanical", "paper", "sheet")} for kind in KINDS}
     kinds["KneePitch"] = {name: knees for name in ("mechanical", "paper", "sheet")}
     walk = {"fell_at_s": None, "walked_m": 1.0, "duration_s": 10.0, "knee_deg": 45.0}
@@ -33,18 +38,16 @@ def drawn(knees: float, others: float = 1.0) -> dict[str, Any]:
 
 def optimum(knee_deg: float) -> dict[str, Any]:
     """The same with and without the paper's bound."""
-    return {
-        bound: {"hip_m": 0.32, "knee_deg": knee_deg, "power_W": 2.0, "success": True} for bound in ("free", "paper")
-    }
+    return {bound: {"hip_m": 0.32, "knee_deg": knee_deg, "power_W": 2.0} for bound in ("free", "paper")}
 
 
-def servo(energy: float | None, falls: int, fastest: float) -> dict[str, Any]:
-    """One walk on servos; no energy means a fall."""
+def drive(energy: float | None, falls: int, fastest: float) -> dict[str, Any]:
+    """One walk on drives; no energy means a fall."""
     found = {"fell": energy is None, "walked_share": 0.9, "speed_m_s": 0.09, "tracking_rad": 0.1, "disturbances": 24}
     return {**found, "sheet_J_per_m": energy, "paper_J_per_m": energy, "falls": falls, "fastest_m_s": fastest}
 
 
-def made(**changes: Any) -> Findings:
+def make_findings(**changes: Any) -> NaoWalkFindings:
     """Findings in which every claim holds."""
     speeds = [
         {"speed_m_s": speed, "feasible": True, "cost_of_transport": cost, "energy_J_per_m": 50.0, "x": {"a": 1.0}}
@@ -59,41 +62,43 @@ def made(**changes: Any) -> Findings:
         "torsos": torsos,
         "straighter": {"0.025": optimum(40.0), "0.5": optimum(30.0), "sheet": optimum(25.0)},
         "joints": {name: drawn(5.0) for name in ("own", "own-plain", "optimum-paper", "optimum-sheet")},
-        "servos": {name: [servo(100.0, 9, 0.1), servo(90.0, 1, 0.12)] for name in ("none", "torque")},
-        "stiffnesses": (1.0, 0.5),
+        "drives": {name: [drive(100.0, 9, 0.1), drive(90.0, 1, 0.12)] for name in ("none", "torque")},
+        "effort": REPRODUCTION.quick,
     }
-    return Findings(**{**holding, **changes})
+    return NaoWalkFindings(**{**holding, **changes})
 
 
 def test_verdicts_follow_the_numbers() -> None:
-    holding = [claim.verdict for claim in claims(made())]
-    assert [verdict.split()[0].rstrip(":") for verdict in holding] == ["holds"] * 6 + ["dearer", "no"]
-    turned = made(
+    holding = [claim.verdict for claim in check_claims(make_findings())]
+    assert [str(verdict) for verdict in holding] == ["holds"] * 6 + ["cannot be tested here"] * 2
+    turned = make_findings(
         torsos=[
-            {**at, "paper_J_per_m": 100 * at["torso_m"], "sheet_J_per_m": 100 * at["torso_m"]} for at in made().torsos
+            {**at, "paper_J_per_m": 100 * at["torso_m"], "sheet_J_per_m": 100 * at["torso_m"]}
+            for at in make_findings().torsos
         ],
         straighter={"0.025": optimum(25.0), "0.5": optimum(25.0), "sheet": optimum(26.0)},
-        joints={name: drawn(0.5, 100.0) for name in made().joints},
-        servos={name: [servo(100.0, 5, 0.12), servo(None, 9, 0.1)] for name in ("none", "torque")},
+        joints={name: drawn(0.5, 100.0) for name in make_findings().joints},
+        drives={name: [drive(100.0, 5, 0.12), drive(None, 9, 0.1)] for name in ("none", "torque")},
     )
-    verdicts = [claim.verdict for claim in claims(turned)]
+    verdicts = [claim.verdict for claim in check_claims(turned)]
     assert verdicts[:6] == ["does not hold"] * 6 and verdicts[-1] == "does not hold"
-    assert "100.0, falls J/m" in claims(turned)[3].evidence
-    close = made(servos={name: [servo(100.0, 1, 0.1), servo(90.0, 0, 0.12)] for name in ("none", "torque")})
-    assert claims(close)[4].verdict == "not shown: 0 falls instead of 1 may be chance (Fisher: p = 0.5)"
+    assert "100.0, falls J/m" in check_claims(turned)[3].found
+    close = make_findings(drives={name: [drive(100.0, 1, 0.1), drive(90.0, 0, 0.12)] for name in ("none", "torque")})
+    assert check_claims(close)[4].verdict == Verdict.NOT_SHOWN
+    assert check_claims(close)[4].detail == "(0 falls instead of 1 may be chance, Fisher: p = 0.5)"
 
 
 def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_joint() -> None:
     """Sums over joints are what the package's own measurement and index say of the same walk."""
-    walk = own_walk(documented())
+    walk = plan_own_walk(make_footsteps())
     indexes = build_exact_model(walk.problem).at(walk.x, walk.problem.p).indexes
     assert indexes["speed_m_s"] == pytest.approx(SPEED_M_S, rel=1e-12)
-    found = by_joint(Drive(), {}, "", 2)
+    found = simulate_joints(Drive(), {}, "", 2)
     assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(found["planned_m"], rel=0.02)
     plan = make_plan(walk, 2)
     whole = predict_power(plan).total_W * plan.duration_s / found["planned_m"]
-    assert total(found["model"].values(), "paper") == pytest.approx(whole, rel=1e-12)
-    assert total(found["engine"].values(), "paper") == pytest.approx(whole, rel=0.05)
+    assert sum_energy(found["model"].values(), "paper") == pytest.approx(whole, rel=1e-12)
+    assert sum_energy(found["engine"].values(), "paper") == pytest.approx(whole, rel=0.05)
     # Heat by the data sheet is 14 to 33 times that of the paper in the legs; each hip yaw-pitch motor turns two joints.
     for kind, parts in found["model"].items():
         if kind not in ("HipYawPitch", "arms"):
@@ -101,33 +106,24 @@ def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_j
 
 
 def test_the_report_from_end_to_end_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With made-up runs: every step is made once, kept, and stands in the report; a second call makes none."""
-    findings, calls = made(), []
+    """With made-up runs: every result is computed once, stored, and in the report; a second call computes nothing."""
+    findings, calls = make_findings(), []
 
-    def stand_in(name: str, result: Any) -> None:
-        def compute(*given: Any) -> Any:
+    def replace_run(name: str, result: Any) -> None:
+        def compute(*_: Any) -> Any:
             calls.append(name)
             return result
 
         monkeypatch.setattr(nao_walk_runs, name, compute)
 
-    stand_in("over_speed", findings.speeds[PAPER_HEAT])
-    stand_in("at_heights", findings.torsos)
-    stand_in("free_height", optimum(30.0))
-    stand_in("by_joint", drawn(5.0))
-    stand_in("on_servos", servo(100.0, 5, 0.1))
-    told: list[str] = []
-    nao_claims.reproduce(tmp_path, progress=told.append, effort=SMALL)
-    assert len(told) == SMALL.steps and len(calls) == SMALL.steps - 1
-    report = (tmp_path / "report.md").read_text()
-    assert "{" not in report and "nan" not in report
-    assert report.count("does not hold") == 4  # softer servos change nothing, and K does not either
-    figures = re.findall(r"\((\S+)\.png\)", report)
-    assert figures == ["joints", "servos", "speeds"]
-    assert all((tmp_path / f"{name}.{kind}").stat().st_size > 1000 for name in figures for kind in ("png", "svg"))
-    assert {path.stem for path in tmp_path.glob("*.csv")} == set(
-        "claims joints torsos straighter servos speeds".split()
-    )
+    replace_run("solve_over_speed", findings.speeds[PAPER_HEAT])
+    replace_run("compute_heights", findings.torsos)
+    replace_run("solve_free_height", optimum(30.0))
+    replace_run("simulate_joints", drawn(5.0))
+    replace_run("simulate_drives", drive(100.0, 5, 0.1))
+    finished = reproduce("nao-claims", tmp_path)
+    check_report(finished, "joints drives speeds", "claims joints torsos straighter drives speeds")
+    assert len(calls) == len(finished.progress) - 1
+    assert finished.report.count("does not hold") == 4  # softer drives change nothing, and K does not either
     calls.clear()
-    nao_claims.reproduce(tmp_path, progress=told.append, effort=SMALL)
-    assert not calls
+    assert recompute(finished) == ["figures, tables and report"] and not calls

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 import nlp_gait
-from compare.papers.paper_runs import best, run_all, starts
+from compare.papers.paper_runs import Runner, choose_best, make_start_tasks
 from compare.study.record import RunRecord
 from compare.study.runner import run_task
 from compare.study.task import ProblemSpec, Task, check_task
 from nlp_gait.errors import InputError
+from nlp_gait.progress import ignore_progress
 from tests.compare.records import record
 
 WALK = ProblemSpec(name="walk12")
@@ -21,7 +22,7 @@ WALK = ProblemSpec(name="walk12")
 def test_starts_are_those_of_one_solve_with_as_many() -> None:
     problem = WALK.load()
     solution = nlp_gait.solve(problem, starts=2, seed=5)
-    tasks = starts(WALK, 2, seed=5)
+    tasks = make_start_tasks(WALK, 2, seed=5)
     assert [task.start for task in tasks] == [problem.by_name(start.x0) for start in solution.starts]
     assert run_task(tasks[1]).x == problem.by_name(solution.starts[1].x)
 
@@ -32,9 +33,9 @@ def test_the_best_run_succeeds_before_it_is_cheap() -> None:
     runs[3] = replace(
         runs[3], claimed=False, verdict=replace(runs[3].verdict, feasible=False, violation=1.0, objective=0.5)
     )
-    assert best(runs) is runs[1] and best(runs[2:]) is runs[2]
+    assert choose_best(runs) is runs[1] and choose_best(runs[2:]) is runs[2]
     maximised = [replace(r, definition={"objective": {"sense": "maximise"}}) for r in runs[:2]]
-    assert best(maximised) is maximised[0]
+    assert choose_best(maximised) is maximised[0]
 
 
 def no_luck(task: Task, start: RunRecord | None) -> RunRecord:
@@ -42,12 +43,12 @@ def no_luck(task: Task, start: RunRecord | None) -> RunRecord:
 
 
 def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="walk12/ipopt-0000 failed: ValueError: no luck; mend that and delete"):
-        run_all(tmp_path, starts(WALK, 1), lambda note: None, no_luck)
+    with pytest.raises(InputError, match="walk12/ipopt-0000 failed: ValueError: no luck; fix this and delete"):
+        Runner(folder=tmp_path, progress=ignore_progress, jobs=1).run_tasks(make_start_tasks(WALK, 1), no_luck)
 
 
 def test_a_start_point_is_for_nlp_solvers() -> None:
-    point = starts(WALK, 1)[0].start
+    point = make_start_tasks(WALK, 1)[0].start
     check_task(Task(problem=WALK, solver="slsqp", start=point))
     with pytest.raises(InputError, match="'pso' takes no start point"):
         check_task(Task(problem=WALK, solver="pso", start=point))

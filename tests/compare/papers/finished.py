@@ -1,0 +1,65 @@
+"""A quick reproduction from end to end, and what every one has to write."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from compare.papers import load_reproduction
+
+
+@dataclass(kw_only=True)
+class Finished:
+    """Folder of a quick reproduction, with its findings and lines of progress."""
+
+    paper: str
+    folder: Path
+    findings: Any = None
+    progress: list[str] = field(default_factory=list)
+
+    def rows(self, table: str) -> list[dict[str, str]]:
+        return list(csv.DictReader((self.folder / f"{table}.csv").read_text().splitlines()))
+
+    @property
+    def report(self) -> str:
+        return (self.folder / "report.md").read_text()
+
+
+def reproduce(paper: str, folder: Path) -> Finished:
+    """Run in this process: workers would build every problem again."""
+    finished, reproduction = Finished(paper=paper, folder=folder), load_reproduction(paper)
+    finished.findings = reproduction.reproduce(folder, reproduction.quick, finished.progress.append, jobs=1)
+    return finished
+
+
+def recompute(finished: Finished, stop_at: str = "figures") -> list[str]:
+    """Rerun until a line of progress that begins so; returns the lines about what was not stored."""
+    progress: list[str] = []
+
+    def stop(line: str) -> None:
+        if "stored by an earlier run" not in line:
+            progress.append(line)
+        if line.startswith(stop_at):
+            raise KeyboardInterrupt
+
+    reproduction = load_reproduction(finished.paper)
+    try:
+        reproduction.reproduce(finished.folder, reproduction.quick, stop, jobs=1)
+    except KeyboardInterrupt:
+        return progress
+    raise AssertionError(f"no line began with {stop_at}")
+
+
+def check_report(finished: Finished, figures: str, tables: str) -> None:
+    """Every place in the text is filled, and every table and figure written."""
+    folder, effort = finished.folder, load_reproduction(finished.paper).quick
+    assert "{" not in finished.report and "nan" not in re.sub(r"\b[a-z]*nan[a-z]+\b", "", finished.report)
+    assert re.findall(r"\((\S+)\.png\)", finished.report) == figures.split()
+    assert all((folder / f"{name}.{kind}").stat().st_size > 1000 for name in figures.split() for kind in ("png", "svg"))
+    assert (folder / "report.html").read_text().count("<svg") == len(figures.split())
+    assert {path.stem for path in folder.glob("*.csv")} == set(tables.split())
+    assert all(finished.rows(name) for name in tables.split())
+    assert effort.steps is None or len(finished.progress) == effort.steps
