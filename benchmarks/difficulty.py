@@ -21,7 +21,7 @@ import nlp_gait
 from compare.study.record import RunRecord
 from compare.study.study import Study, run_study
 from compare.study.task import IPOPT, ProblemSpec, Task
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import ActiveConstraint
@@ -112,7 +112,7 @@ def read_raw() -> dict[str, object]:
 
 def difficulties() -> dict[str, Difficulty]:
     """What is kept, by name of the problem."""
-    return {name: decoded(Difficulty, raw, name) for name, raw in read_raw().items()}
+    return {name: decode(Difficulty, raw, name) for name, raw in read_raw().items()}
 
 
 def measured(name: str, folder: Path, starts: int, runs: int, jobs: int) -> Difficulty:

@@ -15,7 +15,7 @@ DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Columns:
+class Table:
     """Numbers in rows.
 
     Attributes:
@@ -64,7 +64,7 @@ class Columns:
         return int(value)
 
 
-def read_columns(path: Path, what: str) -> Columns:
+def read_table(path: Path, what: str) -> Table:
     """Numbers of a CSV file; commas, semicolons or tabs between them, and a header if its first line is not all numbers.
 
     Raises:
@@ -92,7 +92,7 @@ def read_columns(path: Path, what: str) -> Columns:
             if cell and not _is_number(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
         rows.append(tuple(float(cell) if cell else math.nan for cell in row))
-    return Columns(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
+    return Table(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
 
 
 def _is_number(text: str) -> bool:

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from nlp_gait.errors import GaitError, shown, unknown
-from nlp_gait.files import read_json, refusing
+from nlp_gait.errors import GaitError, format_value, unknown
+from nlp_gait.files import convert_errors, read_json
 
 T = TypeVar("T")
 
@@ -23,7 +23,7 @@ MISSPELLED = 0.8  # similarity, see ``difflib``
 WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 
-def decoded(
+def decode(
     cls: Callable[..., T],
     raw: Any,
     where: str = "",
@@ -46,13 +46,13 @@ def decoded(
         ValueError: with the place: a key is missing or unknown, or a value has another type.
     """
     if not isinstance(raw, Mapping):
-        raise ValueError(f"{where or 'it'} must be an object, got {shown(raw)}")
+        raise ValueError(f"{where or 'it'} must be an object, got {format_value(raw)}")
     values = dict(given or {})
     known = {name: field for name, field in _fields(cls).items() if name not in values}
     for name, (kind, needed) in known.items():
         place = f"{where}.{name}" if where else name
         if name in raw:
-            values[name] = decoded_value(kind, raw[name], place)
+            values[name] = decode_value(kind, raw[name], place)
         elif needed:
             raise ValueError(f"{place} is missing")
     for key in raw:
@@ -62,11 +62,11 @@ def decoded(
     return cls(**values)
 
 
-def read_decoded(cls: Callable[..., T], path: Path, what: str, *, error: type[GaitError]) -> T:
+def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[GaitError]) -> T:
     """Instance of a dataclass from a JSON file.
 
     Args:
-        cls: of the instance, see ``decoded``.
+        cls: of the instance, see ``decode``.
         path: of the file.
         what: kind of file, for messages.
         error: class to raise.
@@ -75,8 +75,8 @@ def read_decoded(cls: Callable[..., T], path: Path, what: str, *, error: type[Ga
         GaitError: of that class: the file cannot be read, or does not hold such a dataclass.
     """
     raw = read_json(path, what, error=error)
-    with refusing(f"{what} {str(path)!r}", error):
-        return decoded(cls, raw)
+    with convert_errors(f"{what} {str(path)!r}", error):
+        return decode(cls, raw)
 
 
 @cache
@@ -86,8 +86,8 @@ def _fields(cls: Any) -> dict[str, tuple[Any, bool]]:
     return {f.name: (hints[f.name], f.default is MISSING and f.default_factory is MISSING) for f in fields(cls)}
 
 
-def decoded_value(kind: Any, raw: Any, where: str) -> Any:
-    """Value of a field's type; arguments and errors as ``decoded``."""
+def decode_value(kind: Any, raw: Any, where: str) -> Any:
+    """Value of a field's type; arguments and errors as ``decode``."""
     if kind is Any:
         return raw
     if kind is float:
@@ -95,21 +95,21 @@ def decoded_value(kind: Any, raw: Any, where: str) -> Any:
     if kind in WORDS:
         return _checked((kind,), raw, where, WORDS[kind])
     if isinstance(kind, type) and is_dataclass(kind):
-        return decoded(kind, raw, where)
+        return decode(kind, raw, where)
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Literal:
         if not any(raw == part and type(raw) is type(part) for part in parts):
-            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {shown(raw)}")
+            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {format_value(raw)}")
         return raw
     if origin is tuple:
         return _tuple(parts, raw, where)
     if origin in (Union, UnionType):
         return _of_union(parts, raw, where)
     if not isinstance(raw, Mapping):
-        raise ValueError(f"{where} must be an object, got {shown(raw)}")
+        raise ValueError(f"{where} must be an object, got {format_value(raw)}")
     keys, values = parts
     return {
-        decoded_value(keys, key, f"a key of {where}"): decoded_value(values, value, f"{where}.{key}")
+        decode_value(keys, key, f"a key of {where}"): decode_value(values, value, f"{where}.{key}")
         for key, value in raw.items()
     }
 
@@ -119,10 +119,10 @@ def _tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
     any_length = parts[-1] is ...
     if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
         count = "" if any_length else f" of {len(parts)} values"
-        raise ValueError(f"{where} must be a list{count}, got {shown(raw)}")
+        raise ValueError(f"{where} must be a list{count}, got {format_value(raw)}")
     kinds = parts[:1] * len(raw) if any_length else parts
     return tuple(
-        decoded_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
+        decode_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
     )
 
 
@@ -131,16 +131,16 @@ def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
         return raw
     others = [part for part in parts if part is not NoneType]
     if all(part in WORDS for part in parts) and not (float in parts and type(raw) in (int, NoneType)):
-        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {shown(raw)}")
+        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {format_value(raw)}")
     for part in others[:-1]:
         try:
-            return decoded_value(part, raw, where)
+            return decode_value(part, raw, where)
         except ValueError:
             continue
-    return decoded_value(others[-1], raw, where)
+    return decode_value(others[-1], raw, where)
 
 
 def _checked(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:
     if not isinstance(raw, kinds) or (isinstance(raw, bool) and bool not in kinds):
-        raise ValueError(f"{where} must be {wanted}, got {shown(raw)}")
+        raise ValueError(f"{where} must be {wanted}, got {format_value(raw)}")
     return raw

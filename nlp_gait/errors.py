@@ -66,7 +66,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
         known: all allowed names.
     """
     if not isinstance(name, str):
-        return UnknownNameError(f"the name of {_a(kind)} must be a text, got {shown(name)}")
+        return UnknownNameError(f"the name of {_a(kind)} must be a text, got {format_value(name)}")
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
@@ -81,10 +81,10 @@ def _a(kind: str) -> str:
 def check_name(kind: str, name: object) -> None:
     """Raise InputError unless what should name a problem, a solver or the like is a text."""
     if not isinstance(name, str):
-        raise InputError(f"the name of {_a(kind)} must be a text, got {shown(name)}")
+        raise InputError(f"the name of {_a(kind)} must be a text, got {format_value(name)}")
 
 
-def checked_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:
+def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:
     """A whole number within limits, NumPy's too; True and False are none.
 
     Args:
@@ -99,11 +99,11 @@ def checked_count(name: str, value: object, *, at_least: int = 1, at_most: int |
     whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if whole is None or whole < at_least or (at_most is not None and whole > at_most):
         limit = "" if at_most is None else f" and <= {at_most}"
-        raise InputError(f"{name} must be a whole number >= {at_least}{limit}, got {shown(value)}")
+        raise InputError(f"{name} must be a whole number >= {at_least}{limit}, got {format_value(value)}")
     return whole
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """A value in a message: short, and whatever it is."""
     try:
         text = repr(value)
@@ -112,7 +112,7 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
 
 
-def kind_name(kind: type) -> str:
+def describe_type(kind: type) -> str:
     """What a value of a type is called to its user: ``a whole number`` for int."""
     names = {
         bool: "true or false",

@@ -34,7 +34,7 @@ BYTE_ORDER_MARK = "\ufeff"
 LEFTOVER_AGE_S = 60.0
 
 
-def file_safe(name: str) -> str:
+def make_file_name(name: str) -> str:
     """Name of a problem or solver as part of a file's name."""
     return "".join(sign if sign.isalnum() or sign in "-_+." else "." for sign in name)
 
@@ -54,7 +54,7 @@ def read_bytes(
     Raises:
         GaitError: of that class: it cannot be read, is not a regular file, or is too long.
     """
-    with refusing(f"{what} {str(path)!r} cannot be read", error, remedy):
+    with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
         # Opening a pipe would wait for its writer.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
         with open(descriptor, "rb") as file:
@@ -72,7 +72,7 @@ def read_text(
 ) -> str:
     """Content of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
     content = read_bytes(path, what, error=error, at_most=at_most, remedy=remedy)
-    with refusing(f"{what} {str(path)!r} cannot be read", error, remedy):
+    with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
         text = content.decode("utf-8")
         if text.startswith(BYTE_ORDER_MARK):
             raise ValueError("it begins with a byte-order mark; save it as UTF-8 without one")
@@ -82,7 +82,7 @@ def read_text(
 def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:
     """Content of a JSON file, see ``check_plain``; a repeated key is refused too; arguments and errors as ``read_bytes``."""
     text = read_text(path, what, error=error, remedy=remedy)
-    with refusing(f"{what} {str(path)!r} is not valid JSON", error, remedy):
+    with convert_errors(f"{what} {str(path)!r} is not valid JSON", error, remedy):
         data = json.loads(text, object_pairs_hook=_without_twins)
         check_plain(data)
     return data
@@ -115,11 +115,11 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         OutputError: no room, no permission, no folder.
     """
-    with new_file(path) as temporary:
+    with replace_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def csv_text(rows: Iterable[Sequence[object]]) -> str:
+def format_csv(rows: Iterable[Sequence[object]]) -> str:
     """Rows as comma-separated values, cells quoted where they must be, each line ended by a line feed."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
@@ -127,7 +127,7 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step; NaN and infinity are refused, for not every reader takes them: see ``without_nan``.
+    """Write JSON in one step; NaN and infinity are refused, for not every reader takes them: see ``replace_nan``.
 
     Raises:
         OutputError: no room, no permission, no folder.
@@ -136,7 +136,7 @@ def write_json(path: Path, data: Any) -> None:
 
 
 @contextmanager
-def new_file(path: Path) -> Iterator[Path]:
+def replace_file(path: Path) -> Iterator[Path]:
     """Empty file beside ``path``, made by this process under a hidden name in ``.tmp``, that takes its name at the end.
 
     After that, a power cut leaves the new file whole, and before it, the older one or none.
@@ -146,7 +146,7 @@ def new_file(path: Path) -> Iterator[Path]:
     """
     temporary = None
     try:
-        with refusing(f"cannot write {str(path)!r}", OutputError):
+        with convert_errors(f"cannot write {str(path)!r}", OutputError):
             if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
                 raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
             unused = path.parent / f".{secrets.token_hex(8)}.tmp"
@@ -162,19 +162,19 @@ def new_file(path: Path) -> Iterator[Path]:
                 temporary.unlink(missing_ok=True)
 
 
-def without_nan(data: Any) -> Any:
+def replace_nan(data: Any) -> Any:
     """The same plain data with null for every number that is not finite."""
     if isinstance(data, float):
         return data if math.isfinite(data) else None
     if isinstance(data, Mapping):
-        return {key: without_nan(value) for key, value in data.items()}
+        return {key: replace_nan(value) for key, value in data.items()}
     if isinstance(data, (list, tuple)):
-        return [without_nan(value) for value in data]
+        return [replace_nan(value) for value in data]
     return data
 
 
 @contextmanager
-def refusing(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
+def convert_errors(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
     """Raises what is wrong with a file or its content as another error, which says whose data it is and what to do."""
     try:
         yield
@@ -213,13 +213,15 @@ def _shortened(text: str) -> str:
 
 
 @contextmanager
-def temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
+def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
     """Folder for a while, removed at the end.
 
     Raises:
         GaitError: of that class: the system has no folder for temporary files with room in it.
     """
-    with refusing("no folder for temporary files", error, "free some disk space, or name another folder in TMPDIR"):
+    with convert_errors(
+        "no folder for temporary files", error, "free some disk space, or name another folder in TMPDIR"
+    ):
         folder = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
     with folder as name:
         yield Path(name)
@@ -244,21 +246,21 @@ def check_path(path: str, owner: str, error: type[GaitError]) -> None:
         raise error(f"{owner}: its name is no valid UTF-8; choose another name")
 
 
-def writable_folder(path: Path) -> Path:
+def make_writable_folder(path: Path) -> Path:
     """Make a folder, and prove now that files can be written there rather than after the work.
 
     Raises:
         OutputError: it cannot be made or written to, or its name is no valid UTF-8.
     """
     check_name(path)
-    with refusing(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
+    with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         make_folder(path)
         tempfile.TemporaryFile(dir=path).close()
     return path
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of ``new_file`` that a killed process left behind, none that may still be in use."""
+    """Remove temporary files of ``replace_file`` that a killed process left behind, none that may still be in use."""
     for path in folder.glob(".*.tmp"):
         try:
             if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # from the future too: a clock was put back

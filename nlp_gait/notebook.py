@@ -9,7 +9,7 @@ from types import ModuleType
 from nlp_gait.errors import MissingExtraError
 
 
-def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
+def format_html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
     """A table without any style of its own, so that it takes that of the notebook, dark or light; all text is escaped."""
     heads = "".join(f"<th>{escape(name)}</th>" for name in header)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
@@ -20,7 +20,7 @@ def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]],
     )
 
 
-def pandas() -> ModuleType:
+def import_pandas() -> ModuleType:
     """The package pandas, which nothing here needs but ``to_frame``.
 
     Raises:

@@ -45,7 +45,7 @@ def built_once() -> Iterator[None]:
     What is built from a problem's mathematics never changes, so that copies share it in use too. A robot from a file is read
     anew: the file of another test may have the same name.
     """
-    find = registry.problem_maker
+    find = registry.find_maker
 
     @cache
     def made(name: str, options: tuple[tuple[str, str, Any], ...]) -> GaitProblem:
@@ -69,5 +69,5 @@ def built_once() -> Iterator[None]:
         return shared_maker(name) if name in PROBLEMS else find(name)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(registry, "problem_maker", maker_of)
+        patch.setattr(registry, "find_maker", maker_of)
         yield

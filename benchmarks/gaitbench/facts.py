@@ -24,7 +24,7 @@ import nlp_gait
 from compare.bench.baseline import baseline_records, shipped
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
@@ -79,7 +79,7 @@ def main() -> None:
     arguments = parser.parse_args()
     for id in arguments.instance or gaitbench.names(arguments.subset):
         kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-        published = decoded(Facts, kept[id], id) if id in kept else None
+        published = decode(Facts, kept[id], id) if id in kept else None
         started = time.perf_counter()
         try:
             if published is None or arguments.again:

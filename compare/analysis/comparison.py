@@ -19,9 +19,9 @@ from compare.analysis.statistics.run_length import (
     relative_gap,
 )
 from compare.study.record import RunRecord
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import refusing
+from nlp_gait.files import convert_errors
 from nlp_gait.formulation import Objective
 
 DEFAULT_WEIGHTING = Weighting()
@@ -162,5 +162,5 @@ def read_objective(record: RunRecord) -> Objective:
     Raises:
         InputError: the record has none, or an invalid one.
     """
-    with refusing(f"record of {record.solver}, run {record.run}", InputError):
-        return decoded(Objective, record.definition.get("objective"), "objective")
+    with convert_errors(f"record of {record.solver}, run {record.run}", InputError):
+        return decode(Objective, record.definition.get("objective"), "objective")

@@ -18,7 +18,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.files import new_file, without_nan
+from nlp_gait.files import replace_file, replace_nan
 
 FOLDER = Path(__file__).with_name("records")
 DIGITS = 12  # of numbers in the histories
@@ -37,10 +37,10 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
         if entry["definition"] != shared:
             raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
         entry["runs"].append(_packed(record))
-    text = json.dumps(without_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
+    text = json.dumps(replace_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
     path = folder / f"{instance}.json.gz"
     make_folder(folder)
-    with new_file(path) as temporary:
+    with replace_file(path) as temporary:
         temporary.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
     return path
 

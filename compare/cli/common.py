@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import check_name, without_nan, writable_folder
+from nlp_gait.files import check_name, make_writable_folder, replace_nan
 
 T = TypeVar("T")
 
@@ -83,7 +83,7 @@ def say(sentence: str) -> None:
 
 def print_json(data: Any) -> None:
     """One JSON object on stdout; what is not finite is null, because not every reader accepts NaN."""
-    sys.stdout.write(json.dumps(without_nan(data), indent=1, allow_nan=False) + "\n")
+    sys.stdout.write(json.dumps(replace_nan(data), indent=1, allow_nan=False) + "\n")
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -197,7 +197,7 @@ class _Log:
 def output_file(path: Path) -> Path:
     """Path that can be written to, checked before the work."""
     check_name(path)
-    writable_folder(path.parent)
+    make_writable_folder(path.parent)
     try:
         if path.is_dir():
             raise InputError(f"{str(path)!r} is a folder; name a file")

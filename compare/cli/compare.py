@@ -22,7 +22,7 @@ from metaheuristics import installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
 from metaheuristics.adapters.egobox import BayesianOptimisation
 from nlp_gait.errors import InputError
-from nlp_gait.files import writable_folder
+from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def compare(
         solvers = chosen_solvers(algorithms, starts, searches)
         settings = searches.make_study(specs, solvers, max(starts, 1))
     study = Study(
-        tasks=settings.tasks(), folder=writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
+        tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
     check_study(study)  # before the manifest names it
     if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):

@@ -25,7 +25,7 @@ from compare.cli.common import (
 from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
 from compare.judge import Evaluation
 from nlp_gait.errors import InputError
-from nlp_gait.files import csv_text, write_text
+from nlp_gait.files import format_csv, write_text
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
@@ -203,7 +203,7 @@ def _write(path: Path, judged: Sequence[Evaluation]) -> None:
         ]
         for e in judged
     ]
-    write_text(path, csv_text([[*judged[0].x, name, *found, *indexes], *rows]))
+    write_text(path, format_csv([[*judged[0].x, name, *found, *indexes], *rows]))
 
 
 def _print(evaluation: Evaluation) -> None:

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from compare.study.task import ProblemSpec
-from nlp_gait.errors import InputError, kind_name, unknown
+from nlp_gait.errors import InputError, describe_type, unknown
 from nlp_gait.formulation import Result
-from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
 
@@ -90,7 +90,7 @@ class CycleOptions:
             InputError: a value is not allowed.
         """
         options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
-        known = inspect.signature(problem_maker(name)).parameters
+        known = inspect.signature(find_maker(name)).parameters
         for key, text in _parse_pairs(self.option, "--option"):
             if key not in known:
                 raise unknown(f"option of {name}", key, known)
@@ -204,4 +204,4 @@ def _parse_option(name: str, text: str, default: Any) -> str | int | float | boo
     try:
         return {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
     except (KeyError, ValueError):
-        raise InputError(f"--option {name} must be {kind_name(kind)}, got {text!r}") from None
+        raise InputError(f"--option {name} must be {describe_type(kind)}, got {text!r}") from None

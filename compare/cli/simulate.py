@@ -65,7 +65,7 @@ def simulate(
     """
     from compare.drawing.simulation_figure import plot_simulation
     from nlp_gait.export.tables import write_npz
-    from nlp_gait.files import without_nan, writable_folder, write_json, write_text
+    from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
     from nlp_gait.formulation.result import load_result
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.film.film import parse_picture_size
@@ -85,7 +85,7 @@ def simulate(
         fail("--beside puts a second gait into a film; name the film with --video FILE.mp4 or FILE.gif")
     size = parse_picture_size(film.size)
     target = None if film.video is None else output_file(check_video_path(film.video))
-    folder = None if out is None else writable_folder(out)
+    folder = None if out is None else make_writable_folder(out)
     drive, conditions = servos.make(), world.make()
     gaits = [(stored.result, stored.load())]
     gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
@@ -109,7 +109,7 @@ def simulate(
     written = [] if target is None else [target]
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "playback.npz")]
-        write_json(folder / "report.json", without_nan(data))
+        write_json(folder / "report.json", replace_nan(data))
         write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
         written += plot_simulation(plan, traces[0], drive, folder / "playback")
@@ -122,7 +122,7 @@ def simulate(
             end_interrupted(f"interrupted in the tests of robustness; {kept}")
         data["robustness"] = asdict(survival)
         if folder is not None:
-            write_json(folder / "report.json", without_nan(data))
+            write_json(folder / "report.json", replace_nan(data))
     if as_json:
         print_json(data)
     else:

@@ -55,7 +55,7 @@ def solve(
     """
     import nlp_gait
     from nlp_gait.backends.solvers import registry
-    from nlp_gait.files import without_nan, write_json
+    from nlp_gait.files import replace_nan, write_json
     from nlp_gait.proofs.guarantee import guarantee
 
     target = None if out is None else output_file(out)
@@ -84,7 +84,7 @@ def solve(
     }
     try:  # before printing, so that a reader who has gone does not take the file with him
         if target is not None:
-            write_json(target, without_nan(data))
+            write_json(target, replace_nan(data))
     finally:  # nor a full disk what is printed
         if as_json:
             print_json(data)

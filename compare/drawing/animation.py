@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.drawing.figures import new_figure, style
-from nlp_gait.files import new_file
+from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.interrupts import delay_interrupts
@@ -59,7 +59,7 @@ def write_contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
         OutputError: the file cannot be written.
     """
     times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
-    with style(), new_file(path) as file, delay_interrupts():
+    with style(), replace_file(path) as file, delay_interrupts():
         figure = plot_poses(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
         figure.savefig(file, format="png", dpi=SHEET_DPI)
 

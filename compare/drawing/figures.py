@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from compare.drawing import STYLE
-from nlp_gait.files import new_file, write_text
+from nlp_gait.files import replace_file, write_text
 from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
     write_text(paths[1], render_svg(figure))
     figure.set_layout_engine("none")  # the layout is final; computing it again takes as long as drawing
-    with style(), new_file(paths[0]) as file, delay_interrupts():
+    with style(), replace_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths
 

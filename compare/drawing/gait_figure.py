@@ -11,8 +11,8 @@ import numpy as np
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
 from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, new_figure, style
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Result, sampled
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.motion.signals import JOINT_UNITS
 from nlp_gait.formulation.motion.skeleton import TRUNK, Skeleton
 
@@ -46,7 +46,7 @@ class GaitCurves:
     margin: Array | None
 
 
-@one_at_a_time
+@lock_casadi
 def prepare_gait(result: Result) -> GaitCurves:
     """Compute the time histories of a result for a figure.
 
@@ -54,7 +54,7 @@ def prepare_gait(result: Result) -> GaitCurves:
         InputError: the problem has no time histories, or time does not run forward in them.
     """
     problem = result.problem
-    signals = sampled(result, PERIOD_S)
+    signals = sample_signals(result, PERIOD_S)
     arrays = signals.arrays
     skeleton = None if problem.display.skeleton is None else problem.display.skeleton(signals, problem.parameter_values)
     margin = None if skeleton is None else skeleton.margin()

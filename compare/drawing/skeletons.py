@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Result, sampled
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation import Result, sample_signals
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.motion.skeleton import Skeleton
 
 
-@one_at_a_time
+@lock_casadi
 def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
     """Skeleton of a gait at about the given number of samples a second.
 
@@ -20,5 +20,5 @@ def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
     problem = result.problem
     if problem.display.skeleton is None:
         raise InputError(f"problem {problem.name!r} has no skeleton to draw")
-    drawn = problem.display.skeleton(sampled(result, 1.0 / frames_per_s), problem.parameter_values)
+    drawn = problem.display.skeleton(sample_signals(result, 1.0 / frames_per_s), problem.parameter_values)
     return replace(drawn, title=problem.title)

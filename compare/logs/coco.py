@@ -8,7 +8,7 @@ from pathlib import Path
 
 from compare.analysis.comparison import Comparison
 from compare.logs.trace import Log, write_logs
-from nlp_gait.files import writable_folder, write_text
+from nlp_gait.files import make_writable_folder, write_text
 
 PRECISION = 1e-8
 # Before each run, as COCO has it; the optimum's gap is zero.
@@ -26,7 +26,7 @@ def write_coco(comparisons: Sequence[Comparison], folder: Path, suite: str = "nl
 def _write(suite: str, log: Log) -> tuple[Path, Path]:
     data = Path(f"data_{log.stem}") / f"bbobexp_f{log.number}_DIM{log.dimension}.dat"
     path = log.folder / data
-    writable_folder(path.parent)
+    make_writable_folder(path.parent)
     lines: list[str] = []
     for run in log.runs:
         lines.append(HEADER)

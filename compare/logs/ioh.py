@@ -9,7 +9,7 @@ from typing import Any
 
 from compare.analysis.comparison import Comparison
 from compare.logs.trace import Log, Trace, write_logs
-from nlp_gait.files import writable_folder, write_json, write_text
+from nlp_gait.files import make_writable_folder, write_json, write_text
 
 VERSION = "0.3.18"  # of ioh, whose layout this is
 
@@ -22,7 +22,7 @@ def write_ioh(comparisons: Sequence[Comparison], folder: Path, suite: str = "nlp
 def _write(suite: str, log: Log) -> tuple[Path, Path]:
     data = Path(f"data_{log.stem}") / f"IOHprofiler_f{log.number}_DIM{log.dimension}.dat"
     path = log.folder / data
-    writable_folder(path.parent)
+    make_writable_folder(path.parent)
     lines = ["evaluations raw_y", *(f"{at} {gap!r}" for run in log.runs for at, gap in run.lines)]
     write_text(path, "\n".join(lines) + "\n")
     header = log.folder / f"IOHprofiler_{log.stem}.json"

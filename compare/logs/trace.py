@@ -12,7 +12,7 @@ import numpy as np
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.run_length import Curve
 from compare.study.record import RunRecord
-from nlp_gait.files import file_safe
+from nlp_gait.files import make_file_name
 
 # Gap that is logged while nothing feasible was found: formats of unconstrained benchmarks have no word for it.
 NOTHING_FEASIBLE = 1e10
@@ -115,8 +115,8 @@ def write_logs(comparisons: Sequence[Comparison], folder: Path, write: Writer) -
         for solver in comparison.solvers
         for path in write(
             Log(
-                folder=folder / file_safe(solver.name),
-                stem=f"f{number}_{file_safe(comparison.problem)}",
+                folder=folder / make_file_name(solver.name),
+                stem=f"f{number}_{make_file_name(comparison.problem)}",
                 number=number,
                 problem=comparison.problem,
                 dimension=dimension(comparison),

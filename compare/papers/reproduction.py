@@ -19,7 +19,7 @@ from compare.report.document import Rows, Table
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.files import writable_folder
+from nlp_gait.files import make_writable_folder
 from nlp_gait.progress import Progress
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Reproduction(Generic[E, F]):
         Raises:
             OutputError: the folder cannot be written to.
         """
-        folder = writable_folder(out)
+        folder = make_writable_folder(out)
         findings = self.run(Runner(folder=folder, progress=progress, jobs=jobs or available_cores()), effort)
         progress("figures, tables and report")
         self.write_report(folder, findings)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from compare.report.document import Document, Table, Value, text_table
 from compare.report.writing import write_document
-from nlp_gait.files import without_nan, write_json
+from nlp_gait.files import replace_nan, write_json
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ class Answer(Document):
         written = write_document(folder, self, self.stem)
         for name, data in {**self.results, self.stem: self.data}.items():
             written.append(folder / f"{name}.json")
-            write_json(written[-1], without_nan(data))
+            write_json(written[-1], replace_nan(data))
         return written
 
 

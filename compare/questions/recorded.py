@@ -11,7 +11,7 @@ import numpy as np
 from compare.judge import Evaluation, evaluate
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import GaitError
-from nlp_gait.files import without_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Result
 from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 from nlp_gait.simulation.drive import Drive
@@ -60,7 +60,7 @@ class JudgedGait:
             "engine": None if self.engine is None else asdict(self.engine),
             "notes": list(self.notes),
         }
-        return dict(without_nan(data))
+        return dict(replace_nan(data))
 
 
 def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> JudgedGait:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from compare.study.record import RunRecord
 from compare.study.rows import HEADER, JUDGED, judged, row_of
-from nlp_gait.files import csv_text, without_nan, write_text
+from nlp_gait.files import format_csv, replace_nan, write_text
 
 
 def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
@@ -22,7 +22,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
         OutputError: a file cannot be written.
     """
     files = [folder / "runs.csv"]
-    write_text(files[0], csv_text([HEADER, *(_cells(row_of(r)) for r in records)]))
+    write_text(files[0], format_csv([HEADER, *(_cells(row_of(r)) for r in records)]))
     for problem, stem in stems.items():
         own = [record for record in records if record.problem == problem]
         names = list(dict.fromkeys(name for record in own for name in record.x))
@@ -42,9 +42,9 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
             if r.x
         ]
         files.append(folder / f"{stem}-points.csv")
-        write_text(files[-1], csv_text([("solver", "run", *names, *JUDGED, *indexes), *rows]))
+        write_text(files[-1], format_csv([("solver", "run", *names, *JUDGED, *indexes), *rows]))
     return files
 
 
 def _cells(row: list[object]) -> list[object]:
-    return ["" if value is None else value for value in without_nan(row)]
+    return ["" if value is None else value for value in replace_nan(row)]

@@ -60,7 +60,7 @@ class Table:
 
     @property
     def csv_rows(self) -> list[list[object]]:
-        """Headings and rows with all digits for ``csv_text``: booleans in lower case, empty cells for None."""
+        """Headings and rows with all digits for ``format_csv``: booleans in lower case, empty cells for None."""
         rows: list[list[object]] = [[str(v).lower() if isinstance(v, bool) else v for v in row] for row in self.rows]
         return [list(self.columns), *rows]
 

@@ -7,7 +7,7 @@ from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure
 from compare.study.record import RunRecord, gait_of
 from nlp_gait.errors import GaitError
-from nlp_gait.files import file_safe
+from nlp_gait.files import make_file_name
 
 CAPTION = (
     "Best gait of each solver: six poses at equidistant times, later ones darker (left blue, right orange). Mechanical "
@@ -29,7 +29,7 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
     found = {title: gait for title, gait in gaits.items() if gait is not None}
     if not any(gait.skeleton is not None or gait.power is not None for gait in found.values()):
         return None
-    return Figure(name=f"{file_safe(comparison.problem)}-gaits", caption=CAPTION, drawing=plot_gaits(found))
+    return Figure(name=f"{make_file_name(comparison.problem)}-gaits", caption=CAPTION, drawing=plot_gaits(found))
 
 
 def _gait(record: RunRecord) -> GaitCurves | None:

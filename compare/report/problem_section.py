@@ -19,7 +19,7 @@ from compare.report.engine_section import engine_section
 from compare.report.gait_section import make_gaits_part
 from compare.study.engine import Played
 from compare.study.record import RunRecord
-from nlp_gait.files import file_safe
+from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
@@ -29,7 +29,7 @@ def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Sec
     """Return the section on one problem: tables, figures, lists, and its best gaits in the engine if simulated."""
     summaries = summarise(comparison)
     objective = comparison.objective
-    stem = file_safe(comparison.problem)
+    stem = make_file_name(comparison.problem)
     figures = (
         Figure(
             name=f"{stem}-convergence",

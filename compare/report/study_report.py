@@ -21,7 +21,7 @@ from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
 from compare.study.study import read_records
-from nlp_gait.files import file_safe
+from nlp_gait.files import make_file_name
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
@@ -49,7 +49,9 @@ def write_report(
     plays = kept_plays(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, plays))
     if as_csv:
-        written += write_csv_files(folder, records, {record.problem: file_safe(record.problem) for record in records})
+        written += write_csv_files(
+            folder, records, {record.problem: make_file_name(record.problem) for record in records}
+        )
     return written
 
 

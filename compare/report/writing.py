@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, save
 from compare.report.document import Document, Figure, Part, Table, iterate_leaves
-from nlp_gait.files import csv_text, write_text
+from nlp_gait.files import format_csv, write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
 
@@ -39,7 +39,7 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
             files += save(part.drawing, folder / part.name)
         elif isinstance(part, Table) and part.name:
             files.append(folder / f"{part.name}.csv")
-            write_text(files[-1], csv_text(part.csv_rows))
+            write_text(files[-1], format_csv(part.csv_rows))
     return files
 
 

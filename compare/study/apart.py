@@ -11,7 +11,7 @@ from compare.study.record import RunRecord, record_from
 from compare.study.task import Task
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import WorkerError
-from nlp_gait.files import LARGEST_FILE, without_nan
+from nlp_gait.files import LARGEST_FILE, replace_nan
 from nlp_gait.processes import run_isolated
 
 # A run that respects its time limit ends within it and is then judged; its process is killed this long after the limit.
@@ -36,7 +36,7 @@ def run_apart(task: Task, run: Callable[[], RunRecord]) -> RunRecord:
     limit = task.stop.time_limit_s
     try:
         sent = run_isolated(
-            lambda: json.dumps(without_nan(run().to_json()), allow_nan=False).encode(),
+            lambda: json.dumps(replace_nan(run().to_json()), allow_nan=False).encode(),
             None if limit is None else limit + GRACE_S,
             LARGEST_FILE,
         )

@@ -12,9 +12,9 @@ from typing import Any, Literal
 from compare.study.record import RunRecord, gait_of, run_file
 from compare.study.store import FOLDER as STORE
 from compare.study.store import Store
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import refusing
+from nlp_gait.files import convert_errors
 from nlp_gait.progress import ignore_progress
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
@@ -83,7 +83,7 @@ def play_records(
             plan = make_plan(result, steps)
             inputs = {**_gait(record), "drive": asdict(drive), "model": f"{_digest(plan, drive)}, {version}"}
             played = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
-            found.append(decoded(Played, played))
+            found.append(decode(Played, played))
         if progress is not None:
             progress(f"{record.problem} {record.solver}")
     return found
@@ -101,8 +101,8 @@ def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
     for record in records:
         stored = store.load(_name(record))
         if stored is not None and _gait(record).items() <= stored.inputs.items():
-            with refusing(f"simulation {_name(record)!r} in {str(folder)!r} is damaged", InputError, REMEDY):
-                found.append(decoded(Played, stored.value))
+            with convert_errors(f"simulation {_name(record)!r} in {str(folder)!r} is damaged", InputError, REMEDY):
+                found.append(decode(Played, stored.value))
     return found
 
 

@@ -15,7 +15,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.study import RECORDS, read_records
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.backends.identity import problem_part, sha256_of
-from nlp_gait.columns import Columns, read_columns
+from nlp_gait.columns import Table, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 
@@ -24,7 +24,7 @@ FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
 
 
-def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) -> tuple[Columns, Array]:
+def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) -> tuple[Table, Array]:
     """Points (m, n) of a CSV file: columns by the variables' names in any order, or without a header in the order of x.
 
     Args:
@@ -36,7 +36,7 @@ def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) ->
         InputError: the file cannot be read, or a row is no point.
         UnknownNameError: a column that nobody reads.
     """
-    table = read_columns(path, "points")
+    table = read_table(path, "points")
     if table.header:
         table.check_header(problem.names, beside)
         order = [table.header.index(name) for name in problem.names]
@@ -139,7 +139,7 @@ def imported(
 
 def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
     """Best so far and times by run."""
-    table = read_columns(path, "history")
+    table = read_table(path, "history")
     table.check_header(HISTORY, ("time_s",))
     columns = [table.column(name) or () for name in HISTORY]
     seconds = table.column("time_s") or (math.nan,) * len(table.rows)

@@ -16,9 +16,9 @@ from typing import Any, Literal
 from compare.study.settings import StudySettings, settings_from
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.files import read_json, refusing, write_json
+from nlp_gait.files import convert_errors, read_json, write_json
 
 SCHEMA = 1
 FILE = "study.json"
@@ -101,8 +101,8 @@ def read_manifest(folder: Path) -> Manifest:
     if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())
     raw = read_json(path, "manifest", remedy=REMEDY)
-    with refusing(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
-        kept = decoded(_Kept, raw)
+    with convert_errors(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
+        kept = decode(_Kept, raw)
     return Manifest(
         settings=settings_from(kept.study, f"manifest {str(path)!r}", runs_code=False), sessions=kept.sessions
     )

@@ -11,13 +11,13 @@ from typing import Any
 
 from compare.judge import Evaluation
 from compare.study.task import LABEL, ProblemSpec, Task
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, refusing, without_nan
+from nlp_gait.files import convert_errors, read_json, replace_nan
 from nlp_gait.formulation import Objective, Result
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
-from nlp_gait.notebook import html_table
+from nlp_gait.notebook import format_html_table
 from nlp_gait.proofs.guarantee import Guarantee
 from nlp_gait.user_code import resolve_code
 
@@ -203,11 +203,13 @@ class RunRecord:
     def _repr_html_(self) -> str:
         calls = ", ".join(f"{kind} {count}" for kind, count in self.evaluations.items())
         note = f"{self.status}; seed {self.seed}; calls {calls}; {self.time_s.solve:.3g} s"
-        return html_table(repr(self)[1:-1], ("variable", "value"), [(n, f"{v:.6g}") for n, v in self.x.items()], note)
+        return format_html_table(
+            repr(self)[1:-1], ("variable", "value"), [(n, f"{v:.6g}") for n, v in self.x.items()], note
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
-        return {"schema": SCHEMA, **without_nan(asdict(self))}
+        return {"schema": SCHEMA, **replace_nan(asdict(self))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,7 +235,7 @@ def gait_of(record: RunRecord) -> Result:
         GaitError: the problem cannot be loaded: it is a file or module of one's own that is not named in this call, say; or it
             has other variables than the record.
     """
-    stored = decoded(StoredProblem, record.definition["problem"], "definition.problem")
+    stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
     name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
     problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
     return Result(problem=problem, x=problem.check_x(record.x))
@@ -257,18 +259,18 @@ def read_record(path: Path) -> RunRecord:
         newer = type(found) is int and found > SCHEMA
         remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
         raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
-    with refusing(f"record {str(path)!r} is damaged", InputError, REMEDY):
+    with convert_errors(f"record {str(path)!r} is damaged", InputError, REMEDY):
         return record_from(raw)
 
 
 def record_from(raw: Any) -> RunRecord:
     """Record from what ``to_json`` gives; ValueError if it is none."""
-    return _checked(decoded(RunRecord, raw, unread=("schema",)))
+    return _checked(decode(RunRecord, raw, unread=("schema",)))
 
 
 def _checked(record: RunRecord) -> RunRecord:
     """The record, if its parts agree with each other."""
-    objective = decoded(_Definition, record.definition, "definition").objective
+    objective = decode(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from compare.study.record import RunRecord
-from nlp_gait.notebook import pandas
+from nlp_gait.notebook import import_pandas
 
 CALLS = ("f", "g", "gradient", "jacobian", "hessian")
 JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
@@ -44,4 +44,4 @@ def frame_of(records: Sequence[RunRecord]) -> Any:
     """
     names = list(dict.fromkeys(name for record in records for name in record.x))
     rows = [[*row_of(record), *(record.x.get(name) for name in names)] for record in records]
-    return pandas().DataFrame(rows, columns=[*HEADER, *(f"x.{name}" for name in names)])
+    return import_pandas().DataFrame(rows, columns=[*HEADER, *(f"x.{name}" for name in names)])

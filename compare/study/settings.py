@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, solver_names
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import check_plain, read_text, refusing
+from nlp_gait.files import check_plain, convert_errors, read_text
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
 
@@ -137,7 +137,7 @@ def read_settings(path: Path) -> StudySettings:
         InputError: the file cannot be read, or something in it is not allowed; the message says what and where.
     """
     text = read_text(path, "study file", at_most=LARGEST_FILE)
-    with refusing(f"study file {str(path)!r} is not valid TOML", InputError):
+    with convert_errors(f"study file {str(path)!r} is not valid TOML", InputError):
         raw = tomllib.loads(text)
     return settings_from(raw, f"study file {str(path)!r}")
 
@@ -154,13 +154,13 @@ def settings_from(raw: Any, source: str, *, runs_code: bool = True) -> StudySett
         InputError: a key that does not exist, or a value of the wrong kind or that is not allowed.
         UnknownNameError: a problem, or a variable to fix, that does not exist.
     """
-    with refusing(f"{source} may hold finite numbers, texts, lists and tables only", InputError):
+    with convert_errors(f"{source} may hold finite numbers, texts, lists and tables only", InputError):
         check_plain(raw)
     for name in ("problem", "solver"):
         if isinstance(raw, Mapping) and not (isinstance(raw.get(name), list) and raw[name]):
             raise InputError(f"{source} needs at least one [[{name}]]")
-    with refusing(source, InputError):
-        study = decoded(_Study, raw)
+    with convert_errors(source, InputError):
+        study = decode(_Study, raw)
     if study.schema != SCHEMA:
         raise InputError(
             f"{source}: schema must be {SCHEMA}, got {study.schema}; a newer version of nlp-gait may read it"

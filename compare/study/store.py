@@ -22,7 +22,7 @@ from compare.study.workers import side_by_side
 from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import new_file, read_bytes, read_json, remove_leftovers, writable_folder, write_json
+from nlp_gait.files import make_writable_folder, read_bytes, read_json, remove_leftovers, replace_file, write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -69,7 +69,7 @@ class Store:
     """
 
     def __init__(self, out: Path | None = None, report: Progress | None = None) -> None:
-        self.folder = None if out is None else writable_folder(out / FOLDER)
+        self.folder = None if out is None else make_writable_folder(out / FOLDER)
         self._report = report
         self._counts = tempfile.TemporaryFile("w+b", buffering=0)  # noqa: SIM115  one byte for each result, shared with forks
         weakref.finalize(self, self._counts.close)
@@ -192,7 +192,7 @@ class Store:
         """
         with self._writing(name, inputs, ".npz") as path:
             if path is not None:
-                with new_file(path) as temporary, open(temporary, "wb") as file:
+                with replace_file(path) as temporary, open(temporary, "wb") as file:
                     text = np.array(json.dumps(inputs, sort_keys=True))
                     np.savez_compressed(file, allow_pickle=False, inputs=text, **arrays)
 
@@ -233,7 +233,7 @@ class Store:
         path = self._path(name, inputs, suffix)
         try:
             if path is not None and not path.parent.is_dir():
-                writable_folder(path.parent)
+                make_writable_folder(path.parent)
             yield path
         except OutputError as error:
             if self._report is None:

@@ -19,9 +19,9 @@ from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
 from nlp_gait.disk import rename
 from nlp_gait.errors import GaitError, InputError, OutputError
-from nlp_gait.files import refusing, remove_leftovers, writable_folder, write_json
+from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers, write_json
 from nlp_gait.interrupts import Interrupted
-from nlp_gait.notebook import html_table
+from nlp_gait.notebook import format_html_table
 
 __all__ = ["Study", "check_study", "read_records", "record_file", "run_study"]
 
@@ -74,7 +74,7 @@ class Study:
 
     def _repr_html_(self) -> str:
         rows = [(problem, solver, str(runs)) for (problem, solver), runs in self._groups.items()]
-        return html_table(repr(self)[1:-1], ("problem", "solver", "runs"), rows)
+        return format_html_table(repr(self)[1:-1], ("problem", "solver", "runs"), rows)
 
     def to_frame(self) -> Any:
         """The finished runs as a pandas data frame, a row each; see ``compare.study.rows.frame_of``.
@@ -175,12 +175,12 @@ def keep_record(record: RunRecord, folder: Path) -> Path:
     """
     path = run_file(folder / RECORDS, record.problem, record.solver, record.run)
     if not path.parent.is_dir():
-        writable_folder(path.parent)
+        make_writable_folder(path.parent)
     if path.exists():
         with suppress(InputError):  # a damaged one is written over
             earlier = read_record(path)
             if key_of(earlier.definition) != key_of(record.definition):
-                with refusing(f"cannot write to {str(path.parent)!r}", OutputError):
+                with convert_errors(f"cannot write to {str(path.parent)!r}", OutputError):
                     rename(path, _keyed(path, earlier.definition))
     write_json(path, record.to_json())
     return path
@@ -220,7 +220,7 @@ def read_records(folder: Path) -> list[RunRecord]:
     Raises:
         InputError: there are none, or one is damaged.
     """
-    with refusing(f"folder {str(folder)!r} cannot be read", InputError):
+    with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
         raise InputError(f"{str(folder)!r} holds no records ({RECORDS}/<problem>/<solver>-<run>.json)")
@@ -246,7 +246,7 @@ def _finished(study: Study) -> tuple[dict[int, RunRecord], dict[int, RunRecord]]
     if study.folder is None:
         return records, others
     for folder in {record_file(study.folder, task).parent for task in study.tasks}:
-        remove_leftovers(writable_folder(folder))
+        remove_leftovers(make_writable_folder(folder))
     for index, task in enumerate(study.tasks):
         path = record_file(study.folder, task)
         if not path.exists():

@@ -46,7 +46,7 @@ class ProblemSpec:
     """A problem as plain data.
 
     Attributes:
-        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.formulation.registry.problem_maker``; or a ``GaitProblem``
+        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.formulation.registry.find_maker``; or a ``GaitProblem``
             itself, which then has its options already.
         options: what it is built with, where that differs from the defaults.
         values: parameters, where they differ from the defaults.

@@ -15,7 +15,7 @@ from compare.study.record import RunRecord
 from compare.study.runner import Run, attempt, run_task
 from compare.study.task import Task
 from nlp_gait.errors import InputError, WorkerError
-from nlp_gait.files import refusing
+from nlp_gait.files import convert_errors
 from nlp_gait.interrupts import block_interrupts_in_children, remember_interrupts
 
 K = TypeVar("K")
@@ -149,7 +149,7 @@ def _dask(address: str) -> AbstractContextManager[object]:
     from joblib import parallel_config
 
     stack = ExitStack()
-    with refusing(f"no Dask scheduler answers at {address!r}", InputError, "start one with `dask scheduler`"):
+    with convert_errors(f"no Dask scheduler answers at {address!r}", InputError, "start one with `dask scheduler`"):
         stack.enter_context(Client(address, timeout=CONNECT_TIMEOUT, set_as_default=True))
     stack.enter_context(parallel_config(backend="dask"))
     return stack

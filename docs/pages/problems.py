@@ -17,7 +17,7 @@ from compare.drawing.gait_figure import plot_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, load, problem_names
-from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.gaitbench.facts import load_facts
@@ -203,7 +203,7 @@ def _parameters(problem: GaitProblem) -> str:
 
 
 def _options(problem: GaitProblem) -> str:
-    make = problem_maker(problem.name)
+    make = find_maker(problem.name)
     hints, words = get_type_hints(make), dict(_option_words(problem))
     rows = []
     for name, parameter in inspect.signature(make).parameters.items():
@@ -218,7 +218,7 @@ def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
     """Return the meaning of options, from the docstrings of the family and of the maker."""
     module = PROBLEMS[problem.name].partition(":")[0]
     family = importlib.import_module(".".join(module.split(".")[:3])).__doc__ or ""
-    for pattern, text in ((OPTION, family), (ARGUMENT, inspect.getdoc(problem_maker(problem.name)) or "")):
+    for pattern, text in ((OPTION, family), (ARGUMENT, inspect.getdoc(find_maker(problem.name)) or "")):
         for name, words in pattern.findall(text):
             yield name, " ".join(words.split()).rstrip(".")
 
@@ -249,7 +249,7 @@ def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:
 
 def _source(problem: GaitProblem) -> str:
     """Return the section ``Source:`` of its maker's docstring."""
-    text = SOURCE.search(f"{inspect.getdoc(problem_maker(problem.name))}\n")
+    text = SOURCE.search(f"{inspect.getdoc(find_maker(problem.name))}\n")
     if text is None:
         raise ValueError(f"the docstring of the maker of {problem.name!r} has no section 'Source:'")
     return " ".join(text[1].split())

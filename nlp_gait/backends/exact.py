@@ -12,7 +12,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -55,7 +55,7 @@ class ExactModel:
     row_scales: Array
     index_names: tuple[str, ...]
 
-    @one_at_a_time
+    @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Return the values at x (n,) and parameter values p (k,)."""
         cost, violation, g, lower, upper, indexes = (

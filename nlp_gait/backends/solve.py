@@ -11,7 +11,7 @@ from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
-from nlp_gait.errors import InputError, checked_count, shown
+from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
 from nlp_gait.interrupts import Interrupted, defer_interrupts
@@ -55,9 +55,9 @@ def solve(
         InputError: no start, x0 or a fixed value that is not allowed, or a solver that does not run here.
         Interrupted: Ctrl-C; carries the solution of the starts so far, and of the interrupted one where it stopped.
     """
-    starts = checked_count("starts", starts, at_most=MOST_STARTS)
-    workers = None if workers is None else checked_count("workers", workers, at_most=MOST_WORKERS)
-    seed = checked_count("seed", seed, at_least=0)
+    starts = check_count("starts", starts, at_most=MOST_STARTS)
+    workers = None if workers is None else check_count("workers", workers, at_most=MOST_WORKERS)
+    seed = check_count("seed", seed, at_least=0)
     problem = load(problem) if isinstance(problem, str) else problem
     _check_types(problem, fix, solver, progress)
     problem = problem.fix(**(fix or {}))
@@ -78,16 +78,16 @@ def solve(
 
 def _check_types(problem: object, fix: object, solver: object, progress: object) -> None:
     if not isinstance(problem, GaitProblem):
-        raise InputError(f"problem must be a problem from load, or the name of one, got {shown(problem)}")
+        raise InputError(f"problem must be a problem from load, or the name of one, got {format_value(problem)}")
     if fix is not None and not (isinstance(fix, Mapping) and all(isinstance(name, str) for name in fix)):
-        raise InputError(f"fix must be values by variable name, got {shown(fix)}")
+        raise InputError(f"fix must be values by variable name, got {format_value(fix)}")
     is_solver = all(callable(getattr(solver, method, None)) for method in ("run", "prepare"))
     if solver is not None and (isinstance(solver, type) or not is_solver):
         raise InputError(
-            f"solver must be made by nlp_gait.make_solver('ipopt'), IpoptSettings() or the like, got {shown(solver)}"
+            f"solver must be made by nlp_gait.make_solver('ipopt'), IpoptSettings() or the like, got {format_value(solver)}"
         )
     if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function of one start's outcome, got {shown(progress)}")
+        raise InputError(f"progress must be a function of one start's outcome, got {format_value(progress)}")
 
 
 def _choose_start_points(

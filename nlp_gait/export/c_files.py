@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from nlp_gait.files import writable_folder, write_text
+from nlp_gait.files import make_writable_folder, write_text
 
 
 def write_c_files(
@@ -33,7 +33,7 @@ def write_c_files(
         texts[name.format(prefix=prefix)] = text
     written = []
     for name, text in texts.items():
-        written.append(writable_folder(folder) / name)
+        written.append(make_writable_folder(folder) / name)
         write_text(written[-1], text)
     return written
 

@@ -10,7 +10,7 @@ from nlp_gait.export.setpoints import SetPoints, set_points
 from nlp_gait.export.tables import write_csv, write_json
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import write_text
-from nlp_gait.formulation import Result, sampled
+from nlp_gait.formulation import Result, sample_signals
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
@@ -53,9 +53,9 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
         plan = make_plan(result)
         write_text(path, make_plan_model(plan, Drive()))
     elif name == "csv":
-        write_csv(path, sampled(result, period_ms / 1000.0))
+        write_csv(path, sample_signals(result, period_ms / 1000.0))
     else:
-        write_json(path, result, sampled(result, period_ms / 1000.0))
+        write_json(path, result, sample_signals(result, period_ms / 1000.0))
 
 
 def _motor_set_points(result: Result, period_ms: int) -> SetPoints:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.columns import read_columns
+from nlp_gait.columns import read_table
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.export.webots import read_motion
 from nlp_gait.formulation.motion.signals import JointAngles
@@ -42,7 +42,7 @@ def read_gait(path: Path, robot: Robot) -> JointAngles:
             t=np.array(points.times_ms) / 1000.0,
             q=points.angles[:, known],
         )
-    table = read_columns(path, "motion")
+    table = read_table(path, "motion")
     times: int | None = None
     angles: dict[str, tuple[int, float]] = {}
     for k, heading in enumerate(table.header):

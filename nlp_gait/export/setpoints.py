@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, finely_sampled
+from nlp_gait.formulation import Array, Result, sample_finely
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 
@@ -36,7 +36,7 @@ def set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
     """
     if isinstance(period_ms, bool) or not isinstance(period_ms, int) or period_ms < 1:
         raise InputError(f"the period must be a whole number of milliseconds >= 1, got {period_ms!r}")
-    signals = finely_sampled(result)
+    signals = sample_finely(result)
     duration = float(signals.arrays["t"][-1])
     end_ms = max(1, round(1000.0 * duration))
     times_ms = (*range(0, end_ms, period_ms), end_ms)

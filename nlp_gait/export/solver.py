@@ -15,7 +15,7 @@ from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.export.c_files import comment, write_c_files
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 
 # Files of the export by the template that each is made from; the C++ file is put together from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
@@ -36,7 +36,7 @@ extern "C" void @_second(void* memory, const double* w, const double* p, double 
 """
 
 
-@one_at_a_time
+@lock_casadi
 def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     """Write source, header, example and build line of a problem's NLP; returns the files.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.files import csv_text, new_file, write_text
+from nlp_gait.files import format_csv, replace_file, write_text
 from nlp_gait.formulation import Result, Signals
 from nlp_gait.formulation.result import SCHEMA
 
@@ -16,7 +16,7 @@ def write_csv(path: Path, signals: Signals) -> None:
     """One row a sample, a header like ``q LKneePitch [rad]``; raises InputError, OutputError."""
     table = list(signals.named_columns())
     header = [f"{name} [{unit}]" for name, unit, _ in table]
-    write_text(path, csv_text([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
+    write_text(path, format_csv([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
 
 
 def write_json(path: Path, result: Result, signals: Signals) -> None:
@@ -35,5 +35,5 @@ def write_json(path: Path, result: Result, signals: Signals) -> None:
 
 def write_npz(path: Path, signals: Signals) -> None:
     """All arrays and the joint names (columns of q, qd, qdd and tau) in one ``.npz`` file; raises OutputError."""
-    with new_file(path) as temporary, open(temporary, "wb") as file:
+    with replace_file(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)

@@ -16,10 +16,10 @@ from nlp_gait.formulation.assembly import (
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
 from nlp_gait.formulation.motion.grid import Grid
-from nlp_gait.formulation.motion.signals import Array, Columns, Signals, in_space
+from nlp_gait.formulation.motion.signals import Array, Columns, Signals, vector_columns
 from nlp_gait.formulation.registry import load, maker, problem_names
 from nlp_gait.formulation.result import Result, load_result
-from nlp_gait.formulation.sampling import finely_sampled, sampled
+from nlp_gait.formulation.sampling import sample_finely, sample_signals
 
 __all__ = [
     "Array",
@@ -42,12 +42,12 @@ __all__ = [
     "SolverHints",
     "Start",
     "Variable",
-    "finely_sampled",
-    "in_space",
+    "sample_finely",
+    "vector_columns",
     "load",
     "load_result",
     "maker",
     "parameters",
     "problem_names",
-    "sampled",
+    "sample_signals",
 ]

@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, TypeAlias, TypeVar
 import casadi as ca
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import InputError, shown, unknown
+from nlp_gait.errors import InputError, format_value, unknown
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Expression = TypeVar("Expression", MX, SX, DM)
@@ -71,7 +71,7 @@ class Variable:
 
 def _check_number(owner: str, field: str, value: object) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError(f"{owner}: {field} must be a finite number, got {shown(value)}")
+        raise InputError(f"{owner}: {field} must be a finite number, got {format_value(value)}")
 
 
 def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:

@@ -92,6 +92,6 @@ class Layout:
         return np.concatenate([values[block.quantity].T.ravel() for block in self.blocks])
 
 
-def labels(rows: Sequence[str], columns: Sequence[int] | range) -> tuple[str, ...]:
+def make_labels(rows: Sequence[str], columns: Sequence[int] | range) -> tuple[str, ...]:
     """Row labels of a constraint on a (rows, columns) matrix in column-major order: ``"HK, 12"``."""
     return tuple(f"{row}, {k}" for k in columns for row in rows)

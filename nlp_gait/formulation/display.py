@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from nlp_gait.formulation.assembly import NumericPoint
-from nlp_gait.formulation.motion.signals import Columns, Signals, in_space
+from nlp_gait.formulation.motion.signals import Columns, Signals, vector_columns
 from nlp_gait.formulation.motion.skeleton import Skeleton
 
 # A ``nlp_gait.robots.Robot``. This package only passes it on, so it does not import it.
@@ -15,11 +15,11 @@ RobotModel: TypeAlias = Any
 
 # What the engine needs of a motion in addition to the joints' q, qd and tau. The floor, or its lowest part, is at z = 0.
 SIMULATED = {
-    "zmp": in_space("m", "xy"),  # planned centre of pressure of everything that stands on the ground
-    "hip": in_space("m"),  # origin of the robot's root
+    "zmp": vector_columns("m", "xy"),  # planned centre of pressure of everything that stands on the ground
+    "hip": vector_columns("m"),  # origin of the robot's root
     "attitude": Columns(unit="1", labels=("w", "x", "y", "z")),  # of the root, a quaternion; upright if missing
-    "left_foot": in_space("m"),  # the sole under the ankle
-    "right_foot": in_space("m"),
+    "left_foot": vector_columns("m"),  # the sole under the ankle
+    "right_foot": vector_columns("m"),
     # 1 where any part of the foot is on the ground, else 0; if missing, a foot is on the ground when its sole is.
     "left_bears": Columns(unit="1"),
     "right_bears": Columns(unit="1"),

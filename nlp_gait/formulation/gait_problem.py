@@ -17,13 +17,13 @@ from typing import Any, Concatenate, Literal, NamedTuple, ParamSpec, TypeVar
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.errors import InputError, UnknownNameError, shown, unknown
+from nlp_gait.errors import InputError, UnknownNameError, format_value, unknown
 from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import Display
-from nlp_gait.formulation.locking import CASADI, one_at_a_time
+from nlp_gait.formulation.locking import CASADI_LOCK, lock_casadi
 from nlp_gait.formulation.motion.grid import Grid
 from nlp_gait.formulation.motion.signals import Array, Signals
-from nlp_gait.formulation.numbers import is_number, real_numbers
+from nlp_gait.formulation.numbers import is_number, to_floats
 from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -54,7 +54,7 @@ class Cache:
     def get(self, key: Hashable, build: Callable[[], T]) -> T:
         """Return the value of a key, built on the first call."""
         if key not in self._values:
-            with CASADI:
+            with CASADI_LOCK:
                 if key not in self._values:  # another thread may have built it meanwhile
                     self._values[key] = build()
         found: T = self._values[key]
@@ -188,7 +188,9 @@ class GaitProblem:
         for name, value in values.items():
             parameter = self._parameter(name)
             if not is_number(value):
-                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {shown(value)}")
+                raise InputError(
+                    f"parameter {name!r} must be a finite number [{parameter.unit}], got {format_value(value)}"
+                )
             if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
@@ -209,8 +211,9 @@ class GaitProblem:
             i = self.variable_index(name)
             if not (is_number(value) and self.lower[i] <= value <= self.upper[i]):
                 raise InputError(
-                    f"variable {name!r} cannot be fixed at {shown(value)}: its bounds are [{self.lower[i]:g}, {self.upper[i]:g}] "
-                    f"{self.variables[i].unit}; widen them with --set {name}.lower=... or --set {name}.upper=..."
+                    f"variable {name!r} cannot be fixed at {format_value(value)}: its bounds are "
+                    f"[{self.lower[i]:g}, {self.upper[i]:g}] {self.variables[i].unit}; "
+                    f"widen them with --set {name}.lower=... or --set {name}.upper=..."
                 )
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
         return self.with_values(**bounds)
@@ -283,7 +286,7 @@ class GaitProblem:
             loaded_as="" if name else self.loaded_as,
         )
 
-    @one_at_a_time
+    @lock_casadi
     def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
         """Time histories at x (n,) and the current parameter values.
 
@@ -294,7 +297,7 @@ class GaitProblem:
             raise InputError(f"problem {self.name!r} has no time histories")
         return self.display.motion(self.at(x))
 
-    @one_at_a_time
+    @lock_casadi
     def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
         """The point x (n,) with the current parameter values, in numbers."""
         return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
@@ -304,7 +307,7 @@ class GaitProblem:
         """Current values by name."""
         return dict(zip((q.name for q in self.parameters), self.p.tolist(), strict=True))
 
-    @one_at_a_time
+    @lock_casadi
     def start_point(self, rng: np.random.Generator) -> Array:
         """(n,) start point for a gradient method, within the bounds."""
         if self.hints.start is not None:
@@ -328,7 +331,7 @@ class GaitProblem:
                     f"unknown: {', '.join(map(str, extra)) or 'none'}"
                 )
             x = [x[name] for name in self.names]
-        array = real_numbers(f"x of {self.name}", x)
+        array = to_floats(f"x of {self.name}", x)
         if array.shape != (len(self.names),):
             raise InputError(
                 f"x of {self.name} must have {len(self.names)} values ({', '.join(self.names)}), got shape {array.shape}"
@@ -359,7 +362,7 @@ class GaitProblem:
         """Values of x by variable name."""
         return dict(zip(self.names, (float(v) for v in x), strict=True))
 
-    @one_at_a_time
+    @lock_casadi
     def symbols(self) -> Point:
         """Fresh symbols for x and p."""
         parameters = [q.name for q in self.parameters]
@@ -429,7 +432,7 @@ def _unpickle(
     return _make_again(make, tuple(sorted(options.items())), robot).with_values(**values)
 
 
-@one_at_a_time
+@lock_casadi
 @lru_cache(maxsize=16)  # so that copies of one problem share what is built
 def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any], ...], robot: str) -> GaitProblem:
     problem = make(**dict(options))

@@ -15,15 +15,15 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 
-CASADI = threading.RLock()
+CASADI_LOCK = threading.RLock()
 
 
-def one_at_a_time(call: Callable[P, T]) -> Callable[P, T]:
+def lock_casadi(call: Callable[P, T]) -> Callable[P, T]:
     """The same function, entered by one thread at a time among all functions that this was done to."""
 
     @wraps(call)
     def alone(*positional: P.args, **named: P.kwargs) -> T:
-        with CASADI:
+        with CASADI_LOCK:
             return call(*positional, **named)
 
     return alone
@@ -31,4 +31,6 @@ def one_at_a_time(call: Callable[P, T]) -> Callable[P, T]:
 
 if hasattr(os, "register_at_fork"):
     # A fork waits until no other thread is inside CasADi: the child, which has this thread only, could never finish its work.
-    os.register_at_fork(before=CASADI.acquire, after_in_parent=CASADI.release, after_in_child=CASADI.release)
+    os.register_at_fork(
+        before=CASADI_LOCK.acquire, after_in_parent=CASADI_LOCK.release, after_in_child=CASADI_LOCK.release
+    )

@@ -21,7 +21,7 @@ def is_number(value: object) -> TypeGuard[float]:
         return False
 
 
-def real_numbers(what: str, values: object) -> Array:
+def to_floats(what: str, values: object) -> Array:
     """Values of any shape as doubles, copied only if they are not that already; they need not be finite.
 
     Args:

@@ -11,10 +11,10 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from nlp_gait.errors import InputError, check_name, kind_name, shown, unknown
+from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.formulation.checks import check_mathematics
 from nlp_gait.formulation.gait_problem import GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
 from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.user_code import (
@@ -41,7 +41,7 @@ def maker(make: Maker) -> Maker:
     problem is refined by the option that its grid names.
     """
 
-    @one_at_a_time
+    @lock_casadi
     @functools.wraps(make)
     def make_problem(**options: Any) -> GaitProblem:
         options = {name: _to_python(value) for name, value in options.items()}
@@ -69,7 +69,7 @@ def problem_names() -> tuple[str, ...]:
     return tuple(PROBLEMS)
 
 
-def problem_maker(name: str) -> Maker:
+def find_maker(name: str) -> Maker:
     """Return the function that makes a problem; its keyword arguments are the problem's options.
 
     Args:
@@ -109,7 +109,7 @@ def _user_maker(name: str) -> Maker:
 
     origin = UserMaker(name, hash_source(name, "problem"))
 
-    @one_at_a_time
+    @lock_casadi
     @functools.wraps(make)
     def make_checked(**options: Any) -> GaitProblem:
         check_maker_options(make, options)
@@ -125,7 +125,7 @@ class UserMaker:
     """Maker of a user-defined problem in the process where the problem is unpickled.
 
     Attributes:
-        name: see ``problem_maker``.
+        name: see ``find_maker``.
         source: hash of its source.
     """
 
@@ -141,7 +141,7 @@ class UserMaker:
 
 def check_options(name: str, options: Mapping[str, Any]) -> None:
     """Check that a problem has these options and allows their values; raises as ``load``."""
-    check_maker_options(problem_maker(name), options)
+    check_maker_options(find_maker(name), options)
 
 
 def check_maker_options(make: Maker, options: Mapping[str, Any]) -> None:
@@ -159,11 +159,11 @@ def check_maker_options(make: Maker, options: Mapping[str, Any]) -> None:
         expected = type(known[option].default)
         right = type(value) is expected or (expected is float and type(value) is int)
         if not right or (expected is float and not is_number(value)):
-            raise InputError(f"option {option} must be {kind_name(expected)}, got {shown(value)}")
+            raise InputError(f"option {option} must be {describe_type(expected)}, got {format_value(value)}")
         if expected is int and value > LARGEST_COUNT:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
         if option in allowed and value not in allowed[option]:
-            raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {shown(value)}")
+            raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {format_value(value)}")
     whole = [name for name, option in known.items() if type(option.default) is int]
     counts = {name: _to_python(options.get(name, known[name].default)) for name in GRID if name in whole}
     if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:
@@ -184,7 +184,7 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Return a problem by name, built with the given options; the others keep their defaults.
 
     Args:
-        name: see ``problem_maker``.
+        name: see ``find_maker``.
         options: of its maker.
 
     Raises:
@@ -192,4 +192,4 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
         InputError: a value that the option does not allow, or user code that fails.
     """
     check_name("problem", name)
-    return problem_maker(name)(**options)
+    return find_maker(name)(**options)

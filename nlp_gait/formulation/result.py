@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import read_json
 from nlp_gait.formulation.gait_problem import GaitProblem
@@ -89,13 +89,13 @@ def load_result(path: Path) -> Result:
 
 
 def _of_record(raw: Mapping[str, Any]) -> Result:
-    record = decoded(_RecordFile, raw, ignore_unknown=True)
-    problem = decoded(StoredProblem, record.definition.get("problem"), "definition.problem")
+    record = decode(_RecordFile, raw, ignore_unknown=True)
+    problem = decode(StoredProblem, record.definition.get("problem"), "definition.problem")
     return _result(problem.name, problem.options, problem.parameters, record.x)
 
 
 def _of_result(raw: Any) -> Result:
-    file = decoded(_ResultFile, raw, ignore_unknown=True)
+    file = decode(_ResultFile, raw, ignore_unknown=True)
     result = _result(file.problem, file.options, file.parameters, file.x)
     if file.robot not in (None, result.problem.options.get("robot")):
         raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")

@@ -14,7 +14,7 @@ SHORTEST_S, LONGEST_S = 0.001, 60.0  # of a gait; a step takes a second
 FINE_INTERVALS = 1000  # of a grid that splines run through: their error is below 1e-9 rad
 
 
-def sampled(result: Result, period_s: float) -> Signals:
+def sample_signals(result: Result, period_s: float) -> Signals:
     """Signals on the problem's own grid, refined until neighbouring samples are at most a period apart.
 
     Raises:
@@ -44,7 +44,7 @@ def _check_times(times: Array) -> None:
         )
 
 
-def finely_sampled(result: Result) -> Signals:
-    """Signals with at least ``FINE_INTERVALS`` intervals, where the problem can be refined; raises as ``sampled``."""
-    own = sampled(result, math.inf)
-    return sampled(result, float(own.arrays["t"][-1]) / FINE_INTERVALS)
+def sample_finely(result: Result) -> Signals:
+    """Signals with at least ``FINE_INTERVALS`` intervals, where the problem can be refined; raises as ``sample_signals``."""
+    own = sample_signals(result, math.inf)
+    return sample_signals(result, float(own.arrays["t"][-1]) / FINE_INTERVALS)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlp_gait.formulation.motion.signals import Array, Signals
-from nlp_gait.notebook import html_table
+from nlp_gait.notebook import format_html_table
 from nlp_gait.providers import FUNCTIONS, import_object
 
 if TYPE_CHECKING:
@@ -234,7 +234,7 @@ class Solution:
         rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
         left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
         note = self.status + (f"; {left_out} more rows in .x and .active_constraints" if left_out else "")
-        return html_table(
+        return format_html_table(
             repr(self)[1:-1], ("variable or row", "value", "price of raising its bound"), [*x, *rows], note
         )
 

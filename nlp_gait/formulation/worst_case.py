@@ -12,7 +12,7 @@ from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 
-def worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
+def make_worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
     """Scenario problem: one x that keeps the limits of all scenarios, with the least objective in the worst one.
 
     Limits, bounds and parameter values are the first scenario's.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ class Facts:
 def load_facts() -> Mapping[str, Facts]:
     """Return the facts about all instances by id."""
     raw = json.loads(files("nlp_gait.gaitbench").joinpath("facts.json").read_text(encoding="utf-8"))
-    return {id: decoded(Facts, entry, id) for id, entry in raw.items()}
+    return {id: decode(Facts, entry, id) for id, entry in raw.items()}
 
 
 def _cma(gap: float) -> str:

@@ -26,7 +26,7 @@ UNMOVED = (
 MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def walk(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
+def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
     """Time histories of so many steps.
 
     Args:
@@ -40,20 +40,20 @@ def walk(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Si
     """
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
-    image = mirror_image(cycle, robot)
-    advance, period = np.array([step_of(cycle), 0.0, rise_m]), float(cycle.arrays["t"][-1])
+    image = mirror(cycle, robot)
+    advance, period = np.array([step_length(cycle), 0.0, rise_m]), float(cycle.arrays["t"][-1])
     parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
     arrays = {name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]}
     return replace(cycle, arrays=arrays)
 
 
-def step_of(cycle: Signals) -> float:
+def step_length(cycle: Signals) -> float:
     """How far a cycle moves the hip forward [m]."""
     hip = cycle.arrays["hip"]
     return float(hip[-1, 0] - hip[0, 0])
 
 
-def mirror_image(signals: Signals, robot: Robot) -> Signals:
+def mirror(signals: Signals, robot: Robot) -> Signals:
     """Time histories with left and right exchanged. Torques are those of a robot that is itself symmetric."""
     images = partners(robot)
     columns = [signals.joints.index(images[name]) for name in signals.joints]

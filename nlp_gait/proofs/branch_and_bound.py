@@ -23,7 +23,7 @@ import numpy as np
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.errors import InputError
-from nlp_gait.files import new_file
+from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
@@ -179,7 +179,7 @@ def _halve_best(tree: _Tree, bounds: Bounds, target: float) -> None:
 
 def _write_checkpoint(path: Path, identity: str, tree: _Tree) -> None:
     parts: Mapping[str, Any] = vars(tree)
-    with new_file(path) as temporary, temporary.open("wb") as file:
+    with replace_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, identity=np.array(identity), **parts)
 
 

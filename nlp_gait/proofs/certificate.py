@@ -15,9 +15,9 @@ import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH, problem_part, sha256_of
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import read_json, refusing
+from nlp_gait.files import convert_errors, read_json
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -88,8 +88,8 @@ def read_certificate(path: Path) -> CertificateFile:
         InputError: the file is not a certificate.
     """
     raw = read_json(path, "certificate")
-    with refusing(f"certificate {str(path)!r} is damaged", InputError):
-        return decoded(CertificateFile, raw)
+    with convert_errors(f"certificate {str(path)!r} is damaged", InputError):
+        return decode(CertificateFile, raw)
 
 
 @cache
@@ -171,8 +171,8 @@ def _check_incumbent(problem: GaitProblem, proof: Certificate) -> float:
 
 
 def _load_problem(description: Mapping[str, Any]) -> GaitProblem:
-    with refusing("the certificate's problem cannot be made", InputError):
-        stored = decoded(StoredProblem, description, "problem")
+    with convert_errors("the certificate's problem cannot be made", InputError):
+        stored = decode(StoredProblem, description, "problem")
         name = resolve_code(stored.name, "problem", "the certificate")
         problem = load(name, **stored.options).with_values(**stored.parameters)
     if problem_part(problem) != dict(description):

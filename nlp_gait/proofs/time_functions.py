@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.formulation import Array, Constraint, GaitProblem, RowsOverTime
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.proofs.boxes import Numbers
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -36,7 +36,7 @@ class Enclosed:
         self._function, self._half_open = function, half_open
         self._parts: dict[int, EnclosedPart] = {}
 
-    @one_at_a_time
+    @lock_casadi
     def part(self, group: int) -> EnclosedPart:
         """Return a group of values: a function of its own if that takes less than half of all instructions."""
         if group not in self._parts:
@@ -80,7 +80,7 @@ class TimeRows(NamedTuple):
     values: Enclosed | None
     bounds: ca.Function
 
-    @one_at_a_time
+    @lock_casadi
     def bound(self, p: Array) -> tuple[Array, Array]:
         """Return lower and upper bounds (m,) for parameter values."""
         lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(p))
@@ -107,7 +107,7 @@ class TimeFunctions(NamedTuple):
     sampled: tuple[str, ...]
 
 
-@one_at_a_time
+@lock_casadi
 def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
     """Read the functions from the rows with all samples at one phase, and with the later samples an interval later.
 

@@ -12,9 +12,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
-from nlp_gait.decoding import decoded, decoded_value, read_decoded
-from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, shown, unknown, warn_once
-from nlp_gait.files import check_path, refusing
+from nlp_gait.decoding import decode, decode_value, read_dataclass
+from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_value, unknown, warn_once
+from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inertia import check_inertias, shift_to_com
 from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
 from nlp_gait.robots.mjcf import mjcf_points, mjcf_record
@@ -64,7 +64,7 @@ class RobotFile:
             for name in getattr(self, group):
                 check_name(name, group)
         for side in self.feet:
-            decoded_value(Side, side, "a key of feet")
+            decode_value(Side, side, "a key of feet")
 
 
 class _Record(NamedTuple):
@@ -101,7 +101,7 @@ def load_robot(name_or_path: str) -> Robot:
         MissingExtraError: a URDF cannot be read without its extra.
     """
     if not isinstance(name_or_path, str):
-        raise UnknownNameError(f"the name of a robot must be a text, got {shown(name_or_path)}")
+        raise UnknownNameError(f"the name of a robot must be a text, got {format_value(name_or_path)}")
     check_path(name_or_path, f"robot {name_or_path!r}", RobotDataError)
     return _load(name_or_path) if is_robot_file(name_or_path) else _load_shipped(name_or_path)
 
@@ -167,9 +167,9 @@ def _read_merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
 
 
 def _read_model(source: str, about: About) -> RobotFile:
-    with refusing(f"robot file {source!r}", RobotDataError):
+    with convert_errors(f"robot file {source!r}", RobotDataError):
         raw = mjcf_record(source) if source.endswith(".xml") else urdf_record(source, about_joint=about == "joint")
-        return _with_records(decoded(RobotFile, {**raw, "inertia_about": about and "com"}), source)
+        return _with_records(decode(RobotFile, {**raw, "inertia_about": about and "com"}), source)
 
 
 def _with_records(file: RobotFile, source: str) -> RobotFile:
@@ -204,7 +204,7 @@ def _read(name_or_path: str) -> RobotFile:
     if not name_or_path.endswith(".json") and name_or_path not in robot_names():
         raise unknown("robot", name_or_path, robot_names())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
-    file = read_decoded(RobotFile, path, "robot file", error=RobotDataError)
+    file = read_dataclass(RobotFile, path, "robot file", error=RobotDataError)
     beside = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]
     if file.extends is None and file.root is None and beside:
         return replace(file, extends=beside[0].name)
@@ -225,7 +225,7 @@ def _make_robot(file: RobotFile, source: str) -> Robot:
         root=str(file.root),
         links=links,
         joints=_decode(_decode_joint, file.joints),
-        feet=_decode(lambda side, record: decoded(Foot, record.raw, f"feet.{side}"), file.feet),
+        feet=_decode(lambda side, record: decode(Foot, record.raw, f"feet.{side}"), file.feet),
         posture_rad=file.posture_rad,
         heat_loss_W_per_Nm2=file.heat_loss_W_per_Nm2,
         notes=tuple(notes),
@@ -257,10 +257,10 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
 
     faults = find_fault_in(file.links, _decode_link), find_fault_in(file.joints, _decode_joint)
     for side, record in file.feet.items():
-        with refusing(f"robot file {record.file!r}", RobotDataError):
-            decoded_value(Mapping[str, Any], record.raw, f"feet.{side}")
+        with convert_errors(f"robot file {record.file!r}", RobotDataError):
+            decode_value(Mapping[str, Any], record.raw, f"feet.{side}")
     links, joints, feet = ({k: dict(r.raw) for k, r in group.items()} for group in (file.links, file.joints, file.feet))
-    with refusing(f"robot file {model!r}", RobotDataError):
+    with convert_errors(f"robot file {model!r}", RobotDataError):
         legs = find_legs(name, joints, feet)
         if file.unphysical == "repair":
             repair_links(links, legs.links, faults[0], notes)
@@ -284,23 +284,23 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
 def _decode(decode: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:
     found = {}
     for name, record in records.items():
-        with refusing(f"robot file {record.file!r}", RobotDataError):
+        with convert_errors(f"robot file {record.file!r}", RobotDataError):
             found[name] = decode(name, record)
     return found
 
 
 def _decode_link(name: str, record: _Record) -> Link:
-    link = decoded(Link, record.raw, f"links.{name}", given={"name": name})
+    link = decode(Link, record.raw, f"links.{name}", given={"name": name})
     return shift_to_com(link) if record.about == "joint" else link
 
 
 def _decode_joint(name: str, record: _Record) -> Joint:
     where = f"joints.{name}"
-    raw = decoded_value(Mapping[str, Any], record.raw, where)
-    axis = decoded_value(Vector, raw.get("axis"), f"{where}.axis")
+    raw = decode_value(Mapping[str, Any], record.raw, where)
+    axis = decode_value(Vector, raw.get("axis"), f"{where}.axis")
     length = math.hypot(*axis)
     if not 0.99 < length < 1.01:  # published axes are rounded (0.7071); a larger error is a mistake
         raise RobotDataError(f"joint {name!r}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
     completed = {"planning_limits_rad": raw.get("limits_rad"), **raw, "axis": [a / length for a in axis]}
-    joint = decoded(Joint, completed, where, given={"name": name})
+    joint = decode(Joint, completed, where, given={"name": name})
     return reverse_joint(joint) if record.reversed else joint

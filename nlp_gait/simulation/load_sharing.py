@@ -17,7 +17,7 @@ from scipy import sparse
 
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.simulation.feedback import check_period
@@ -115,7 +115,7 @@ def find_double_supports(signals: Signals) -> Iterator[Support]:
             yield Support(start + (landed is not None), end, landed, lifting)
 
 
-@one_at_a_time
+@lock_casadi
 def compute_instants(plan: Plan, samples: slice) -> Instants:
     """Compute the loads of some of a plan's samples."""
     arrays, joints, feet = plan.signals.arrays, plan.joints, plan.robot.feet
@@ -139,7 +139,7 @@ def compute_instants(plan: Plan, samples: slice) -> Instants:
     )
 
 
-@one_at_a_time
+@lock_casadi
 def make_sole_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
     """Return matrices (16, 6) by side; their products with a wrench on the sole must be >= 0."""
     wrench, found = SX.sym("wrench", WRENCH), {}

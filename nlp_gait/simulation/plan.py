@@ -9,10 +9,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, Signals, finely_sampled
+from nlp_gait.formulation import Array, Result, Signals, sample_finely
 from nlp_gait.formulation.display import Tread
-from nlp_gait.formulation.locking import one_at_a_time
-from nlp_gait.gaits.several_steps import walk
+from nlp_gait.formulation.locking import lock_casadi
+from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.robots import Robot
 from nlp_gait.simulation.shapes import Shape, make_shapes
 
@@ -136,7 +136,7 @@ class Plan:
         return make_shapes(self.full_robot, sole, welded=welded)
 
 
-@one_at_a_time
+@lock_casadi
 def make_plan(result: Result, steps: int | None = None) -> Plan:
     """Return the plan of a solved problem.
 
@@ -160,8 +160,8 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
     if model.motion is not None:
         signals = model.motion(at, 1 if steps is None else steps)
     else:
-        signals = finely_sampled(result)
-        signals = signals if steps is None else walk(signals, model.robot, steps)
+        signals = sample_finely(result)
+        signals = signals if steps is None else repeat_steps(signals, model.robot, steps)
     if not all(np.isfinite(array).all() for array in signals.arrays.values()):
         raise InputError(f"the gait of {problem.name!r} has samples that are not finite and cannot be simulated")
     if (duration := float(signals.arrays["t"][-1])) > LONGEST_S:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Columns, Signals, in_space
+from nlp_gait.formulation import Array, Columns, Signals, vector_columns
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
@@ -22,12 +22,12 @@ FALLEN_HEIGHT = (
     0.6  # of the torso's planned height at the start; a robot has fallen if it sinks by the rest below its plan
 )
 COLUMNS = {
-    "torso": in_space("m"),
+    "torso": vector_columns("m"),
     "tilt": Columns(unit="rad"),
     "heading": Columns(unit="rad"),
     "feet": Columns(unit="m", labels=SIDES),
     "loads": Columns(unit="N", labels=SIDES),
-    "pressure": in_space("m", "xy"),
+    "pressure": vector_columns("m", "xy"),
 }
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 

@@ -17,7 +17,7 @@ from compare.study.study import Study, keep_record, record_file, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.tables import write_npz
-from nlp_gait.files import writable_folder, write_json
+from nlp_gait.files import make_writable_folder, write_json
 from nlp_gait.formulation import Signals
 from tests.compare.records import record
 from tests.faults.forgetful_disk import Files, ForgetfulDisk
@@ -34,7 +34,7 @@ def one_file_again_and_again(folder: Path, finished: Finished) -> None:
 
 
 def a_file_in_new_folders(folder: Path, finished: Finished) -> None:
-    inner = writable_folder(folder / "records" / "walk12")
+    inner = make_writable_folder(folder / "records" / "walk12")
     write_json(inner / "pso-0000.json", [1])
     finished(inner / "pso-0000.json")
 
@@ -162,7 +162,7 @@ def test_without_flushes_the_disk_loses_it(
         cut_everywhere(scenario, tmp_path, monkeypatch, flushes=False)
 
 
-# Writers that hold a temporary file of ``new_file``, or write where nothing is kept.
+# Writers that hold a temporary file of ``replace_file``, or write where nothing is kept.
 ALLOWED = {
     "nlp_gait/disk.py",
     "nlp_gait/files.py",

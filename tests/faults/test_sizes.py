@@ -16,7 +16,7 @@ from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.registry import LARGEST_COUNT
 from nlp_gait.formulation.result import load_result
-from nlp_gait.formulation.sampling import LONGEST_S, SHORTEST_S, sampled
+from nlp_gait.formulation.sampling import LONGEST_S, SHORTEST_S, sample_signals
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
@@ -49,7 +49,7 @@ def test_a_gait_without_a_duration_is_not_drawn_played_or_exported(duration_s: f
     result = load_result(path)
     expected = re.escape(f"but it lasts {duration_s:g} s")
     with pytest.raises(InputError, match=rf"for {SHORTEST_S:g} to {LONGEST_S:g} s .* {expected}"):
-        sampled(result, 0.02)
+        sample_signals(result, 0.02)
     for format_, ending in FORMATS.items():
         with pytest.raises(InputError, match="time must run forward"):
             write_as(format_, tmp_path / f"gait{ending}", result, 40)

@@ -15,7 +15,7 @@ from compare.study.task import ProblemSpec, Task
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
-from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
 
@@ -36,14 +36,12 @@ QUICK = ("walk12", "nao-ssp")
 
 
 def defaults(name: str) -> dict[str, Any]:
-    return {
-        option: parameter.default for option, parameter in inspect.signature(problem_maker(name)).parameters.items()
-    }
+    return {option: parameter.default for option, parameter in inspect.signature(find_maker(name)).parameters.items()}
 
 
 def others(name: str) -> dict[str, Any]:
     """A value that is not its default for every option; of a choice, the one after the default."""
-    hints, found = get_type_hints(problem_maker(name)), {}
+    hints, found = get_type_hints(find_maker(name)), {}
     for option, default in defaults(name).items():
         choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
         found[option] = choices[(choices.index(default) + 1) % len(choices)] if choices else OTHER[option]

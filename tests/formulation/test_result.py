@@ -7,7 +7,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import load_result, sampled
+from nlp_gait.formulation import load_result, sample_signals
 
 X = dict(
     zip(
@@ -95,7 +95,7 @@ def test_an_absent_file_is_refused(tmp_path):
 @pytest.mark.parametrize(("period", "samples"), [(0.2, 11), (0.1, 21), (0.15, 21), (10.0, 11)])
 def test_sampling_keeps_the_problems_samples(tmp_path, period, samples):
     result = load_result(written(tmp_path, {"problem": "nao-dsp", "x": X}))
-    signals = sampled(result, period)
+    signals = sample_signals(result, period)
     assert len(signals.arrays["t"]) == samples
     own = result.problem.signals(result.x)
     np.testing.assert_allclose(signals.arrays["q"][:: (samples - 1) // 10], own.arrays["q"], atol=1e-12)
@@ -104,4 +104,4 @@ def test_sampling_keeps_the_problems_samples(tmp_path, period, samples):
 @pytest.mark.parametrize("period", [0.0, -1.0, float("nan")])
 def test_a_period_that_is_not_positive_is_refused(tmp_path, period):
     with pytest.raises(InputError, match="must be > 0 s"):
-        sampled(load_result(written(tmp_path, {"problem": "nao-dsp", "x": X})), period)
+        sample_signals(load_result(written(tmp_path, {"problem": "nao-dsp", "x": X})), period)

@@ -15,7 +15,7 @@ from compare.study.study import Study, keep_record
 from compare.study.task import ProblemSpec, Task
 from nlp_gait.errors import InputError, MissingExtraError, UnknownNameError
 from nlp_gait.formulation import Columns, Signals
-from nlp_gait.formulation.motion.skeleton import Skeleton, Sole, rectangle
+from nlp_gait.formulation.motion.skeleton import Skeleton, Sole, make_rectangle
 from tests.compare.records import record
 
 T = np.array([0.0, 0.5, 1.0])
@@ -86,7 +86,7 @@ def test_records_and_studies_are_one_line_a_table_and_a_frame(tmp_path: Path) ->
 
 def walker(zmp: list[tuple[float, float]], half_width: float = 0.05) -> Skeleton:
     """Two soles of 0.2 m length at x = 0 and x = 1; the first bears load at all times, the second at the first instant only."""
-    corners = np.stack([rectangle(-0.1, 0.1, -half_width, half_width)] * len(zmp))
+    corners = np.stack([make_rectangle(-0.1, 0.1, -half_width, half_width)] * len(zmp))
     always, first = np.ones(len(zmp), bool), np.arange(len(zmp)) == 0
     soles = (
         Sole(side="left", corners=corners, supports=always),

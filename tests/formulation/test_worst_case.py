@@ -8,7 +8,7 @@ from casadi import MX
 from nlp_gait import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem
-from nlp_gait.formulation.worst_case import worst_case
+from nlp_gait.formulation.worst_case import make_worst_case
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, row, toy
 
@@ -24,7 +24,7 @@ def target(at: float, least: float) -> Mathematics:
 
 def test_the_worst_scenario_is_made_as_good_as_can_be() -> None:
     """Between targets at -1 and 1 x is 0; the strictest limit holds in all scenarios."""
-    problem = worst_case([toy(target(-1.0, 0.0)), toy(target(1.0, 0.5)), toy(target(0.5, 0.2))])
+    problem = make_worst_case([toy(target(-1.0, 0.0)), toy(target(1.0, 0.5)), toy(target(0.5, 0.2))])
     found = solve(problem, starts=3)
     assert found.converged
     assert found.x["x"] == pytest.approx(0.0, abs=1e-6)
@@ -35,7 +35,7 @@ def test_the_worst_scenario_is_made_as_good_as_can_be() -> None:
 
 def test_one_scenario_is_the_problem_itself() -> None:
     problem = toy(target(1.0, 0.5))
-    alone, same = solve(worst_case([problem])), solve(problem)
+    alone, same = solve(make_worst_case([problem])), solve(problem)
     assert alone.objective == pytest.approx(same.objective, abs=1e-9)
 
 
@@ -49,4 +49,4 @@ def test_what_is_maximised_or_different_is_refused() -> None:
     ]
     for scenarios, said in refused:
         with pytest.raises(InputError, match=said):
-            worst_case(scenarios)
+            make_worst_case(scenarios)

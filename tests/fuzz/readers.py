@@ -23,7 +23,7 @@ from compare.study.study import Study, check_study
 from nlp_gait.backends.identity import problem_part
 from nlp_gait.errors import InputError
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
-from nlp_gait.files import without_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check_certificate, read_certificate
 from nlp_gait.robots import Robot, load_robot
@@ -78,7 +78,7 @@ def read_a_record(path: Path) -> None:
     record, raw = read_record(path), _plain(path)
     if raw["verdict"]["guaranteed"] is not None:
         raw["verdict"]["guaranteed"] = {**NOTHING_MORE, **raw["verdict"]["guaranteed"]}
-    same(raw, without_nan(record.to_json()), "record")
+    same(raw, replace_nan(record.to_json()), "record")
 
 
 def read_a_manifest(path: Path) -> None:
@@ -154,7 +154,7 @@ def read_mjcf(path: Path) -> None:
 def read_a_certificate(path: Path) -> None:
     """A certificate, read and followed: it says what stands there, and what passes has the incumbent's objective."""
     file, raw = read_certificate(path), _plain(path)
-    same({"schema": 1, **raw}, without_nan(file.to_json()), "certificate")
+    same({"schema": 1, **raw}, replace_nan(file.to_json()), "certificate")
     check_certificate(file, paths=2)
 
 
@@ -166,7 +166,7 @@ def read_a_motion(path: Path) -> None:
         clock, _, *values = line.split(",")
         units = [1, 1000, 60_000]
         same(sum(unit * int(part) for unit, part in zip(units, reversed(clock.split(":")), strict=False)), time, "time")
-        same([None if value == "*" else float(value) for value in values], without_nan(angles), "angles")
+        same([None if value == "*" else float(value) for value in values], replace_nan(angles), "angles")
     again = parse_motion(motion_text(points), "again")
     same((points.joints, points.times_ms), (again.joints, again.times_ms), "written again")
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
 from nlp_gait.export.tables import write_npz
-from nlp_gait.files import new_file, write_text
+from nlp_gait.files import replace_file, write_text
 from nlp_gait.formulation import Signals
 from nlp_gait.simulation.film.video import write_video
 
@@ -62,7 +62,7 @@ def test_the_temporary_file_is_new_and_cannot_be_guessed(tmp_path: Path, monkeyp
     monkeypatch.setattr(os, "open", watched)
     names = set()
     for _ in range(2):
-        with new_file(tmp_path / "a.txt") as temporary:
+        with replace_file(tmp_path / "a.txt") as temporary:
             names.add(temporary.name)
     made = [how for how in flags if how & os.O_CREAT]
     assert len(names) == len(made) == 2 and all(how & os.O_EXCL for how in made)

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, Signals, finely_sampled
+from nlp_gait.formulation import Array, Result, Signals, sample_finely
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
-from nlp_gait.gaits.several_steps import step_of, walk
+from nlp_gait.gaits.several_steps import repeat_steps, step_length
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over
 
@@ -49,7 +49,7 @@ def cycle() -> Result:
 
 @pytest.fixture(scope="module")
 def signals(cycle: Result) -> Signals:
-    return finely_sampled(cycle)
+    return sample_finely(cycle)
 
 
 def jumps(values: Array, slopes: Array, t: Array) -> Array:
@@ -58,7 +58,7 @@ def jumps(values: Array, slopes: Array, t: Array) -> Array:
 
 
 def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
-    arrays = walk(signals, load_nao("nao-v5"), 4).arrays
+    arrays = repeat_steps(signals, load_nao("nao-v5"), 4).arrays
     t = arrays["t"]
     assert (np.diff(t) > 0.0).all()
     assert t[-1] == pytest.approx(4 * signals.arrays["t"][-1])
@@ -68,8 +68,8 @@ def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
 
 
 def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals: Signals) -> None:
-    arrays = walk(signals, load_nao("nao-v5"), 3).arrays
-    n, step = len(signals.arrays["t"]) - 1, step_of(signals)
+    arrays = repeat_steps(signals, load_nao("nao-v5"), 3).arrays
+    n, step = len(signals.arrays["t"]) - 1, step_length(signals)
     assert step == pytest.approx(0.07619)
     np.testing.assert_allclose(arrays["q"][2 * n :], arrays["q"][: n + 1], atol=CONTINUITY)
     np.testing.assert_allclose(arrays["hip"][n : 2 * n + 1, 1], -arrays["hip"][: n + 1, 1], atol=CONTINUITY)
@@ -79,7 +79,7 @@ def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals:
 
 def test_wrenches_carry_the_robot_in_mirrored_steps_too(signals: Signals) -> None:
     """Pinocchio finds nothing left over in either phase of the second and the third step."""
-    walked = walk(signals, load_nao("nao-v5"), 3)
+    walked = repeat_steps(signals, load_nao("nao-v5"), 3)
     n = len(signals.arrays["t"]) - 1
     for sample in (n + n // 4, n + n // 2, 2 * n - n // 8, 2 * n + n // 2, 3 * n - n // 8):
         loads = [walked.arrays[f"{side}_force"][sample, 2] for side in ("left", "right")]
@@ -157,7 +157,7 @@ def test_the_command_says_how_far_it_walked(cycle: Result, tmp_path: Path) -> No
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])
 def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int) -> None:
     with pytest.raises(InputError, match="steps must be a whole number >= 1"):
-        walk(signals, load_nao("nao-v5"), steps)
+        repeat_steps(signals, load_nao("nao-v5"), steps)
 
 
 def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]

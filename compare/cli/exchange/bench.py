@@ -13,7 +13,7 @@ from compare.cli.common import end_interrupted, print_result, print_table, progr
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, parse_names
 from nlp_gait.errors import InputError
-from nlp_gait.files import writable_folder
+from nlp_gait.files import make_writable_folder
 
 
 @command
@@ -65,7 +65,7 @@ def bench(
     if missing:
         stderr.print(f"left out, for no baseline records of them are shipped yet: {', '.join(missing)}", soft_wrap=True)
         chosen = tuple(id for id in chosen if id in known)
-    writable_folder(out)
+    make_writable_folder(out)
     records: list[RunRecord] = []
     name: str | None = None
     if algorithm is not None:

@@ -42,11 +42,11 @@ def import_results(
     from compare.study.imported import imported
     from compare.study.manifest import read_manifest
     from compare.study.study import keep_record, read_records
-    from nlp_gait.files import writable_folder
+    from nlp_gait.files import make_writable_folder
 
     spec = problem.spec()
     records = imported(spec, finals, label, history, evaluations)
-    kept = [keep_record(record, writable_folder(out)) for record in records]
+    kept = [keep_record(record, make_writable_folder(out)) for record in records]
     everything = label_editions(read_records(out))
     written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
     shown = [record for record in everything if record.problem == spec.title]

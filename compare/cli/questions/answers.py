@@ -10,7 +10,7 @@ import typer
 
 from compare.cli.common import end_interrupted, print_result, print_table, say, stdout
 from compare.cli.options import RESULTS, AsJson
-from nlp_gait.files import writable_folder
+from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class Output:
 
     def __post_init__(self) -> None:
         """Refuse a folder that cannot be written to."""
-        writable_folder(self.out)
+        make_writable_folder(self.out)
 
     def take(self, answer: Answer, stopped: str = "", store: Store | None = None) -> None:
         """Write an answer and print it, as one JSON object or in tables and sentences.

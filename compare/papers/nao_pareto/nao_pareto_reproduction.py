@@ -28,7 +28,7 @@ from compare.questions.pareto.study import pareto_study
 from compare.study.store import Computation, Store
 from compare.study.stored_solver import store_runs
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 
 
 def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
@@ -68,7 +68,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
         problem=study.problem,
         criterion=study.criterion,
         first_front=study.front,
-        answer=decoded(Challenge, answer),
+        answer=decode(Challenge, answer),
         runs=runs,
     )
 

@@ -20,7 +20,7 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, finely_sampled
+from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
 from nlp_gait.gaits.nao.recorded import nao_cycles
@@ -170,7 +170,7 @@ def solve_free_height(spec: ProblemSpec, starts: int) -> dict[str, Any]:
         result = Result(problem=problem, x=problem.check_x(solution.x))
         found[name] = {
             "power_W": solution.objective,
-            "hip_m": float(finely_sampled(result).arrays["hip"][:, 2].mean()),
+            "hip_m": float(sample_finely(result).arrays["hip"][:, 2].mean()),
             "knee_deg": compute_knee_deg(result),
         }
     return found
@@ -243,7 +243,7 @@ def plan_own_walk(footsteps: Footsteps) -> Result:
 
 def compute_knee_deg(result: Result) -> float:
     """Return the mean angle of both knees over a step [degrees]."""
-    signals = finely_sampled(result)
+    signals = sample_finely(result)
     t, q = signals.arrays["t"], signals.arrays["q"]
     knees = [column for column, joint in enumerate(signals.joints) if joint.endswith("KneePitch")]
     return math.degrees(float(trapezoid(q[:, knees].mean(axis=1), t) / (t[-1] - t[0])))

@@ -14,7 +14,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.files import without_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -90,4 +90,4 @@ def _batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: i
     for _ in range(count):
         end = solver.run(problem, problem.start_point(rng))
         rows.append([end.x.tolist(), end.objective, bool(end.converged), end.status])
-    return list(without_nan(rows))
+    return list(replace_nan(rows))

@@ -18,9 +18,9 @@ from compare.study.store import Store
 from compare.study.task import plain_problem
 from nlp_gait.backends.identity import fingerprint, sha256_of
 from nlp_gait.backends.kernel.compiled import compile_objective
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import without_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
@@ -181,16 +181,16 @@ def certainty(
         checkpoint = None if store.folder is None else store.folder / name
         limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
         found = certify(problem, x, **limits, progress=progress, checkpoint=checkpoint)
-        return dict(without_nan(asdict(found)))
+        return dict(replace_nan(asdict(found)))
 
     search = certificate = None
     if evaluations:
         inputs = {**identity, "evaluations": evaluations, "seed": seed}
-        search = decoded(LongSearch, compute("cma", inputs, searched))
+        search = decode(LongSearch, compute("cma", inputs, searched))
     if time_limit_s and (len(problem.names) <= MOST_CERTIFIED or has_power_form(problem)):
         limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
         inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
-        certificate = decoded(Certificate, compute("certificate", inputs, proven))
+        certificate = decode(Certificate, compute("certificate", inputs, proven))
     return Certainty(
         problem=problem,
         starts=starts,

@@ -19,7 +19,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.biped.curves import SPANS
 from nlp_gait.gaits.nao.free_joints import fit_joints
@@ -102,7 +102,7 @@ def motions(
         start = None if x0 is None else x0.tolist()
         inputs = {**fingerprint(problem), "task": asdict(task), "seed": seed, "start": start}
         solved = partial(_solved, task, problem, x0, seed, solver)
-        found.append(decoded(Motion, store.compute(f"{task.problem}-{task.label}", inputs, solved, code=CODE)))
+        found.append(decode(Motion, store.compute(f"{task.problem}-{task.label}", inputs, solved, code=CODE)))
         progress(task.label)
     return found
 

@@ -15,7 +15,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.interrupts import Interrupted
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -101,7 +101,7 @@ def motor_variants(
     published = spec.load()
     if "motors" in spec.options:
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
-    if "motors" not in inspect.signature(problem_maker(spec.called)).parameters:
+    if "motors" not in inspect.signature(find_maker(spec.called)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
     store = store or Store()
     store.report_changes("motors", published, starts=starts, seed=seed)

@@ -18,7 +18,7 @@ from compare.study.stored_solver import store_runs
 from compare.study.task import plain_problem
 from metaheuristics.multi_objective import check_budgets, front_algorithm
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
@@ -105,7 +105,7 @@ def pareto_study(
         pareto_front, problem, beside, points=points, starts=starts, seed=seed, solver=solver, progress=progress
     )
     stored = compute(f"front-{name}", inputs, lambda: [asdict(point) for point in solved()])
-    front = [decoded(FrontPoint, point) for point in stored]
+    front = [decode(FrontPoint, point) for point in stored]
     found: list[SearchFront] = []
     outcome = None
     if searches:
@@ -114,7 +114,7 @@ def pareto_study(
         )
         best = best_of_all(found)
         answered = partial(challenge, free, beside, front, best, solver, progress)
-        outcome = decoded(Challenge, compute(f"challenge-{name}", {**inputs, **asked}, lambda: asdict(answered())))
+        outcome = decode(Challenge, compute(f"challenge-{name}", {**inputs, **asked}, lambda: asdict(answered())))
         front = list(outcome.front)
     return ParetoStudy(
         problem=free,

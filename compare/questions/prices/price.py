@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 
 # A variable that moves by less than this share of its range over a natural step stands still.
 STANDS = 1e-9
@@ -71,7 +71,7 @@ class Price:
 
 def price_from(raw: Mapping[str, Any]) -> Price:
     """The price that ``Price.plain`` was asked of."""
-    return decoded(Price, {**raw, "reach": [float(end) for end in raw["reach"]]})
+    return decode(Price, {**raw, "reach": [float(end) for end in raw["reach"]]})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,8 @@ from compare.questions.robust.study import Robust
 from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.decoding import decoded
-from nlp_gait.files import without_nan
+from nlp_gait.decoding import decode
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.simulation.drive import Drive
@@ -60,7 +60,7 @@ def played(
             problem = spec.with_options(robot=robot).load()
             inputs = {**fingerprint(problem), "gait": gait, "x": dict(x)}
             kept = (store or Store()).compute("play-{key}", inputs, partial(_play, problem, robot, gait, x))
-            runs.append(decoded(Played, kept))
+            runs.append(decode(Played, kept))
             progress(f"{gait} gait on {robot[:40]}")
     return tuple(runs)
 
@@ -79,7 +79,7 @@ def _play(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -
         margin_m=lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
         predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
     )
-    return dict(without_nan(asdict(run)))
+    return dict(replace_nan(asdict(run)))
 
 
 def lateral_margin(plan: Plan, y: Array) -> float:

@@ -24,11 +24,11 @@ from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import without_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation.solution import Solution
-from nlp_gait.formulation.worst_case import worst_case
+from nlp_gait.formulation.worst_case import make_worst_case
 from nlp_gait.progress import Progress, ignore_progress
 
 ROUNDS = 8
@@ -114,9 +114,9 @@ def robust(
     asked = {"box": dict(box), "name": name, "starts": starts, "seed": seed, "samples": samples}
 
     def found() -> dict[str, Any]:
-        return dict(without_nan(asdict(_found(spec, name, box, starts, seed, samples, store_runs(store), progress))))
+        return dict(replace_nan(asdict(_found(spec, name, box, starts, seed, samples, store_runs(store), progress))))
 
-    return decoded(Robust, store.compute("box-{key}", {**fingerprint(spec.load()), **asked}, found))
+    return decode(Robust, store.compute("box-{key}", {**fingerprint(spec.load()), **asked}, found))
 
 
 def _found(
@@ -136,7 +136,7 @@ def _found(
             settled = True
             break
         corners += worse
-        found = solve(worst_case([family.problem(corner) for corner in corners]), x0=x, solver=solver)
+        found = solve(make_worst_case([family.problem(corner) for corner in corners]), x0=x, solver=solver)
         _require(found, f"{len(corners)} scenarios together ({name})")
         x = family.nominal.check_x(found.x)
     rng = np.random.default_rng(seed)

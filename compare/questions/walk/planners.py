@@ -18,7 +18,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.formulation.registry import problem_maker
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaits.biped.body import LIFT
 from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
@@ -72,7 +72,7 @@ def checked_planners(names: Sequence[str], problem: GaitProblem) -> tuple[str, .
         if name not in PLANNERS:
             raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
     if CART_TABLE in names:
-        usual = problem_maker(problem.name)().options
+        usual = find_maker(problem.name)().options
         for name, value in problem.options.items():
             if name not in ("objective", *_shared(problem)) and value != usual.get(name):
                 raise InputError(f"the {CART_TABLE} walk is not judged with {name}={value}; leave that option out")

@@ -19,8 +19,8 @@ from compare.questions.walk.planners_report import planners_parts
 from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import ProblemSpec, plain_problem
-from nlp_gait.formulation import GaitProblem, Result, finely_sampled
-from nlp_gait.gaits.several_steps import walk
+from nlp_gait.formulation import GaitProblem, Result, sample_finely
+from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.simulation.measurements import Measurements, Walk
 
 MODEL, ENGINE = "#000000", "#56B4E9"
@@ -208,7 +208,7 @@ def cycle_figure(result: Result) -> Drawing:
     problem = result.problem
     assert problem.display.simulation_model is not None  # a cycle can be played; for the type checker
     robot = problem.display.simulation_model.robot
-    signals = walk(finely_sampled(result), robot, STEPS_SHOWN)
+    signals = repeat_steps(sample_finely(result), robot, STEPS_SHOWN)
     leg = [joint.name for joint in reversed(robot.path_to_root(robot.feet["left"].link))]
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
     durations = [float(result.x[problem.variable_index(name)]) for name in problem.display.durations]

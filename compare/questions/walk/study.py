@@ -11,8 +11,8 @@ from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.decoding import decoded
-from nlp_gait.files import without_nan
+from nlp_gait.decoding import decode
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.biped.cycle import SPEED, SPEED_M_S
 from nlp_gait.interrupts import Interrupted
@@ -120,9 +120,9 @@ def walked(gait: Result, steps: int, drive: Drive, store: Store) -> Walk:
 
     def measured() -> dict[str, Any]:
         plan = make_plan(gait, steps)
-        return dict(without_nan(asdict(measure_walk(plan, simulate_plan(plan, drive=drive), drive, steps))))
+        return dict(replace_nan(asdict(measure_walk(plan, simulate_plan(plan, drive=drive), drive, steps))))
 
-    return decoded(Walk, store.compute("walk-{key}", inputs, measured))
+    return decode(Walk, store.compute("walk-{key}", inputs, measured))
 
 
 def result_of(spec: ProblemSpec, point: SweepPoint) -> Result:

@@ -16,9 +16,9 @@ import numpy as np
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
 from nlp_gait.backends.kernel.evaluators import InterpretedKernel, NativeKernel
 from nlp_gait.backends.kernel.kernel_source import build_kernel
-from nlp_gait.errors import CompilerError, InputError, checked_count, shown
+from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.numbers import real_numbers
+from nlp_gait.formulation.numbers import to_floats
 
 LOG = logging.getLogger("nlp_gait")
 # Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.
@@ -145,7 +145,7 @@ class CompiledObjective:
         """Return X as contiguous, aligned doubles, copied only if necessary."""
         if isinstance(X, Mapping):
             return self.problem.check_x(X)[None]
-        array = np.require(real_numbers(f"X of {self.problem.name}", X), requirements=("C", "A"))
+        array = np.require(to_floats(f"X of {self.problem.name}", X), requirements=("C", "A"))
         if array.ndim != 2 or array.shape[1] != len(self.names):
             raise InputError(
                 f"X of {self.problem.name} must have one candidate per row and {len(self.names)} columns "
@@ -173,16 +173,16 @@ def compile_objective(
         CompilerError: ``require_compiler``, and there is no compiler or it fails.
     """
     if not isinstance(problem, GaitProblem):
-        raise InputError(f"problem must be a problem from load, got {shown(problem)}")
+        raise InputError(f"problem must be a problem from load, got {format_value(problem)}")
     if not isinstance(require_compiler, bool):
-        raise InputError(f"require_compiler must be True or False, got {shown(require_compiler)}")
+        raise InputError(f"require_compiler must be True or False, got {format_value(require_compiler)}")
     if not problem.searchable:
         raise InputError(
             f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can satisfy; use solve"
         )
     if threads is not None:
-        threads = checked_count("threads", threads, at_most=MOST_THREADS)
-    if lanes is not None and checked_count("lanes", lanes) not in LANE_COUNTS:
+        threads = check_count("threads", threads, at_most=MOST_THREADS)
+    if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
         raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
     count = native_lanes() if lanes is None else lanes
     evaluator: NativeKernel | InterpretedKernel

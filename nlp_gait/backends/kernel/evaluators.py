@@ -12,7 +12,7 @@ from nlp_gait.backends.kernel.compiler import BASE_FLAGS, Compiler, lane_flags
 from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, write_kernel_source
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.formulation import Array
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 
 SCALAR_FUNCTIONS = ("-DNO_VECTOR_LIBM",)
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
@@ -95,7 +95,7 @@ class InterpretedKernel:
         self._shape = n, m
         self.description = "interpreted by CasADi's virtual machine"
 
-    @one_at_a_time
+    @lock_casadi
     def __call__(
         self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
     ) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 
 SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
 
@@ -32,7 +32,7 @@ class Kernel:
     weights: Array
     model: ExactModel
 
-    @one_at_a_time
+    @lock_casadi
     def row_bounds(self, problem: GaitProblem) -> tuple[Array, Array]:
         """Return lower and upper bounds (m,) of the rows for the problem's parameter values."""
         lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(problem.p))

@@ -23,7 +23,7 @@ from pathlib import Path
 from nlp_gait.backends.kernel.compiler import Compiler
 from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import CompilerError, warn_once
-from nlp_gait.files import refusing, temporary_folder
+from nlp_gait.files import convert_errors, make_temporary_folder
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
@@ -60,7 +60,7 @@ def load_library(
         loaded = load_checked(library, symbols)
         if loaded is not None:
             return loaded, library
-    with temporary_folder("nlp-gait-build-", CompilerError) as workshop:
+    with make_temporary_folder("nlp-gait-build-", CompilerError) as workshop:
         file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
         try:
             file.write_text(source if write_source is None else write_source(), encoding="utf-8")
@@ -135,7 +135,7 @@ def _find_danger(path: Path, has_type: Callable[[int], bool]) -> str | None:
 @cache
 def private_folder() -> Path:
     """Return a folder that only this process uses, created when it is first needed and removed at the end."""
-    with refusing("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
+    with convert_errors("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
         folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
     atexit.register(_remove_folder, folder, os.getpid())
     return folder

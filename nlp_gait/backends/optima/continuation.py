@@ -10,7 +10,7 @@ from nlp_gait.backends.solve import MOST_STARTS, make_solution
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.starts import run_starts
-from nlp_gait.errors import checked_count
+from nlp_gait.errors import check_count
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome, Solution
 from nlp_gait.interrupts import Interrupted, defer_interrupts, never
@@ -30,7 +30,7 @@ class Continuation:
     """
 
     def __init__(self, *, starts: int = 5, seed: int = 0, solver: Solver | None = None, solves: int = 1) -> None:
-        self._starts = checked_count("starts", starts, at_least=0, at_most=MOST_STARTS)
+        self._starts = check_count("starts", starts, at_least=0, at_most=MOST_STARTS)
         self._seed = seed
         self._solver = solver or IpoptSettings()
         self._solves = solves

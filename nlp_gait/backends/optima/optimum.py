@@ -17,7 +17,7 @@ from nlp_gait.backends.optima.kkt import KktFunctions, build_kkt_functions, colu
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import Guess, Outcome
 
 # IPOPT then distinguishes bounds with and without a price: at kinks of |power| both multipliers are small.
@@ -67,7 +67,7 @@ class Optimum:
         return self.functions.model.point(self.w)
 
     @property
-    @one_at_a_time
+    @lock_casadi
     def objective(self) -> float:
         """Objective in the problem's sense."""
         return self.problem.objective.sign * float(self.functions.values(self.w, self.parameters)[0])
@@ -83,21 +83,21 @@ class Optimum:
         return np.append(self.problem.p, self.width)
 
     @cached_property
-    @one_at_a_time
+    @lock_casadi
     def matrices(self) -> tuple[Array, Array]:
         """Hessian of L and Jacobian of all rows."""
         hessian, jacobian = self.functions.matrices(self.w, self.parameters, self.multipliers)
         return np.array(hessian), np.array(jacobian)
 
     @cached_property
-    @one_at_a_time
+    @lock_casadi
     def rows(self) -> tuple[Array, Array, Array]:
         """Values of all rows with their lower and upper bounds."""
         _, values, lower, upper = (column(part) for part in self.functions.values(self.w, self.parameters))
         return values, lower, upper
 
 
-@one_at_a_time
+@lock_casadi
 def find_optimum(problem: GaitProblem, near: Outcome) -> Optimum:
     """Find the optimum near which a solver ended.
 

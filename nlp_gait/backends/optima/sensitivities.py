@@ -19,7 +19,7 @@ from nlp_gait.backends.optima.kkt import build_kkt_functions, column, solve_kkt
 from nlp_gait.backends.optima.optimum import WEAK, Optimum
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
@@ -55,7 +55,7 @@ class _Change(NamedTuple):
     gradient: Array
 
 
-@one_at_a_time
+@lock_casadi
 def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     """Return derivatives with respect to all parameters of the problem, in their order and units.
 
@@ -68,7 +68,7 @@ def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     return _differentiate(optimum, _Change(cost[0], *others))
 
 
-@one_at_a_time
+@lock_casadi
 def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
     """Return derivatives with respect to the data of the model, for example a robot's masses.
 

@@ -20,7 +20,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.backends.solvers.stages import StagedSolver
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.files import temporary_folder
+from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.interrupts import defer_interrupts, never
@@ -223,7 +223,7 @@ def find_linear_solver(wanted: str | None = None) -> str:
         OutputError: there is no disk space for the log.
     """
     x = ca.MX.sym("x")
-    with temporary_folder("nlp-gait-ipopt-") as folder:
+    with make_temporary_folder("nlp-gait-ipopt-") as folder:
         log = folder / "ipopt.log"
         options: dict[str, Any] = {
             **QUIET,

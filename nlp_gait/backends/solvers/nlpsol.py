@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, Iter
 from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import defer_interrupts, never
 
@@ -82,7 +82,7 @@ class CasadiSolver(Solver):
         """See ``Solver``."""
         return {"kind": self.name}
 
-    @one_at_a_time
+    @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """See ``Solver``.
 

@@ -10,9 +10,9 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decoded
+from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_name, unknown
-from nlp_gait.files import refusing
+from nlp_gait.files import convert_errors
 
 SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
 
@@ -30,8 +30,8 @@ def make_solver(name: str, /, **settings: Any) -> Solver:
             raise InputError(f"{name} has no settings, got {setting!r}")
         if setting not in known:
             raise unknown(f"setting of {name}", setting, known)
-    with refusing(f"setting of {name}", InputError):
-        decoded(SOLVERS[name], settings)
+    with convert_errors(f"setting of {name}", InputError):
+        decode(SOLVERS[name], settings)
     return SOLVERS[name](**settings)
 
 

@@ -14,7 +14,7 @@ from nlp_gait.backends.nlp import WIDTHS, NlpModel
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
 from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.locking import one_at_a_time
+from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 from nlp_gait.interrupts import defer_interrupts, never
 
@@ -58,7 +58,7 @@ class StagedSolver(Solver):
     compiled: bool
     create_s: float
 
-    @one_at_a_time
+    @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """Run all stages from a start point (n,); ``stop`` is called after each iteration."""
         start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
@@ -73,7 +73,7 @@ class StagedSolver(Solver):
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
         return self._run_stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
 
-    @one_at_a_time
+    @lock_casadi
     def _run_stages(
         self,
         problem: GaitProblem,

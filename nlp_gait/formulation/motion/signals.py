@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.notebook import html_table, pandas
+from nlp_gait.notebook import format_html_table, import_pandas
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -30,7 +30,7 @@ class Columns:
     labels: tuple[str, ...] = ("",)
 
 
-def in_space(unit: str, axes: str = "xyz") -> Columns:
+def vector_columns(unit: str, axes: str = "xyz") -> Columns:
     """Columns of a vector along axes of the world."""
     return Columns(unit=unit, labels=tuple(axes))
 
@@ -99,7 +99,7 @@ class Signals:
         """
         columns = {name: (unit, values) for name, unit, values in self.named_columns()}
         unit, t = columns.pop("t")
-        module = pandas()
+        module = import_pandas()
         index = module.Index(t, name=f"t [{unit}]")
         frame = module.DataFrame({name: values for name, (_, values) in columns.items()}, index=index)
         frame.attrs["units"] = {name: unit for name, (unit, _) in columns.items()}
@@ -117,7 +117,7 @@ class Signals:
             for name, unit, labels, table in self._tables()
         ]
         note = f"{len(t)} samples over {t[-1] - t[0]:.4g} s; signals[{rows[0][0]!r}] is an array, signals.to_frame() a data frame"
-        return html_table("Time histories", ("name", "unit", "columns", "of", "range"), rows, note)
+        return format_html_table("Time histories", ("name", "unit", "columns", "of", "range"), rows, note)
 
     def _tables(self) -> Iterator[tuple[str, str, tuple[str, ...], Array]]:
         for name, array in self.arrays.items():

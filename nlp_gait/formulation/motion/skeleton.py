@@ -115,30 +115,30 @@ def _hull(points: Array) -> Array | None:
         return None
 
 
-def on_flat_ground(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
+def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
     """A gait on a floor, with the centre of mass and the zero-moment point of its time histories."""
     arrays = signals.arrays
     return Skeleton(
         t=arrays["t"],
         limbs=tuple(limbs),
         soles=tuple(soles),
-        ground=flat_ground(*(sole.corners for sole in soles)),
+        ground=make_flat_ground(*(sole.corners for sole in soles)),
         com=arrays["com"],
-        zmp=grounded(arrays["zmp"]),
+        zmp=append_zero_height(arrays["zmp"]),
     )
 
 
-def flat_ground(*points: Array) -> Array:
+def make_flat_ground(*points: Array) -> Array:
     """Line (x, z) at height zero below all points (..., 3)."""
     x = np.concatenate([p[..., 0].ravel() for p in points])
     return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
 
 
-def rectangle(back: float, front: float, right: float, left: float) -> Array:
+def make_rectangle(back: float, front: float, right: float, left: float) -> Array:
     """(4, 3) corners at height zero."""
     return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
 
 
-def grounded(zmp: Array) -> Array:
+def append_zero_height(zmp: Array) -> Array:
     """(T, 3) from (T, 2)."""
     return np.column_stack([zmp, np.zeros(len(zmp))])

@@ -19,7 +19,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, finely_sampled
+from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import CLOSURE_M
 from nlp_gait.gaits.biped.preview_control import PREVIEW_S, PreviewController
@@ -192,7 +192,7 @@ def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int
     planned = walker.planned_zmp
     # The robot whose hip is the cart says where its mass is; the cart is then moved there.
     hip = walker.follow(planned, footsteps.hip_height_m)
-    first = finely_sampled(walker.gait(hip)).arrays
+    first = sample_finely(walker.gait(hip)).arrays
     mass = (first["com"] - first["hip"]).mean(axis=0) - np.array(cycles.body.hip_m)
     ahead, _, height = mass + (0.0, 0.0, footsteps.hip_height_m)
     cart = walker.follow(planned, height)
@@ -203,7 +203,7 @@ def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int
 
     gait = walker.gait(path)
     for _ in range(passes - 1):
-        played = finely_sampled(gait).arrays
+        played = sample_finely(gait).arrays
 
         def missed(t: Array, played: Mapping[str, Array] = played) -> Array:
             zmp = np.stack([np.interp(t, played["t"], played["zmp"][:, k]) for k in range(2)])

@@ -14,7 +14,7 @@ from casadi import DM, MX
 
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.formulation.assembly import parameters as table
-from nlp_gait.formulation.blocks import labels
+from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.samples import Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -99,7 +99,7 @@ def rows_at_samples(
         first: number of the first sample.
     """
     numbers = range(first, first + values.shape[1])
-    return rows(name, unit, ca.vec(values), lower, upper, labels(names, numbers), "instant")
+    return rows(name, unit, ca.vec(values), lower, upper, make_labels(names, numbers), "instant")
 
 
 class JointLimits(Limit):
@@ -143,7 +143,7 @@ class Closure(Limit):
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
         miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(LEGS) * (samples.steps + 1))
-        names = labels(LEGS, range(samples.steps + 1))
+        names = make_labels(LEGS, range(samples.steps + 1))
         return [rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant")], {}
 
 
@@ -166,7 +166,7 @@ class DriveLimits(Limit):
         speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in samples.moving])
         strongest, fastest = (MX(ca.repmat(limit, n, 1)) for limit in (effort, speed))
         torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
-        joints, moving = (labels(names, range(n)) for names in (samples.joints, samples.moving))
+        joints, moving = (make_labels(names, range(n)) for names in (samples.joints, samples.moving))
         return (
             rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
             rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
@@ -194,7 +194,7 @@ class TorqueChange(Limit):
         step = samples.per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = at["torque_change_limit_Nm"]
-        names = labels(samples.joints, range(change.shape[1]))
+        names = make_labels(samples.joints, range(change.shape[1]))
         return [rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
             "torque_change_Nm": ca.mmax(ca.fabs(change))
         }

@@ -19,7 +19,7 @@ from casadi import MX, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Point, Start, Variable
 from nlp_gait.formulation.assembly import parameters as table
-from nlp_gait.formulation.blocks import labels
+from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows, rows_at_samples
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
@@ -272,7 +272,7 @@ class FootLimits(Limit):
         total = loads["left"] + loads["right"]
         changes = (total[1:] - total[:-1]) / samples.step_s
         rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}
-        limit, names = at["load_rate_limit_1_s"], labels(tuple(rates), range(n))
+        limit, names = at["load_rate_limit_1_s"], make_labels(tuple(rates), range(n))
         ends = ca.vertcat(loads["right"][0], loads["left"][-1])
         feet = ("right, landed", "left, lifting")
         return (

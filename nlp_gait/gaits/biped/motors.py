@@ -25,7 +25,7 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
-from nlp_gait.formulation.blocks import labels
+from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, Draw
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
 from nlp_gait.gaits.biped.samples import Samples, time_mean
@@ -189,9 +189,9 @@ class MotorLimits(Limit):
         drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
         speed = DM([self._motors.robot.joint(joint).velocity_limit_rad_s for joint in moving])
         fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
-        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, labels(moving, range(n)), "instant")
+        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, make_labels(moving, range(n)), "instant")
         too_weak = [
-            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, labels(names, range(n)), "instant")
+            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, make_labels(names, range(n)), "instant")
             for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))

@@ -22,7 +22,7 @@ from nlp_gait.formulation import (
     RowsOverTime,
     Signals,
     Variable,
-    in_space,
+    vector_columns,
 )
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.gaits.biped.body import Body
@@ -39,11 +39,13 @@ Derivatives = Literal["analytic", "finite-difference"]
 
 # Of the ground on each sole: its force, and its moment about the point under the ankle.
 WRENCHES = {
-    f"{foot}_{half}": in_space(unit) for foot in BOTH_FEET.values() for half, unit in (("force", "N"), ("moment", "Nm"))
+    f"{foot}_{half}": vector_columns(unit)
+    for foot in BOTH_FEET.values()
+    for half, unit in (("force", "N"), ("moment", "Nm"))
 }
 COLUMNS = {
-    "zmp": in_space("m", "xy"),
-    **{name: in_space("m") for name in ("hip", "com", "left_foot", "right_foot")},
+    "zmp": vector_columns("m", "xy"),
+    **{name: vector_columns("m") for name in ("hip", "com", "left_foot", "right_foot")},
     **WRENCHES,
 }
 

@@ -21,7 +21,7 @@ from nlp_gait.formulation import (
     Signals,
     Variable,
 )
-from nlp_gait.formulation.blocks import labels
+from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.recorded_motion import FINE, Motion, instant_function
@@ -190,9 +190,9 @@ class SwingLimits(Limit):
         lift = self._lift.name
         apart = self._inner_edge - ca.vec(sides[1::2, 1:-1])
         return (
-            rows("foot_stands", "m", ca.vec(ends), -tolerance, tolerance, labels(CORNERS, (0, samples.steps))),
-            rows("foot_height", "m", ca.vec(heights[:, 1:-1]), -tolerance, labels=labels(CORNERS, inside)),
-            rows("feet_apart", "m", apart, MX(0.0), labels=labels(CORNERS[1::2], inside)),
+            rows("foot_stands", "m", ca.vec(ends), -tolerance, tolerance, make_labels(CORNERS, (0, samples.steps))),
+            rows("foot_height", "m", ca.vec(heights[:, 1:-1]), -tolerance, labels=make_labels(CORNERS, inside)),
+            rows("feet_apart", "m", apart, MX(0.0), labels=make_labels(CORNERS[1::2], inside)),
             rows("swing_height", "m", highest, at[f"{lift}.lower"], at[f"{lift}.upper"]),
         ), {"swing_height_m": highest}
 
@@ -208,8 +208,8 @@ class StandingLimits(Limit):
         drift = ground - ca.repmat(ca.sum2(ground) / n, 1, n)
         every = range(n)
         return (
-            rows("foot_stands", "m", ca.vec(heights), -tolerance, tolerance, labels(CORNERS, every)),
-            rows("foot_still", "m", ca.vec(drift), -tolerance, tolerance, labels(("x", "y"), every)),
+            rows("foot_stands", "m", ca.vec(heights), -tolerance, tolerance, make_labels(CORNERS, every)),
+            rows("foot_still", "m", ca.vec(drift), -tolerance, tolerance, make_labels(("x", "y"), every)),
         ), {}
 
 

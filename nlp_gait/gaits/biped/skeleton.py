@@ -9,7 +9,16 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, on_flat_ground, rectangle
+from nlp_gait.formulation.motion.skeleton import (
+    LEFT,
+    RIGHT,
+    TRUNK,
+    Limb,
+    Skeleton,
+    Sole,
+    make_flat_skeleton,
+    make_rectangle,
+)
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
@@ -41,13 +50,13 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
             continue
         side = TRUNK if abs(far[1]) < 0.1 * height else LEFT if far[1] > 0 else RIGHT
         limbs.append(Limb(side=side, points=np.stack([at[link] for link in chain], axis=1)))
-    return on_flat_ground(signals, limbs, soles)
+    return make_flat_skeleton(signals, limbs, soles)
 
 
 def level_sole(robot: Robot, side: str, centre: Array) -> Sole:
     """Sole of a foot that stays level, from the point under its ankle (T, 3) [m]; it bears load on the ground alone."""
     foot = robot.feet[side]
-    outline = rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
+    outline = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
     return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
 
 

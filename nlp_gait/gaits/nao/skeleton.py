@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, on_flat_ground
+from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped.skeleton import level_sole
 from nlp_gait.gaits.biped.skeleton import skeleton as any_skeleton
 from nlp_gait.robots import Robot
@@ -42,7 +42,7 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
         sole_centre = arrays[f"{side}_foot"]
         limbs += [Limb(side=side, points=np.stack(part, axis=1)) for part in ([*leg, sole_centre], arm)]
         soles.append(level_sole(robot, side, sole_centre))
-    return on_flat_ground(signals, limbs, soles)
+    return make_flat_skeleton(signals, limbs, soles)
 
 
 def _link_origins(robot: Robot, signals: Signals) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from casadi import SX
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import SIMULATED, Tread
 from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton
-from nlp_gait.gaits.several_steps import walk
+from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs.bodies import JOINTS, joint_angles, joint_torques, rigid_bodies, torso_lean
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, LINKS, MOVING, link_angles, loads, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -93,7 +93,7 @@ def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repea
 
     def motion(at: NumericPoint, steps: int) -> Signals:
         _, rise = _stair(at)
-        return walk(_signals(step_motion(at), rise), rigid_bodies(), steps, rise_m=rise)
+        return repeat_steps(_signals(step_motion(at), rise), rigid_bodies(), steps, rise_m=rise)
 
     def ground(at: NumericPoint, steps: int) -> tuple[Tread, ...]:
         tread, rise = _stair(at)

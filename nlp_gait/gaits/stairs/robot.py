@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from nlp_gait.decoding import read_decoded
+from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import RobotDataError
 from nlp_gait.gaits.stairs.planar_biped import LINKS, Rod
 from nlp_gait.robots.robot import check_numbers
@@ -103,4 +103,4 @@ def toe_foot_biped(path: str = "") -> ToeFootBiped:
     Raises:
         RobotDataError: the file cannot be read, or does not describe such a robot.
     """
-    return read_decoded(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
+    return read_dataclass(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

@@ -9,8 +9,8 @@ from math import inf
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, in_space, parameters
-from nlp_gait.formulation.blocks import labels
+from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, parameters, vector_columns
+from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -42,11 +42,11 @@ COLUMNS = {
     "link_qdd": Columns(unit="rad/s^2", labels=MOVING),
     "power": Columns(unit="W", labels=JOINTS),
     "reach": Columns(unit="1", labels=("swing knee", "stance knee")),
-    "stance_force": in_space("N", "xz"),
-    "stance_pressure": in_space("m", "x"),
-    "zmp": in_space("m", "x"),
-    "hip": in_space("m", "xz"),
-    "ankle": in_space("m", "xz"),
+    "stance_force": vector_columns("N", "xz"),
+    "stance_pressure": vector_columns("m", "x"),
+    "zmp": vector_columns("m", "x"),
+    "hip": vector_columns("m", "xz"),
+    "ankle": vector_columns("m", "xz"),
 }
 
 
@@ -104,7 +104,7 @@ def rows(
     """
     return Constraint(
         name=name,
-        labels=labels(of, columns or range(value.shape[1])),
+        labels=make_labels(of, columns or range(value.shape[1])),
         unit=unit,
         scale=scale,
         value=ca.vec(value),

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, Columns, Signals, in_space
+from nlp_gait.formulation import Array, Columns, Signals, vector_columns
 from nlp_gait.gaits.walk12.model import Zmp, legs, mass_motion, masses, zero_moment_point
 from nlp_gait.gaits.walk12.robot import PointMassBiped
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -26,8 +26,8 @@ JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
 COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
 YAW_COLUMN = {"left": 3, "right": 8}
 COLUMNS_OF = {
-    **{name: in_space("m", "xy") for name in ("zmp", "zmp_foot")},
-    **{name: in_space("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
+    **{name: vector_columns("m", "xy") for name in ("zmp", "zmp_foot")},
+    **{name: vector_columns("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
     "left_stance": Columns(unit="1"),
 }
 MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])

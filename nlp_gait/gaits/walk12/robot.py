@@ -7,7 +7,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from nlp_gait.decoding import read_decoded
+from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import check_numbers
 
@@ -75,4 +75,4 @@ def point_mass_biped(path: str = "") -> PointMassBiped:
     Raises:
         RobotDataError: the file cannot be read, lacks a field or has one too many, or a value is not allowed.
     """
-    return read_decoded(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
+    return read_dataclass(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

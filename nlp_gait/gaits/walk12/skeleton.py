@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, on_flat_ground, rectangle
+from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.gaits.walk12.robot import PointMassBiped
 
 
@@ -23,7 +23,7 @@ def _skeleton(robot: PointMassBiped, signals: Signals, turn: float) -> Skeleton:
     heading = steps * turn
     forward = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
     across = np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=1)
-    outline = rectangle(-robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2)
+    outline = make_rectangle(-robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2)
     limbs, soles = [], []
     for side, sign, stands in ((LEFT, 0.5, left_stands), (RIGHT, -0.5, ~left_stands)):
         hip, ankle = waist + sign * robot.hip_distance_m * across, arrays[f"{side}_ankle"]
@@ -31,7 +31,7 @@ def _skeleton(robot: PointMassBiped, signals: Signals, turn: float) -> Skeleton:
         limbs.append(Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
         corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
         soles.append(Sole(side=side, corners=corners, supports=stands))
-    return on_flat_ground(signals, limbs, soles)
+    return make_flat_skeleton(signals, limbs, soles)
 
 
 def _knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:

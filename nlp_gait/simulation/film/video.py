@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from nlp_gait.errors import InputError, MissingExtraError
-from nlp_gait.files import new_file
+from nlp_gait.files import replace_file
 
 MOST_FRAMES = 3000
 SUFFIXES = (".gif", ".mp4")
@@ -60,7 +60,7 @@ def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> Non
         OutputError: the file cannot be written.
     """
     check_video_path(path)
-    with new_file(path) as temporary:
+    with replace_file(path) as temporary:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frames, frames_per_s)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, Signals, finely_sampled, load
+from nlp_gait.formulation import Array, Result, Signals, load, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.humanoid.body import GRAVITY
@@ -41,7 +41,7 @@ def walk(cycles: RecordedCycles) -> Result:
 
 @pytest.fixture(scope="module")
 def signals(walk: Result) -> Signals:
-    return finely_sampled(walk)
+    return sample_finely(walk)
 
 
 def test_the_cycle_is_one_step_at_a_constant_height_and_continues_mirrored(

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Result, finely_sampled
+from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, Walker, cart_table_walk
 from nlp_gait.gaits.biped.preview_control import JERK_WEIGHT, PreviewController
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
@@ -17,7 +17,7 @@ STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3, lif
 
 
 def histories(gait: Result) -> dict[str, Array]:
-    return dict(finely_sampled(gait).arrays)
+    return dict(sample_finely(gait).arrays)
 
 
 def walker() -> Walker:
