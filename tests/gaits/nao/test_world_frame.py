@@ -9,13 +9,13 @@ from casadi import SX
 
 from nlp_gait.gaits.nao.body import load_nao, upright_plan
 from nlp_gait.gaits.nao.joints import ARM_JOINTS
-from nlp_gait.gaits.nao.least_power.world_frame import leg_rates, world_frame_dynamics
+from nlp_gait.gaits.nao.least_power.world_frame import leg_rates
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion
-from tests.gaits.nao.torque_bounds import enclose_sample, upright_frames
+from tests.gaits.nao.torque_bounds import enclose_sample, upright_frames, world_frame_dynamics
 
 SEED = 11
 GRAVITY = 9.8

@@ -6,12 +6,12 @@ differences of w = v T at both ends, swing height, T.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import DM, SX
 
 import nlp_gait
 from nlp_gait.formulation import InstantPoint
@@ -20,13 +20,13 @@ from nlp_gait.gaits.biped.curves import hip_motion
 from nlp_gait.gaits.biped.single_support import stance_of, swing_foot
 from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, make_nao, upright_links, upright_plan
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS
-from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright, world_frame_dynamics
+from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
 from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
@@ -58,6 +58,79 @@ def upright_frames(
         frames |= {pelvis.child: upright(at_pelvis), **dict(zip(turning, leg, strict=True)), foot: upright(ankle)}
         frames |= chain_frames([robot.joint(f"{side}{name}") for name in ARM_JOINTS], arms, hip)
     return frames
+
+
+def world_frame_dynamics(
+    tree: Sequence[Body],
+    frames: Mapping[str, Frame],
+    qdd: Mapping[str, SX],
+    gravity: float,
+    shares: Mapping[str, SX] | None = None,
+) -> tuple[dict[str, SX], Wrench]:
+    """Compute the joint torques of a tree whose first body stands still, equal to those of ``dynamics.newton_euler``.
+
+    Args:
+        tree: bodies, parents first.
+        frames: of all links by name.
+        qdd: joint accelerations by name, where rotors have inertia [rad/s^2].
+        gravity: magnitude, acting along -z [m/s^2].
+        shares: factors on mass and inertia of links by name.
+
+    Returns:
+        Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (15)-(18): a joint's moment is the sum over the links that it carries.
+    """
+    shares = shares or {}
+    below = _find_carried(tree)
+    centres, forces, spins = [], [], []
+    for body in tree:
+        frame, share = frames[body.link.name], shares.get(body.link.name, 1.0)
+        com, mass = DM(body.link.com_m), body.link.mass_kg
+        centres.append(frame.origin.position + frame.axes.position @ com)
+        acceleration = frame.origin.acceleration + frame.axes.acceleration @ com + SX(DM([0, 0, gravity]))
+        forces.append(share * mass * acceleration)
+        spins.append(share * _spin_rate(frame.axes, body.link.inertia_matrix))
+    references = [_reference(body, frames) for body in tree]
+    torques: dict[str, SX] = {}
+    for i, body in enumerate(tree):
+        if body.joint is None:
+            continue
+        axis = frames[body.link.name].axes.position @ DM(body.joint.axis)
+        torque = SX(0)
+        for k in below[i]:
+            torque += ca.dot(axis, ca.cross(centres[k] - references[i], forces[k]) + spins[k])
+        torques[body.joint.name] = body.direction * torque
+        if body.armature_kgm2:
+            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
+    moments = (ca.cross(c - references[0], f) + s for c, f, s in zip(centres, forces, spins, strict=True))
+    return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
+
+
+def _find_carried(tree: Sequence[Body]) -> list[list[int]]:
+    """Return the bodies that each body carries, itself included."""
+    found: list[list[int]] = [[] for _ in tree]
+    for k in range(len(tree)):
+        at = k
+        while at >= 0:
+            found[at].append(k)
+            at = tree[at].parent
+    return found
+
+
+def _reference(body: Body, frames: Mapping[str, Frame]) -> SX:
+    """Return (3,) the joint through which the tree reaches a body [m]."""
+    frame = frames[body.link.name]
+    offset = np.array(body.link.com_m) - np.array(body.com_offset_m)
+    return frame.origin.position + frame.axes.position @ DM(offset)
+
+
+def _spin_rate(axes: Motion, inertia: Any) -> SX:
+    """Return (3,) the rate of a link's angular momentum about its centre of mass: sum of r x r'' over its matter [Nm]."""
+    second = np.trace(inertia) / 2 * np.eye(3) - inertia
+    bent = axes.acceleration @ DM(second)
+    return sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), SX(3, 1))
 
 
 def enclose_sample(edge: float) -> tuple[Errors, Errors]:

@@ -19,17 +19,16 @@ from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS
 from nlp_gait.gaits.nao.least_power.world_frame import (
-    SplitWrench,
+    Frame,
     chain_frames,
     leg_frames,
     leg_rates,
     link_wrench,
+    move_wrench,
     upright,
-    world_frame_dynamics,
 )
 from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
@@ -37,32 +36,6 @@ from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, r
 # First of each pair of velocities at both ends: z, x, y.
 PAIRS = (1, 3, 5)
 ONE, FORWARD = SX(1), DM([1, 0, 0])
-
-
-@dataclass(kw_only=True)
-class PowerInstant:
-    """One sample.
-
-    Attributes:
-        rate_squared: 1 / T^2 for the time T.
-        torques: by joint, in the time T.
-        rates: of the joints that turn, in unit time.
-        zmp: (2,) [m].
-        reaches: squared distances of hip and ankle by side [m^2].
-        sideways: of the ankle from the hip across and down, by side [m]: their quotient is the tangent of the leg's roll.
-    """
-
-    rate_squared: SX
-    torques: dict[str, SX] = field(default_factory=dict)
-    rates: dict[str, SX] = field(default_factory=dict)
-    zmp: SX = field(default_factory=SX)
-    reaches: dict[str, SX] = field(default_factory=dict)
-    sideways: dict[str, tuple[SX, SX]] = field(default_factory=dict)
-
-    def add_torque(self, name: str, axis: SX | DM, carried: SplitWrench, direction: int) -> None:
-        """Add the torque of a joint from the wrench that it carries, about a point of its axis."""
-        gravity, inertia = (ca.dot(axis, part.moment) for part in carried)
-        self.torques[name] = direction * (gravity + self.rate_squared * inertia)
 
 
 class PowerPhase(NamedTuple):
@@ -79,20 +52,139 @@ class PowerPhase(NamedTuple):
     margins: Mapping[str, Callable[[SX], SX]]
 
 
-def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
-    """Return the distance to the nearer of two sides."""
-    return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
+class LegParts(NamedTuple):
+    """Wrenches of a leg's links, see ``link_wrench``, and positions of its joints.
+
+    Attributes:
+        links: of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the
+            sole and sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight.
+        joints: (3,) yaw-pitch joint, hip, knee and ankle [m].
+        yaw_axis: (3,) axis of the yaw-pitch joint.
+        across: (3,) axis of the pitching joints.
+    """
+
+    links: tuple[SX, ...]
+    joints: tuple[SX, SX, SX, SX]
+    yaw_axis: DM
+    across: SX
 
 
-def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
-    """Return the distance to the side beyond the ankle, see ``NaoBody.sole_margins``."""
-    return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
+@dataclass(kw_only=True)
+class PowerInstant:
+    """One sample.
 
+    Attributes:
+        robot: of the phase.
+        rate_squared: 1 / T^2 for the time T.
+        cosine: largest one of the knee's angle, see ``leg_frames``.
+        torques: by joint, in the time T.
+        rates: of the joints that turn, in unit time.
+        zmp: (2,) [m].
+        reaches: squared distances of hip and ankle by side [m^2].
+        sideways: of the ankle from the hip across and down, by side [m]: their quotient is the tangent of the leg's roll.
+    """
 
-def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
-    s = SX(phase)
-    up = cubic_of_sums(z[0], z[0], z[1], z[2], s)
-    return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
+    robot: Robot
+    rate_squared: SX
+    cosine: float
+    torques: dict[str, SX] = field(default_factory=dict)
+    rates: dict[str, SX] = field(default_factory=dict)
+    zmp: SX = field(default_factory=SX)
+    reaches: dict[str, SX] = field(default_factory=dict)
+    sideways: dict[str, tuple[SX, SX]] = field(default_factory=dict)
+
+    def link_wrench(self, name: str, frame: Frame) -> SX:
+        """Return the wrench (6, 2) of a link about the origin of its frame."""
+        return link_wrench(self.robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
+
+    def add_arm(self, side: str, arms: Mapping[str, Motion], acceleration: SX) -> SX:
+        """Add the torques of an arm; returns its wrench (6, 2) about the torso's origin.
+
+        At one phase the arm's pose consists of numbers, so that everything is linear in the torso's acceleration.
+        """
+        joints, a = [self.robot.joint(f"{side}{name}") for name in ARM_JOINTS], SX.sym("a", 3)
+        frames = chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
+        carried, at, rows = SX(6, 2), SX(3, 1), list[SX]()
+        for joint in reversed(joints):
+            frame = frames[joint.child]
+            carried = move_wrench(carried, at - frame.origin.position) + self.link_wrench(joint.child, frame)
+            at = frame.origin.position
+            rows.append((frame.axes.position @ DM(joint.axis)).T @ carried[3:, :])
+        values = _evaluate_linear(ca.vertcat(*rows, move_wrench(carried, at)), a, acceleration)
+        for i, joint in enumerate(reversed(joints)):
+            self.torques[joint.name] = values[i, 0] + self.rate_squared * values[i, 1]
+            if not arms[joint.name].velocity.is_zero():
+                self.rates[joint.name] = arms[joint.name].velocity
+        return values[len(joints) :, :]
+
+    def add_stance_leg(self, side: str, hip: Motion, ankle: Motion, upper: SX) -> Wrench:
+        """Add the torques of a leg that carries ``upper`` (about the torso's origin); returns the wrench at its ankle."""
+        leg = self._split_leg(side, hip, ankle)
+        yaw, at_hip, at_knee, at_ankle = leg.joints
+        pelvis, hip_link, thigh, tibia, above, sole = leg.links
+        carried = move_wrench(upper, hip.position - yaw)
+        self._add_torque(f"{side}HipYawPitch", leg.yaw_axis, carried, -1)
+        carried = move_wrench(carried + pelvis, yaw - at_hip)
+        self._add_torque(f"{side}HipRoll", FORWARD, carried, -1)
+        carried = carried + hip_link
+        self._add_torque(f"{side}HipPitch", leg.across, carried, -1)
+        carried = carried + thigh
+        self._add_torque(f"{side}KneePitch", leg.across, move_wrench(carried, at_hip - at_knee), -1)
+        carried = move_wrench(carried, at_hip - at_ankle) + tibia
+        self._add_torque(f"{side}AnklePitch", leg.across, carried, -1)
+        carried = carried + above
+        self._add_torque(f"{side}AnkleRoll", FORWARD, carried, -1)
+        ground = carried + sole
+        total = ground[:, 0] + self.rate_squared * ground[:, 1]
+        return Wrench(total[:3], total[3:])
+
+    def add_swing_leg(self, side: str, hip: Motion, ankle: Motion) -> SX:
+        """Add the torques of a hanging leg; returns its wrench (6, 2) about the torso's origin."""
+        leg = self._split_leg(side, hip, ankle)
+        yaw, at_hip, at_knee, at_ankle = leg.joints
+        pelvis, hip_link, thigh, tibia, above, carried = leg.links
+        self._add_torque(f"{side}AnkleRoll", FORWARD, carried, 1)
+        carried = carried + above
+        self._add_torque(f"{side}AnklePitch", leg.across, carried, 1)
+        carried = carried + tibia
+        self._add_torque(f"{side}KneePitch", leg.across, move_wrench(carried, at_ankle - at_knee), 1)
+        carried = move_wrench(carried, at_ankle - at_hip) + thigh
+        self._add_torque(f"{side}HipPitch", leg.across, carried, 1)
+        carried = carried + hip_link
+        self._add_torque(f"{side}HipRoll", FORWARD, carried, 1)
+        carried = move_wrench(carried, at_hip - yaw) + pelvis
+        self._add_torque(f"{side}HipYawPitch", leg.yaw_axis, carried, 1)
+        return move_wrench(carried, yaw - hip.position)
+
+    def _add_torque(self, name: str, axis: SX | DM, carried: SX, direction: int) -> None:
+        gravity, inertia = (ca.dot(axis, part) for part in ca.horzsplit(carried[3:, :]))
+        self.torques[name] = direction * (gravity + self.rate_squared * inertia)
+
+    def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> LegParts:
+        geometry, yaw = leg_geometry(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
+        at_hip = add_motions(hip, resting_point(geometry.hip_m))
+        frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
+        rates = leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        self.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates.joints, strict=True)}
+        self.reaches[side] = rates.distance_squared
+        self.sideways[side] = apart.position[1], -apart.position[2]
+        names = (yaw.child, *(self.robot.joint(f"{side}{name}").child for name in LEG_JOINTS))
+        wrenches = [
+            self.link_wrench(name, frame)
+            for name, frame in zip(names, (upright(hip), *frames, upright(ankle)), strict=True)
+        ]
+        tibia = self.robot.links[names[3]]
+        x, y, z = tibia.com_m
+        from_ankle = replace(tibia, com_m=(x, y, z + geometry.tibia_m))
+        wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
+        joints = (
+            hip.position + DM(yaw.origin_m),
+            at_hip.position,
+            frames.tibia.origin.position,
+            ankle.position,
+        )
+        return LegParts(tuple(wrenches), joints, DM(yaw.axis), frames.hip.axes.position[:, 1])
 
 
 def double_support_instants(
@@ -114,21 +206,18 @@ def double_support_instants(
         cosine: largest one of the knee's angle, see ``leg_frames``.
     """
     ankles = {side: SX(DM([*xy, leg_geometry(robot, side).ankle_height_m])) for side, xy in soles.items()}
-    along, across = hip_ends
     feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
     weight = robot.mass_kg * GRAVITY
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip = _hip(z, along, across, phase)
-        arms = arm_joints(arm_swing, ONE, SX(phase))
-        found = PowerInstant(rate_squared=1 / z[-1] ** 2)
+        hip, arms = _hip(z, *hip_ends, phase), arm_joints(arm_swing, ONE, SX(phase))
+        found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         shares = torso_shares(hip.position[1], rule, feet_y)
-        torso = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
+        torso = found.link_wrench(robot.root, upright(hip))
         moments, loads = [], []
         for side, foot in (("L", robot.feet["left"]), ("R", robot.feet["right"])):
-            upper = _add_arm(robot, side, arms, hip.acceleration, found).plus(torso.times(shares[side]))
-            ankle = Motion(ankles[side], SX(3, 1), SX(3, 1))
-            ground = _add_stance_leg(robot, side, hip, ankle, upper, cosine, found).in_time(found.rate_squared)
+            upper = found.add_arm(side, arms, hip.acceleration) + shares[side] * torso
+            ground = found.add_stance_leg(side, hip, Motion(ankles[side], SX(3, 1), SX(3, 1)), upper)
             load = ground_load(ground, weight)
             moments.append(ankles[side][:2] * load + _tilt(ground, foot.ankle_height_m))
             loads.append(load)
@@ -166,17 +255,15 @@ def single_support_instants(
     support = SX(DM([*support_xy, foot.ankle_height_m]))
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip = _hip(z, hip_x, hip_y, phase)
-        arms = arm_joints(arm_swing, ONE, SX(phase))
-        found = PowerInstant(rate_squared=1 / z[-1] ** 2)
+        hip, arms = _hip(z, hip_x, hip_y, phase), arm_joints(arm_swing, ONE, SX(phase))
+        found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         begin, end = (SX(x) for x in swing_x)
         path = swing_foot(begin, end, swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
-        upper = link_wrench(robot.links[robot.root], upright(hip).axes, hip.acceleration, GRAVITY)
+        upper = found.link_wrench(robot.root, upright(hip))
         for side in "LR":
-            upper = upper.plus(_add_arm(robot, side, arms, hip.acceleration, found))
-        upper = upper.plus(_add_swing_leg(robot, "R", hip, path, cosine, found))
-        ankle = Motion(support, SX(3, 1), SX(3, 1))
-        ground = _add_stance_leg(robot, "L", hip, ankle, upper, cosine, found).in_time(found.rate_squared)
+            upper = upper + found.add_arm(side, arms, hip.acceleration)
+        upper = upper + found.add_swing_leg("R", hip, path)
+        ground = found.add_stance_leg("L", hip, Motion(support, SX(3, 1), SX(3, 1)), upper)
         found.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
         return found
 
@@ -185,33 +272,26 @@ def single_support_instants(
     return PowerPhase(instant, sides, {"x": _ankle_side_margin(x, *sides[0]), "y": _nearer_margin(*sides[1])})
 
 
+def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
+    s = SX(phase)
+    up = cubic_of_sums(z[0], z[0], z[1], z[2], s)
+    return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
+
+
+def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
+    """Return the distance to the nearer of two sides."""
+    return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
+
+
+def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
+    """Return the distance to the side beyond the ankle, see ``NaoBody.sole_margins``."""
+    return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
+
+
 def _tilt(ground: Wrench, height: float) -> SX:
     """Return (2,) the ZMP's offset from a foot times its load [Nm], see ``balance.zmp_of_wrench``."""
     (fx, fy, _), (nx, ny, _) = ca.vertsplit(ground.force), ca.vertsplit(ground.moment)
     return ca.vertcat(-(ny + height * fx), nx - height * fy)
-
-
-def _add_arm(robot: Robot, side: str, arms: Mapping[str, Motion], acceleration: SX, found: PowerInstant) -> SplitWrench:
-    """Add the torques of an arm; returns its wrench about the torso's origin.
-
-    At one phase the arm's pose consists of numbers, so that everything is linear in the torso's acceleration.
-    """
-    joints, a = [f"{side}{name}" for name in ARM_JOINTS], SX.sym("a", 3)
-    base = Motion(SX(3, 1), SX(3, 1), a)
-    frames = chain_frames([robot.joint(name) for name in joints], arms, base) | {robot.root: upright(base)}
-    tree = tree_from(robot, robot.root, joints)
-    without_torso = {robot.root: SX(0)}
-    moved, all_moved = world_frame_dynamics(tree, frames, {}, 0.0, without_torso)
-    both, all_both = world_frame_dynamics(tree, frames, {}, GRAVITY, without_torso)
-    parts = ([moved[name] for name in joints], all_moved), ([both[name] for name in joints], all_both)
-    columns = ca.horzcat(*(ca.vertcat(*torques, *wrench) for torques, wrench in parts))
-    still, moving = (_evaluate_linear(part, a, acceleration) for part in (columns[:, 1] - columns[:, 0], columns[:, 0]))
-    for i, name in enumerate(joints):
-        found.torques[name] = still[i] + found.rate_squared * moving[i]
-        if not arms[name].velocity.is_zero():
-            found.rates[name] = arms[name].velocity
-    n = len(joints)
-    return SplitWrench(*(Wrench(part[n : n + 3], part[n + 3 :]) for part in (still, moving)))
 
 
 def _evaluate_linear(expression: SX, symbol: SX, value: SX) -> SX:
@@ -219,88 +299,5 @@ def _evaluate_linear(expression: SX, symbol: SX, value: SX) -> SX:
     slopes = ca.jacobian(expression, symbol)
     at_zero = ca.substitute(expression, symbol, SX.zeros(*symbol.shape))
     constant, slope = ca.Function("coefficients", [], [at_zero, slopes]).call([])
-    return SX(DM(constant)) + SX(ca.sparsify(DM(slope))) @ value
-
-
-class LegParts(NamedTuple):
-    """Wrenches of a leg's links, and positions of its joints.
-
-    Attributes:
-        links: of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the
-            sole and sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight.
-        joints: (3,) hip, knee and ankle [m].
-        yaw: (3,) the hip's yaw-pitch joint [m].
-        across: (3,) axis of the pitching joints.
-    """
-
-    links: tuple[SplitWrench, ...]
-    joints: tuple[SX, SX, SX]
-    yaw: SX
-    across: SX
-
-
-def _split_leg(robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant) -> LegParts:
-    geometry, yaw = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
-    at_hip = add_motions(hip, resting_point(geometry.hip_m))
-    frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, cosine)
-    apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
-    rates = leg_rates(apart, geometry.thigh_m, geometry.tibia_m, cosine)
-    found.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates.joints, strict=True)}
-    found.reaches[side] = rates.distance_squared
-    found.sideways[side] = apart.position[1], -apart.position[2]
-    sole = next(foot.link for foot in robot.feet.values() if foot.link == robot.joint(f"{side}AnkleRoll").child)
-    names = (yaw.child, *(robot.joint(f"{side}{name}").child for name in LEG_JOINTS[:4]), sole)
-    turned = (upright(hip), *frames, upright(ankle))
-    wrenches = [
-        link_wrench(robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
-        for name, frame in zip(names, turned, strict=True)
-    ]
-    tibia = robot.links[names[3]]
-    x, y, z = tibia.com_m
-    from_ankle = replace(tibia, com_m=(x, y, z + geometry.tibia_m))
-    wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
-    joints = (at_hip.position, frames.tibia.origin.position, ankle.position)
-    return LegParts(tuple(wrenches), joints, hip.position + DM(yaw.origin_m), frames.hip.axes.position[:, 1])
-
-
-def _add_stance_leg(
-    robot: Robot, side: str, hip: Motion, ankle: Motion, upper: SplitWrench, cosine: float, found: PowerInstant
-) -> SplitWrench:
-    """Add the torques of a leg that carries ``upper`` (about the torso's origin); returns the ground's wrench about its ankle."""
-    leg = _split_leg(robot, side, hip, ankle, cosine, found)
-    at_hip, at_knee, at_ankle = leg.joints
-    pelvis, hip_link, thigh, tibia, above, sole = leg.links
-    carried = upper.about(hip.position - leg.yaw)
-    found.add_torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, -1)
-    carried = carried.plus(pelvis).about(leg.yaw - at_hip)
-    found.add_torque(f"{side}HipRoll", FORWARD, carried, -1)
-    carried = carried.plus(hip_link)
-    found.add_torque(f"{side}HipPitch", leg.across, carried, -1)
-    carried = carried.plus(thigh)
-    found.add_torque(f"{side}KneePitch", leg.across, carried.about(at_hip - at_knee), -1)
-    carried = carried.about(at_hip - at_ankle).plus(tibia)
-    found.add_torque(f"{side}AnklePitch", leg.across, carried, -1)
-    carried = carried.plus(above)
-    found.add_torque(f"{side}AnkleRoll", FORWARD, carried, -1)
-    return carried.plus(sole)
-
-
-def _add_swing_leg(
-    robot: Robot, side: str, hip: Motion, ankle: Motion, cosine: float, found: PowerInstant
-) -> SplitWrench:
-    """Add the torques of a hanging leg; returns its wrench about the torso's origin."""
-    leg = _split_leg(robot, side, hip, ankle, cosine, found)
-    at_hip, at_knee, at_ankle = leg.joints
-    pelvis, hip_link, thigh, tibia, above, carried = leg.links
-    found.add_torque(f"{side}AnkleRoll", FORWARD, carried, 1)
-    carried = carried.plus(above)
-    found.add_torque(f"{side}AnklePitch", leg.across, carried, 1)
-    carried = carried.plus(tibia)
-    found.add_torque(f"{side}KneePitch", leg.across, carried.about(at_ankle - at_knee), 1)
-    carried = carried.about(at_ankle - at_hip).plus(thigh)
-    found.add_torque(f"{side}HipPitch", leg.across, carried, 1)
-    carried = carried.plus(hip_link)
-    found.add_torque(f"{side}HipRoll", FORWARD, carried, 1)
-    carried = carried.about(at_hip - leg.yaw).plus(pelvis)
-    found.add_torque(f"{side}HipYawPitch", DM(robot.joint(f"{side}HipYawPitch").axis), carried, 1)
-    return carried.about(leg.yaw - hip.position)
+    linear = SX(ca.sparsify(DM(slope))) @ value
+    return SX(DM(constant)) + ca.reshape(linear, *expression.shape)

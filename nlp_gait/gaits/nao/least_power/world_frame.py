@@ -8,15 +8,13 @@ of hip and ankle, without an angle.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.robot import Joint, Link
-from nlp_gait.robots.tree import Body
-from nlp_gait.symbolic.dynamics import Wrench
 from nlp_gait.symbolic.inverse_kinematics import knee_cosine
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, map_motion
@@ -118,82 +116,17 @@ def upright(origin: Motion) -> Frame:
     return Frame(Motion(SX.eye(3), SX(3, 3), SX(3, 3)), origin)
 
 
-def world_frame_dynamics(
-    tree: Sequence[Body],
-    frames: Mapping[str, Frame],
-    qdd: Mapping[str, SX],
-    gravity: float,
-    shares: Mapping[str, SX] | None = None,
-) -> tuple[dict[str, SX], Wrench]:
-    """Compute the joint torques of a tree whose first body stands still, equal to those of ``dynamics.newton_euler``.
-
-    Args:
-        tree: bodies, parents first.
-        frames: of all links by name.
-        qdd: joint accelerations by name, where rotors have inertia [rad/s^2].
-        gravity: magnitude, acting along -z [m/s^2].
-        shares: factors on mass and inertia of links by name.
-
-    Returns:
-        Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), eqs. (15)-(18): a joint's moment is the sum over the links that it carries.
-    """
-    shares = shares or {}
-    below = _find_carried(tree)
-    centres, forces, spins = [], [], []
-    for body in tree:
-        frame, share = frames[body.link.name], shares.get(body.link.name, 1.0)
-        com, mass = DM(body.link.com_m), body.link.mass_kg
-        centres.append(frame.origin.position + frame.axes.position @ com)
-        acceleration = frame.origin.acceleration + frame.axes.acceleration @ com + SX(DM([0, 0, gravity]))
-        forces.append(share * mass * acceleration)
-        spins.append(share * _spin_rate(frame.axes, body.link.inertia_matrix))
-    references = [_reference(body, frames) for body in tree]
-    torques: dict[str, SX] = {}
-    for i, body in enumerate(tree):
-        if body.joint is None:
-            continue
-        axis = frames[body.link.name].axes.position @ DM(body.joint.axis)
-        torque = SX(0)
-        for k in below[i]:
-            torque += ca.dot(axis, ca.cross(centres[k] - references[i], forces[k]) + spins[k])
-        torques[body.joint.name] = body.direction * torque
-        if body.armature_kgm2:
-            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
-    moments = (ca.cross(c - references[0], f) + s for c, f, s in zip(centres, forces, spins, strict=True))
-    return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
+def move_wrench(wrench: SX, arm: SX) -> SX:
+    """Return wrenches (6, k) about another point, from which ``arm`` (3,) leads to theirs [m]."""
+    force = wrench[:3, :]
+    moved = (m + ca.cross(arm, f) for m, f in zip(ca.horzsplit(wrench[3:, :]), ca.horzsplit(force), strict=True))
+    return ca.vertcat(force, ca.horzcat(*moved))
 
 
-class SplitWrench(NamedTuple):
-    """Wrench that moves a body, about one point: of gravity, and of its motion in unit time.
+def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> SX:
+    """Return the wrench (6, 2) that moves a link, about the origin of its frame: of gravity, and of its motion in unit time.
 
-    In a time T, the second one is divided by T^2.
-    """
-
-    gravity: Wrench
-    inertia: Wrench
-
-    def plus(self, other: SplitWrench) -> SplitWrench:
-        """Return the sum of two about one point."""
-        return SplitWrench(*(Wrench(a.force + b.force, a.moment + b.moment) for a, b in zip(self, other, strict=True)))
-
-    def times(self, share: SX) -> SplitWrench:
-        """Return a share of it."""
-        return SplitWrench(*(Wrench(share * part.force, share * part.moment) for part in self))
-
-    def about(self, arm: SX) -> SplitWrench:
-        """Return the wrench about another point, from which ``arm`` (3,) leads to this one's [m]."""
-        return SplitWrench(*(Wrench(part.force, part.moment + ca.cross(arm, part.force)) for part in self))
-
-    def in_time(self, rate_squared: SX) -> Wrench:
-        """Return the total wrench of a motion that takes 1 / sqrt(rate_squared)."""
-        return Wrench(*(g + rate_squared * i for g, i in zip(*self, strict=True)))
-
-
-def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> SplitWrench:
-    """Return the wrench that moves a link, about the origin of its frame.
+    In a time T, the second one is divided by T^2. A wrench is a force [N] above a moment [Nm].
 
     Args:
         link: its mass and inertia.
@@ -209,8 +142,8 @@ def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> S
     arm, bent = axes.position @ DM(mass * com), axes.acceleration @ DM(second)
     force = mass * acceleration + axes.acceleration @ DM(mass * com)
     moment = sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), ca.cross(arm, acceleration))
-    weight = Wrench(SX(DM([0, 0, mass * gravity])), ca.vertcat(gravity * arm[1], -gravity * arm[0], 0))
-    return SplitWrench(weight, Wrench(force, moment))
+    weight = ca.vertcat(0, 0, mass * gravity, gravity * arm[1], -gravity * arm[0], 0)
+    return ca.horzcat(weight, ca.vertcat(force, moment))
 
 
 class LegRates(NamedTuple):
@@ -243,28 +176,3 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
     turn, offset = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
     return LegRates((roll, turn - (0.5 - offset) * knee, knee, -turn - (0.5 + offset) * knee, -roll), distance_squared)
-
-
-def _find_carried(tree: Sequence[Body]) -> list[list[int]]:
-    """Return the bodies that each body carries, itself included."""
-    found: list[list[int]] = [[] for _ in tree]
-    for k in range(len(tree)):
-        at = k
-        while at >= 0:
-            found[at].append(k)
-            at = tree[at].parent
-    return found
-
-
-def _reference(body: Body, frames: Mapping[str, Frame]) -> SX:
-    """Return (3,) the joint through which the tree reaches a body [m]."""
-    frame = frames[body.link.name]
-    offset = np.array(body.link.com_m) - np.array(body.com_offset_m)
-    return frame.origin.position + frame.axes.position @ DM(offset)
-
-
-def _spin_rate(axes: Motion, inertia: Any) -> SX:
-    """Return (3,) the rate of a link's angular momentum about its centre of mass: sum of r x r'' over its matter [Nm]."""
-    second = np.trace(inertia) / 2 * np.eye(3) - inertia
-    bent = axes.acceleration @ DM(second)
-    return sum((ca.cross(axes.position[:, j], bent[:, j]) for j in range(3)), SX(3, 1))
