@@ -9,7 +9,7 @@ from typing import Any
 
 from compare.study.definition import edition, group_of
 from compare.study.record import RunRecord
-from nlp_gait.backends.identity import sha256_of
+from nlp_gait.backends.identity import hash_json
 
 # An edition's name is a label, so that files can be named after it.
 NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
@@ -36,7 +36,7 @@ def _name(
     label: str, definition: Mapping[str, Any], first: dict[str, dict[str, Any]], named: dict[tuple[str, str], str]
 ) -> str:
     """Return a label with the differences from the first definition of that label."""
-    key = label, sha256_of(definition)
+    key = label, hash_json(definition)
     if key not in named:
         name = label
         if label in first:

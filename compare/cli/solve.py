@@ -24,7 +24,7 @@ from compare.cli.common import (
 )
 from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
-from nlp_gait.backends.identity import problem_part
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.proofs.certificate import proven_bound
 
@@ -76,7 +76,7 @@ def solve(
             )
         )
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
-    definition = problem_part(loaded)
+    definition = identify_problem(loaded)
     data = {
         **solution.to_json(),
         "guaranteed": None if proven is None else asdict(proven),

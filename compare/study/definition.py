@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.backends.identity import FORMULAS, HASH, SOURCE, sha256_of
+from nlp_gait.backends.identity import FORMULAS, HASH, SOURCE, hash_json
 from nlp_gait.robots.loading import is_robot_file
 from nlp_gait.user_code import hash_file, shorten_name
 
@@ -46,7 +46,7 @@ def source_of(algorithm: object) -> str | None:
 
 def key_of(definition: Mapping[str, Any]) -> str:
     """Hash of a definition without what says only where something lies."""
-    return sha256_of(_content(definition))
+    return hash_json(_content(definition))
 
 
 def group_of(definition: Mapping[str, Any]) -> dict[str, Any]:

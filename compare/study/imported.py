@@ -14,7 +14,7 @@ from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.study import RECORDS, read_records
 from compare.study.task import LABEL, ProblemSpec
-from nlp_gait.backends.identity import problem_part, sha256_of
+from nlp_gait.backends.identity import hash_json, identify_problem
 from nlp_gait.columns import Table, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -80,7 +80,7 @@ def imported(
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run stands twice")
     known = {} if histories is None else _histories(histories, runs)
-    part, objective = problem_part(problem), asdict(problem.objective)
+    part, objective = identify_problem(problem), asdict(problem.objective)
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
@@ -115,7 +115,7 @@ def imported(
                             "solver": label,
                             "settings": {},
                             "seed": seed,
-                            "imported": {"sha256": sha256_of(content)},
+                            "imported": {"sha256": hash_json(content)},
                         }
                     )
                 ),

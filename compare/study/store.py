@@ -19,7 +19,7 @@ import numpy as np
 
 from compare.study.definition import input_differences
 from compare.study.workers import side_by_side
-from nlp_gait.backends.identity import fingerprint, sha256_of
+from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import make_writable_folder, read_bytes, read_json, remove_leftovers, replace_file, write_json
@@ -113,7 +113,7 @@ class Store:
             OutputError: a result cannot be stored, and the store has no ``report``.
             ValueError: a result is no plain data, or not finite.
         """
-        source = {CODE: sha256_of([inspect.getsource(module) for module in code])} if code else {}
+        source = {CODE: hash_json([inspect.getsource(module) for module in code])} if code else {}
         inputs = {computation.name: {**computation.inputs, **source} for computation in computations}
         values: dict[str, Any] = dict.fromkeys(inputs)
         waiting: dict[str, Callable[[], Any]] = {}
@@ -154,8 +154,8 @@ class Store:
             return None
         if not isinstance(content, dict) or not content.keys() >= {"inputs", "result", "sha256", "result_sha256"}:
             return None
-        intact = content["result_sha256"] == sha256_of([content["result"], content["inputs"]])
-        fits = inputs is None or content["sha256"] == sha256_of(inputs)
+        intact = content["result_sha256"] == hash_json([content["result"], content["inputs"]])
+        fits = inputs is None or content["sha256"] == hash_json(inputs)
         return Result(content["result"], content["inputs"]) if intact and fits else None
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
@@ -165,7 +165,7 @@ class Store:
             OutputError, ValueError: see ``compute_all``.
         """
         value, inputs = as_json(value), as_json(inputs)
-        hashes = {"sha256": sha256_of(inputs), "result_sha256": sha256_of([value, inputs])}
+        hashes = {"sha256": hash_json(inputs), "result_sha256": hash_json([value, inputs])}
         with self._writing(name, inputs, ".json") as path:
             if path is not None:
                 write_json(path, {"inputs": inputs, "result": value, **hashes})
@@ -225,7 +225,7 @@ class Store:
     def _path(self, name: str, inputs: Mapping[str, Any] | None, suffix: str) -> Path | None:
         if self.folder is None:
             return None
-        return self.folder / f"{name.replace(KEY, sha256_of(inputs)[:KEY_DIGITS])}{suffix}"
+        return self.folder / f"{name.replace(KEY, hash_json(inputs)[:KEY_DIGITS])}{suffix}"
 
     @contextmanager
     def _writing(self, name: str, inputs: Mapping[str, Any], suffix: str) -> Iterator[Path | None]:

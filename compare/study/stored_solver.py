@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from compare.study.store import Store
-from nlp_gait.backends.identity import fingerprint, sha256_of
+from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.solvers import ipopt, stages
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -66,7 +66,7 @@ class _StoredSolver(Solver):
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         start = {
             "x0": _numbers(near.x),
-            "guess_sha256": None if near.guess is None else sha256_of(plain_outcome(near.guess)),
+            "guess_sha256": None if near.guess is None else hash_json(plain_outcome(near.guess)),
         }
         return self._load_or_run(problem, start, stop, lambda ready: ready.run_from(problem, near, stop))
 

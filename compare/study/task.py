@@ -17,7 +17,7 @@ from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
 from metaheuristics.user_algorithm import PlainFunction, as_algorithm
-from nlp_gait.backends.identity import SOURCE, problem_part, sha256_of
+from nlp_gait.backends.identity import SOURCE, hash_json, identify_problem
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
@@ -180,7 +180,7 @@ class Task:
         """All that the result depends on, as JSON gives it back; equal definitions have equal results."""
         problem = self.problem.load()
         parts: dict[str, Any] = {
-            "problem": problem_part(problem),
+            "problem": identify_problem(problem),
             "objective": asdict(problem.objective),
             "solver": self._solver_part(),
             "settings": dict(self.settings),
@@ -197,7 +197,7 @@ class Task:
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
             if self.polished is not None:
-                parts["polishes"]["key"] = sha256_of(group_of(self.polished.definition()))
+                parts["polishes"]["key"] = hash_json(group_of(self.polished.definition()))
         try:
             return json.loads(json.dumps(parts, allow_nan=False))
         except (TypeError, ValueError) as error:

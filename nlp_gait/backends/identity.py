@@ -13,13 +13,13 @@ from nlp_gait.user_code import hash_source
 HASH, SOURCE, FORMULAS = "sha256", "source_sha256", "mathematics_sha256"
 
 
-def sha256_of(data: Any, code: str = "") -> str:
-    """Hash of plain data, and of the text of the code that takes it."""
+def hash_json(data: Any, code: str = "") -> str:
+    """Return a hash of plain data, and of the text of the code that uses it."""
     return hashlib.sha256((json.dumps(data, sort_keys=True) + code).encode()).hexdigest()
 
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
-    """What identifies a problem's mathematics and its parameter values: every number of a robot is in one of both."""
+    """Identify a problem's mathematics and parameter values; every number of a robot is part of one of them."""
     return {
         "problem": problem.address,
         "options": dict(problem.options),
@@ -32,15 +32,14 @@ def _hash_mathematics(problem: GaitProblem) -> str:
     return hashlib.sha256(build_exact_model(problem).function.serialize().encode()).hexdigest()
 
 
-def problem_part(problem: GaitProblem) -> dict[str, Any]:
-    """A problem in a definition: how to make it again, and the hash of what was made."""
-    found = fingerprint(problem)
-    content = [found[FORMULAS], found["parameters"], problem.names]
+def identify_problem(problem: GaitProblem) -> dict[str, Any]:
+    """Return the problem's part of a definition: how to load it, and a hash of its content."""
+    content = [problem.build_once(_hash_mathematics), problem.p.tolist(), problem.names]
     part = {
-        "name": found["problem"],
-        "options": found["options"],
+        "name": problem.address,
+        "options": dict(problem.options),
         "parameters": dict(problem.values),
-        HASH: sha256_of(content),
+        HASH: hash_json(content),
     }
     if problem.loaded_as:
         part[SOURCE] = hash_source(problem.loaded_as, "problem")

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import fingerprint, sha256_of
+from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array, GaitProblem
@@ -117,7 +117,7 @@ def certify(
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
     bounds, target = make_bounds(problem), target_cost(at.cost, tolerance)
-    identity = sha256_of(
+    identity = hash_json(
         {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()}
     )
     tree = _read_checkpoint(checkpoint, identity) or _plant(bounds, target)

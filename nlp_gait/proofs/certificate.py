@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, problem_part, sha256_of
+from nlp_gait.backends.identity import HASH, hash_json, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json
@@ -78,7 +78,7 @@ class Check:
 
 def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:
     """Return the certificate of a problem with its problem and code."""
-    return CertificateFile(problem=problem_part(problem), code_sha256=hash_code(problem), certificate=certificate)
+    return CertificateFile(problem=identify_problem(problem), code_sha256=hash_code(problem), certificate=certificate)
 
 
 def read_certificate(path: Path) -> CertificateFile:
@@ -175,7 +175,7 @@ def _load_problem(description: Mapping[str, Any]) -> GaitProblem:
         stored = decode(StoredProblem, description, "problem")
         name = resolve_code(stored.name, "problem", "the certificate")
         problem = load(name, **stored.options).with_values(**stored.parameters)
-    if problem_part(problem) != dict(description):
+    if identify_problem(problem) != dict(description):
         raise InputError(
             f"problem {problem.name!r} has changed since the certificate was made; rerun `nlp-gait certainty` on it"
         )
@@ -189,4 +189,4 @@ def hash_code(problem: GaitProblem) -> str:
     if has_power_form(problem):
         assert problem.power_form is not None  # for the type checker
         sources += sorted(Path(inspect.getfile(problem.power_form)).parent.glob("*.py"))
-    return sha256_of([path.read_text(encoding="utf-8") for path in sources])
+    return hash_json([path.read_text(encoding="utf-8") for path in sources])

@@ -1,4 +1,4 @@
-"""Zero-moment point, and what a sole on the ground can bear."""
+"""Zero-moment point, and the limits of the wrench between a sole and the ground."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ from casadi import DM, SX
 
 from nlp_gait.symbolic.dynamics import Wrench
 
-# In free fall there is no ZMP. Below this share of the weight the ground force is taken as this share: the ZMP is then
-# far outside any sole, and finite.
+# In free fall there is no ZMP. The ground force is at least this share of the weight: the ZMP is then far outside any sole, and
+# finite.
 LEAST_LOAD = 1e-3
 # Static friction that is commonly required of a walkway (UL 410); rubber on a dry floor has more.
 SOLE_FRICTION = 0.5
 
 
 def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
-    """Point on flat ground about which the ground's moment on the robot has no horizontal part.
-
-    Includes the rate of angular momentum of every body.
+    """Return the point on flat ground about which the moment of the ground on the robot has no horizontal component.
 
     Args:
         wrench: of the ground on the robot, about a point ``height`` above the ground.
@@ -40,29 +38,29 @@ def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
 
 
 def ground_load(wrench: Wrench, weight: float) -> SX:
-    """Vertical force of the ground [N], at least ``LEAST_LOAD`` of the robot's weight [N]."""
+    """Return the vertical force of the ground [N], at least ``LEAST_LOAD`` of the robot's weight [N]."""
     return ca.fmax(wrench.force[2], LEAST_LOAD * weight)
 
 
-def below(wrench: Wrench, height: float) -> SX:
-    """A wrench (6,) about the point that lies a height [m] below its own point [N, Nm]."""
+def shift_down(wrench: Wrench, height: float) -> SX:
+    """Return the wrench (6,) about the point a height [m] below its reference point [N, Nm]."""
     return ca.vertcat(wrench.force, wrench.moment + ca.cross(SX(DM([0.0, 0.0, height])), wrench.force))
 
 
-def above(wrench: SX, height: float) -> Wrench:
-    """A wrench (6,) as one about the point that lies a height [m] above its own point."""
+def shift_up(wrench: SX, height: float) -> Wrench:
+    """Return a wrench (6,) about the point a height [m] above its reference point."""
     force, moment = ca.vertsplit(wrench, 3)
     return Wrench(force, moment - ca.cross(SX(DM([0.0, 0.0, height])), force))
 
 
 def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, float], friction: SX) -> tuple[SX, SX, SX]:
-    """What must not be negative for flat ground to give a wrench to a rectangular sole by pushing and rubbing alone.
+    """Return what must not be negative for flat ground to exert a wrench on a rectangular sole by pressure and friction.
 
-    Linear in the wrench; all of them together also say that the ground does not pull. Friction has the pyramid inside its cone,
-    with sides along and across.
+    All are linear in the wrench; together they also imply that the ground does not pull. The friction cone is replaced by the
+    pyramid inside it, with sides along and across.
 
     Args:
-        wrench: (6,) of the ground on the sole, about a point of it [N, Nm].
+        wrench: (6,) of the ground on the sole, about a point of the sole [N, Nm].
         along: from that point to the back and the front edge [m], the back edge negative.
         across: to the right and the left edge [m], the right edge negative.
         friction: coefficient of Coulomb's friction.
@@ -91,7 +89,7 @@ def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, flo
 
 
 def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
-    """ZMP of several feet on one flat ground.
+    """Return the ZMP of several feet on the same flat ground.
 
     Args:
         zmps: (2,) of each foot in the world [m].
@@ -108,15 +106,15 @@ def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
 
 
 def zmp_of_point_masses(masses: DM, p: SX, a: SX, gravity: float, *, static_load: bool = False) -> SX:
-    """Zero-moment point of point masses on flat ground at height zero.
+    """Return the zero-moment point of point masses on flat ground at height zero.
 
     Args:
         masses: (N,) [kg].
         p: (3, N) positions [m], z up.
         a: (3, N) accelerations [m/s^2], gravity excluded.
         gravity: g [m/s^2].
-        static_load: take the weight as the ground's load, as eq. (14) does. The moment of gravity and inertia about that point
-            vanishes only where the centre of mass has no vertical acceleration.
+        static_load: use the weight as the load of the ground, as eq. (14) does. The moment of gravity and inertia about that
+            point vanishes only if the centre of mass has no vertical acceleration.
 
     Returns:
         (2,) ZMP [m].

@@ -1,4 +1,4 @@
-"""Quantised dynamics with spring-damper contacts and Coulomb friction, linearly implicit: stable at any stiffness and gain."""
+"""Linearly implicit dynamics with spring-damper contacts and Coulomb friction: stable at every stiffness and gain."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-# A contact fades in over this height [m], and out again as its force falls through this one [N]: no branch, no jump.
+# A contact fades in over this height [m], and out again as its force falls below this one [N]: no branch, no jump.
 FADE_HEIGHT, FADE_FORCE = 2e-4, 1.0
-# Springs yield beyond this depth [m]: a point far below the ground has come in through the riser of a step, and must not be
-# shot out upwards.
+# Springs yield beyond this depth [m]: a point far below the ground has entered through the riser of a step, and must not be
+# accelerated upwards.
 YIELD_DEPTH = 0.02
-# Slower than this a contact sticks: it creeps at the share of this speed that its load has of the friction limit [m/s].
+# A slower contact sticks: it creeps at this speed times the ratio of its load to the friction limit [m/s].
 CREEP_SPEED = 5e-3
 
 
@@ -26,7 +26,7 @@ class Ground(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Point that may touch the ground.
+    """A point that may touch the ground.
 
     Attributes:
         height: above the ground [m].
@@ -49,16 +49,15 @@ class Equations(NamedTuple):
 def implicit_equations(
     motion: Equations, velocity: SX, contacts: Sequence[Contact], ground: Ground, quantum: SX | float
 ) -> Equations:
-    """Equations of the acceleration over one quantum of time dt, with the contact forces at its end.
+    """Return the equations of the acceleration over one quantum of time dt, with the contact forces at its end.
 
-    Spring, damper and friction act at the position and velocity that the acceleration leads to, so none of them can
-    overshoot. A first pass without friction finds which contacts press, a second one adds friction and lets go of those
-    that would pull.
+    Spring, damper and friction act at the position and velocity at the end of the quantum, so none of them can overshoot. A first
+    pass without friction finds which contacts press, a second one adds friction and releases those that would pull.
 
     Args:
-        motion: without contacts; to the inertia is added what other implicit forces add.
+        motion: without contacts; its mass includes the terms of other implicit forces.
         velocity: (n,) now.
-        contacts: points that may touch.
+        contacts: points that may touch the ground.
         ground: below them.
         quantum: dt [s].
 
@@ -76,7 +75,7 @@ def implicit_equations(
     free = [k * depth - c * rate for depth, rate in zip(depths, rates, strict=True)]  # (eq. 33)
     touching = [(1 - ca.tanh(height / FADE_HEIGHT)) / 2 for height in ahead]
 
-    pressing, pressed_by = _with_normal_forces(motion, contacts, touching, free, stiff)
+    pressing, pressed_by = _add_normal_forces(motion, contacts, touching, free, stiff)
     solved = solve_definite(pressing, ca.horzcat(pressed_by, *(contact.tangent for contact in contacts)))
     first, yields = solved[:, 0], ca.horzsplit(solved[:, 1:])
     shares, grips = [], []
@@ -92,13 +91,13 @@ def implicit_equations(
     for contact, grip, slip in zip(contacts, grips, slips, strict=True):
         mass = mass + grip * quantum * contact.tangent @ contact.tangent.T
         force = force - grip * slip * contact.tangent
-    return _with_normal_forces(Equations(mass, force), contacts, shares, free, stiff)
+    return _add_normal_forces(Equations(mass, force), contacts, shares, free, stiff)
 
 
-def _with_normal_forces(
+def _add_normal_forces(
     motion: Equations, contacts: Sequence[Contact], shares: Sequence[SX], free: Sequence[SX], stiff: SX
 ) -> Equations:
-    """Equations with the given shares of the contacts' normal forces (eq. 35)."""
+    """Add the given shares of the contacts' normal forces (eq. 35)."""
     mass, force = motion
     for contact, share, push in zip(contacts, shares, free, strict=True):
         mass = mass + share * stiff * contact.normal @ contact.normal.T
@@ -107,7 +106,7 @@ def _with_normal_forces(
 
 
 def solve_definite(A: SX, B: SX) -> SX:
-    """Solution of A X = B (n, m) by elimination without pivoting, hence without branches.
+    """Solve A X = B (n, m) by elimination without pivoting, hence without branches.
 
     Args:
         A: (n, n) with a positive definite symmetric part; it need not be symmetric.

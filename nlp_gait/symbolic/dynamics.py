@@ -38,17 +38,17 @@ def newton_euler(
     upright: Collection[str] = (),
     pushes: Mapping[str, Wrench] | None = None,
 ) -> tuple[dict[str, SX], Wrench]:
-    """Joint torques of a tree whose first body stands still on the ground.
+    """Return the joint torques of a tree whose first body is fixed to the ground.
 
     Args:
         tree: bodies, parents first (see ``robots.tree.tree_from``).
-        q: joint angles by name [rad]; an angle that is a constant costs no operations.
+        q: joint angles by name [rad]; a constant angle costs no operations.
         qd: joint velocities by name [rad/s].
         qdd: joint accelerations by name [rad/s^2].
         gravity: magnitude, acting along -z [m/s^2].
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
-        upright: links that do not turn in the motions asked for; to know it saves operations.
-        pushes: what else acts on links by name, about their reference point and in their axes.
+        upright: links that do not turn, which saves operations.
+        pushes: other wrenches on links by name, about their reference points and in their axes.
 
     Returns:
         Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
@@ -62,12 +62,12 @@ def newton_euler(
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
     inertias = regroup_inertias(tree, shares)
-    forces, moments = _forward(tree, inertias, rotations, qd, qdd, gravity, upright)
+    forces, moments = _accelerate(tree, inertias, rotations, qd, qdd, gravity, upright)
     for i, body in enumerate(tree):
         if body.link.name in shares:  # force and moment are linear in mass and inertia
             forces[i] *= shares[body.link.name]
             moments[i] *= shares[body.link.name]
-        if pushes and body.link.name in pushes:  # what pushes a body need not come through its joint
+        if pushes and body.link.name in pushes:  # its joint does not transmit them
             forces[i] -= pushes[body.link.name].force
             moments[i] -= pushes[body.link.name].moment
     torques: dict[str, SX] = {}
@@ -85,15 +85,15 @@ def newton_euler(
 
 
 def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[Inertia]:
-    """Inertias that give the same torques and the same wrench on the ground with fewer operations.
+    """Return inertias with the same torques and the same wrench on the ground that need fewer operations.
 
-    Matter on a joint's axis moves alike whether it belongs to the body before or behind the joint, and gives no torque
-    about the axis. So mass, the first moment along the axis and the second moment along it go to the body before: all
-    bodies but the first end up without mass.
+    Matter on the axis of a joint moves in the same way whether it belongs to the body before or after the joint, and exerts no
+    torque about the axis. So mass, the first moment along the axis and the second moment along it are moved to the body before:
+    only the first body has mass.
 
     Args:
         tree: bodies, parents first.
-        kept: links that neither give nor take.
+        kept: links that are not changed.
     """
     inertias = [_inertia(body) for body in tree]
     for i in range(len(tree) - 1, 0, -1):
@@ -120,7 +120,7 @@ def _inertia(body: Body) -> Inertia:
     return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
 
 
-def _forward(
+def _accelerate(
     tree: Sequence[Body],
     inertias: Sequence[Inertia],
     rotations: Sequence[SX],
@@ -129,7 +129,7 @@ def _forward(
     gravity: float,
     upright: Collection[str],
 ) -> tuple[list[SX], list[SX]]:
-    """Force and moment that each body's own motion asks for, about its reference point, in its axes."""
+    """Return force and moment that the motion of each body needs, about its reference point, in its axes."""
     moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
     forces: list[SX] = []
     moments: list[SX] = []
@@ -146,22 +146,22 @@ def _forward(
                 carried = rotation.T @ parent_spin
                 spin = carried + rate
                 spin_rate = rotation.T @ parent_spin_rate + ca.cross(carried, rate) + rate_rate
-        turning = _turning(spin, spin_rate)
+        turning = _compute_turning(spin, spin_rate)
         moved.append((spin, spin_rate, turning, acceleration))
         forces.append(inertia.mass * acceleration + turning @ DM(inertia.first))
-        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _spin_moment(turning, inertia.second))
+        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, inertia.second))
     return forces, moments
 
 
-def _turning(spin: SX, spin_rate: SX) -> SX:
-    """(3, 3) matrix that gives a body point's acceleration relative to the reference point from its position."""
+def _compute_turning(spin: SX, spin_rate: SX) -> SX:
+    """Return the matrix (3, 3) from the position of a body's point to its acceleration, relative to the reference point."""
     (x, y, z), (a, b, c) = ca.vertsplit(spin), ca.vertsplit(spin_rate)
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
     return ca.blockcat([[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]])
 
 
-def _spin_moment(turning: SX, second: np.ndarray[Any, Any]) -> SX:
-    """Moment that turning a body about its reference point asks for: sum of p x (turning p) over its matter at p."""
+def _compute_moment(turning: SX, second: np.ndarray[Any, Any]) -> SX:
+    """Return the moment that turning a body about its reference point needs: sum of p x (turning p) over its matter at p."""
     U, J = turning, second
     return ca.vertcat(
         *(

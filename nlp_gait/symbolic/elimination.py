@@ -1,4 +1,4 @@
-"""Linear equations of a few unknowns as expressions: elimination whose pivots are chosen once, from numbers."""
+"""Linear equations of a few unknowns as expressions: elimination with pivots that are chosen once, from numbers."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from casadi import SX
 
 Array = np.ndarray[Any, Any]
 
-# A pivot at least this share of the largest one left may be taken for its sparsity.
+# A pivot of at least this share of the largest one may be chosen for its sparsity.
 THRESHOLD = 0.2
-# Matrices whose own orders are tried, and the share of the best least pivot with which less work decides.
+# Matrices whose orders are candidates, and the share of the best smallest pivot above which less work decides.
 CANDIDATES, NEARLY_BEST = 60, 0.8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Factors:
-    """A matrix taken apart: rows and columns in the order of elimination.
+    """Factors of a matrix, with rows and columns in the order of elimination.
 
     Attributes:
         order: (row, column) of each pivot.
-        factors: (n, n) multipliers below the pivots and what is left above them, in the matrix's own places.
+        factors: (n, n) multipliers below the pivots and remaining entries above them, in the places of the matrix.
         inverses: of the pivots.
     """
 
@@ -33,7 +33,7 @@ class Factors:
     inverses: Sequence[SX]
 
     def solve(self, right: SX) -> SX:
-        """Solution (n,) for a right-hand side (n,)."""
+        """Return the solution (n,) for a right-hand side (n,)."""
         b = ca.vertsplit(right)
         for k, (row, column) in enumerate(self.order):
             for below, _ in self.order[k + 1 :]:
@@ -47,33 +47,32 @@ class Factors:
 
 
 def choose_pivots(matrices: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
-    """Order of elimination whose pivots stay away from zero for all of some matrices of numbers, with little work.
+    """Choose an order of elimination, (row, column) of each pivot, that suits all of some matrices and needs little work.
 
     Args:
-        matrices: (N, n, n) of what is to be solved.
-        pattern: (n, n) whether an entry is ever not zero.
+        matrices: (N, n, n) examples of the matrix.
+        pattern: (n, n) whether an entry is ever nonzero.
     """
-    orders = {_order_for(matrix, pattern) for matrix in matrices[:: max(1, len(matrices) // CANDIDATES)]}
-    least = {order: _least_pivot(matrices, order) for order in orders}
+    orders = {_choose_pivots_of(matrix, pattern) for matrix in matrices[:: max(1, len(matrices) // CANDIDATES)]}
+    least = {order: _find_least_pivot(matrices, order) for order in orders}
     best = max(least.values())
     return min(
         (order for order in orders if least[order] >= NEARLY_BEST * best),
-        key=lambda order: (_work(pattern, order), -least[order], order),
+        key=lambda order: (_count_multiplications(pattern, order), -least[order], order),
     )
 
 
-def _order_for(matrix: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
-    """Order that is sound for one matrix."""
+def _choose_pivots_of(matrix: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
     left, filled = matrix.copy(), pattern.copy()
     rows, columns = list(range(len(matrix))), list(range(len(matrix)))
     order: list[tuple[int, int]] = []
     while rows:
         block = np.abs(left[np.ix_(rows, columns)])
         used = filled[np.ix_(rows, columns)]
-        able = np.argwhere((block >= THRESHOLD * block.max()) & used)
-        work = [(used[:, c].sum() - 1) * (used[r].sum() - 1) for r, c in able]
-        best = min(range(len(able)), key=lambda k: (work[k], -block[tuple(able[k])]))
-        row, column = rows[able[best][0]], columns[able[best][1]]
+        candidates = np.argwhere((block >= THRESHOLD * block.max()) & used)
+        work = [(used[:, c].sum() - 1) * (used[r].sum() - 1) for r, c in candidates]
+        best = min(range(len(candidates)), key=lambda k: (work[k], -block[tuple(candidates[k])]))
+        row, column = rows[candidates[best][0]], columns[candidates[best][1]]
         rows.remove(row)
         columns.remove(column)
         order.append((row, column))
@@ -84,8 +83,7 @@ def _order_for(matrix: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
     return tuple(order)
 
 
-def _least_pivot(matrices: Array, order: Sequence[tuple[int, int]]) -> float:
-    """Smallest pivot over all matrices."""
+def _find_least_pivot(matrices: Array, order: Sequence[tuple[int, int]]) -> float:
     left, least = matrices.copy(), np.inf
     rows = [row for row, _ in order]
     for k, (row, column) in enumerate(order):
@@ -98,8 +96,7 @@ def _least_pivot(matrices: Array, order: Sequence[tuple[int, int]]) -> float:
     return least
 
 
-def _work(pattern: Array, order: Sequence[tuple[int, int]]) -> int:
-    """Multiplications of the elimination."""
+def _count_multiplications(pattern: Array, order: Sequence[tuple[int, int]]) -> int:
     filled, work = pattern.copy(), 0
     for k, (row, column) in enumerate(order):
         later = [c for _, c in order[k + 1 :]]
@@ -111,12 +108,12 @@ def _work(pattern: Array, order: Sequence[tuple[int, int]]) -> int:
 
 
 def factorise(matrix: SX, order: Sequence[tuple[int, int]], least_pivot: float) -> Factors:
-    """A matrix (n, n) taken apart in a given order, finite for every matrix.
+    """Factorise a matrix (n, n) in a given order; the factors are finite for every matrix.
 
     Args:
-        matrix: expressions; zeros among them cost nothing.
+        matrix: expressions; structural zeros cost nothing.
         order: see ``choose_pivots``.
-        least_pivot: a pivot nearer to zero is taken as this far from it.
+        least_pivot: smaller pivots are replaced by this one, with their sign.
     """
     n = len(order)
     entries = [[matrix[i, j] for j in range(n)] for i in range(n)]

@@ -27,12 +27,12 @@ class LegAngles(NamedTuple):
 
 
 def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:
-    """Cosine of the knee angle (zero if stretched) from the squared distance of hip and ankle [m^2], by the law of cosines."""
+    """Return the cosine of the knee angle (0 if stretched) from the squared distance of hip and ankle [m^2]."""
     return (distance_squared - thigh**2 - tibia**2) / (2 * thigh * tibia)
 
 
 def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> LegAngles:
-    """Angles, velocities and accelerations of a leg, defined for every finite input.
+    """Return the angles, velocities and accelerations of a leg, defined for every finite input.
 
     Args:
         hip_to_ankle: (3,) vector from the hip joint to the ankle in world axes [m], with its time derivatives.

@@ -26,21 +26,21 @@ class Pose(NamedTuple):
 
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
-    """(3, 3) rotation about a fixed unit axis (Rodrigues), with no superfluous terms for a coordinate axis."""
+    """Return the rotation (3, 3) about a fixed unit axis (Rodrigues); coordinate axes need no superfluous terms."""
     k = DM(axis)
     along = k @ k.T
     return SX(along) + ca.cos(angle) * (DM.eye(3) - along) + ca.sin(angle) * ca.skew(k)
 
 
 def relative_rotation(body: Body, q: Mapping[str, SX]) -> SX:
-    """(3, 3) rotation from a body's axes to its parent's in the tree; q by joint name [rad]."""
+    """Return the rotation (3, 3) from a body's axes to those of its parent in the tree; q by joint name [rad]."""
     if body.joint is None:
         return SX.eye(3)
     return axis_rotation(body.joint.axis, body.direction * q[body.joint.name])
 
 
 def forward_kinematics(tree: Sequence[Body], q: Mapping[str, SX], base: SX) -> list[Pose]:
-    """Poses of all bodies; the first stands at ``base`` (3,) [m] with world axes.
+    """Return the poses of all bodies; the first is at ``base`` (3,) [m] with world axes.
 
     Args:
         tree: bodies, parents first.
@@ -60,7 +60,7 @@ def forward_kinematics(tree: Sequence[Body], q: Mapping[str, SX], base: SX) -> l
 
 
 def centre_of_mass(tree: Sequence[Body], poses: Sequence[Pose]) -> SX:
-    """(3,) centre of mass of all bodies [m].
+    """Return the centre of mass (3,) of all bodies [m].
 
     Source:
         Gupta, Pratihar, Deb (2023), eq. (23).

@@ -23,7 +23,7 @@ class EquationsOfMotion(NamedTuple):
 
 
 def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsOfMotion:
-    """Lagrange's equations of L = K - P, with K quadratic in the velocities.
+    """Derive Lagrange's equations of L = K - P, with K quadratic in the velocities.
 
     Args:
         kinetic: K(q, qd), scalar [J].
@@ -34,13 +34,12 @@ def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsO
     Source:
         Bhardwaj et al., eqs. (40)-(42); with C as a matrix, so that the product C qd is the vector of eq. (42).
     """
-    # Equal entries of M are one expression, so that what cancels in C cancels symbolically.
+    # Equal entries of M are one expression, so that terms of C cancel symbolically.
     M = ca.triu2symm(ca.cse(ca.triu(ca.hessian(kinetic, qd)[0])))
     n = range(q.shape[0])
     slopes = {(i, j): ca.jacobian(M[i, j], q) for i in n for j in n if i <= j}
 
-    def slope(i: int, j: int, k: int) -> SX:
-        """Derivative of M_ij by q_k."""
+    def slope(i: int, j: int, k: int) -> SX:  # derivative of M_ij by q_k
         return slopes[min(i, j), max(i, j)][k]
 
     C = SX(q.shape[0], q.shape[0])

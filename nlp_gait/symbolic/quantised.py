@@ -1,4 +1,4 @@
-"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, printed and linearly implicit."""
+"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, as printed and linearly implicit."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from casadi import SX
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, implicit_equations
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
 
-# A link that turns by a radian within a quantum is not resolved by it: there this power of its turn brakes it as much as its
-# own inertia. At the rates of a gait, a tenth of that, the brake is 1e-8 of the inertia.
+# A link that turns by a radian within a quantum is not resolved: there this power of its turn brakes it as much as its inertia.
+# At the rates of a gait, a tenth of that, the brake is 1e-8 of the inertia.
 BRAKE_POWER = 8
 
 
 class Controller(NamedTuple):
-    """PD controller with a share of gravity compensated.
+    """PD controller with partial compensation of gravity.
 
     Attributes:
         proportional: (n,) K_p [N m/rad].
         derivative: (n,) K_d [N m s/rad].
-        gravity_share: 1 takes all of gravity off the PD terms, 0 is as printed.
+        gravity_share: compensated share of gravity; 0 as printed.
     """
 
     proportional: SX
@@ -37,14 +37,14 @@ class QuantisedState(NamedTuple):
     v: SX
 
 
-def after(state: QuantisedState, acceleration: SX, quantum: float) -> QuantisedState:
-    """QuantisedState one quantum of time later (eqs. 44, 45)."""
+def advance(state: QuantisedState, acceleration: SX, quantum: float) -> QuantisedState:
+    """Return the state one quantum of time later (eqs. 44, 45)."""
     q, v = state
     return QuantisedState(q + v * quantum + acceleration * quantum**2 / 2, v + acceleration * quantum)
 
 
 def controller_torque(control: Controller, desired: QuantisedState, state: QuantisedState, gravity: SX) -> SX:
-    """(n,) generalised torque (eqs. 50-52), with the share of gravity that is compensated."""
+    """Return the generalised torque (n,) (eqs. 50-52), with the compensated share of gravity."""
     errors = control.proportional * (desired.q - state.q) + control.derivative * (desired.v - state.v)
     return errors + control.gravity_share * gravity
 
@@ -59,11 +59,11 @@ def implicit_quantum(
     disturbance: SX,
     quantum: float,
 ) -> Equations:
-    """Equations of the acceleration when all velocity-dependent forces act at the end of the quantum: finite at every gain.
+    """Return the equations of the acceleration with all velocity-dependent forces at the end of the quantum.
 
-    The Coriolis matrix multiplies the rates at the end too: as dM/dt - 2 C is skew, a free motion then loses kinetic energy to
-    first order in the quantum. That holds while links turn by less than a radian in a quantum. A robot that collapses without
-    damping whips its toes round ten times faster, which no step of this length follows: such links are braked.
+    They are finite at every gain. The Coriolis matrix multiplies the rates at the end, too: as dM/dt - 2 C is skew, a free motion
+    then loses kinetic energy to first order in the quantum, while links turn by less than a radian in a quantum. In a robot that
+    collapses without damping, toes turn ten times faster, which a step of this length cannot resolve: such links are braked.
 
     Args:
         motion: equations of motion at the state.
@@ -71,14 +71,14 @@ def implicit_quantum(
         control: gains.
         desired: at the end of the quantum.
         contacts: points that may touch the ground.
-        ground: below them.
+        ground: below the contacts.
         disturbance: (n,) generalised force.
         quantum: dt [s].
 
     Source:
         Bhardwaj et al., eqs. (46)-(52), taken at the end of the quantum.
     """
-    coasting = after(state, SX(state.q.shape[0], 1), quantum)
+    coasting = advance(state, SX(state.q.shape[0], 1), quantum)
     stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
     force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
     brake = ca.diag(motion.M) * (quantum * state.v) ** BRAKE_POWER
@@ -95,7 +95,7 @@ def explicit_quantum(
     ground: Ground,
     disturbance: SX,
 ) -> Equations:
-    """Equations of the acceleration of the printed scheme: controller and contacts act on the state at the start of the quantum.
+    """Return the equations of the acceleration as printed: controller and contacts act on the state at the start of the quantum.
 
     It is stable only for K_d below twice the least inertia over dt: 0.018 N m s/rad at the toe and dt = 0.01 s.
 

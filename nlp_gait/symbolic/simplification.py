@@ -1,4 +1,4 @@
-"""Expressions rewritten to cost fewer and cheaper operations, with the same values up to rounding."""
+"""Rewriting of expressions, so that they cost fewer and cheaper operations, with the same values up to rounding."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ LEAST_SQUARE = 1e-200
 
 
 def simplify(outputs: Sequence[SX]) -> list[SX]:
-    """The same expressions, cheaper to evaluate.
+    """Return the same expressions, cheaper to evaluate.
 
     Common parts are shared; several divisions by one divisor become one reciprocal and products; sines and cosines of angles
-    that come from ``acos`` and ``atan2`` are taken from the arguments of these, without a transcendental function.
+    that come from ``acos`` and ``atan2`` are computed from the arguments of these, without a transcendental function.
     """
     shared = ca.cse(list(outputs))
     symbols = ca.symvar(ca.veccat(*shared))
@@ -30,7 +30,7 @@ def simplify(outputs: Sequence[SX]) -> list[SX]:
 
 
 def tabulate_last_input(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
-    """A function that is to be mapped over known values of its last input, without what depends on that input alone.
+    """Take out of a function what depends on its last input alone, for a map over known values of that input.
 
     Args:
         function: of SX expressions; its last input is a scalar.
@@ -59,14 +59,13 @@ class _Rewriter:
         self._reciprocals: dict[int, SX] = {}
 
     def rewrite(self, outputs: Sequence[SX]) -> list[SX]:
-        """Return the function's outputs, which have the sparsity of ``outputs``."""
+        """Return the function's outputs, with the sparsity of ``outputs``."""
         nonzeros: dict[int, SX] = {}
         for instruction in self._tape:
             self._values.append(self._build(instruction))
             if instruction.operation == ca.OP_OUTPUT:
                 nonzeros[instruction.place] = self._values[-1]
-        results = [SX(output) for output in outputs]
-        places = count()
+        results, places = [SX(output) for output in outputs], count()
         for result in results:
             for k in range(result.nnz()):
                 result.nz[k] = nonzeros[next(places)]
@@ -100,7 +99,7 @@ class _Rewriter:
         return _multiply(self._values[dividend], self._reciprocals[divisor])
 
     def _cos_sin(self, angle: int) -> tuple[SX, SX]:
-        """Cosine and sine of an angle, in closed form where that is possible."""
+        """Return cosine and sine of an angle, in closed form where possible."""
         node = self._tape[angle]
         if node.operation == ca.OP_NEG:
             cos, sin = self._cos_sin(node.arguments[0])
@@ -121,14 +120,14 @@ class _Rewriter:
         return cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b
 
     def _has_closed_form(self, angle: int) -> bool:
-        """Whether an angle is acos, atan2, or a sum, difference or negative of such angles."""
+        """Return whether an angle is acos, atan2, or a sum, difference or negative of such angles."""
         node = self._tape[angle]
         if node.operation in (ca.OP_ADD, ca.OP_SUB, ca.OP_NEG):
             return all(self._has_closed_form(i) for i in node.arguments)
         return node.operation in (ca.OP_ACOS, ca.OP_ATAN2)
 
     def _square(self, number: int) -> SX:
-        """Square of a node, without a detour over a sign or a root."""
+        """Return the square of an instruction's result, without a sign or a root."""
         node = self._tape[number]
         if node.operation == ca.OP_NEG:
             return self._square(node.arguments[0])
@@ -142,7 +141,7 @@ def _multiply(factor: SX, reciprocal: SX) -> SX:
 
 @contextmanager
 def _without_simplification() -> Iterator[None]:
-    """Keeps CasADi from turning a product with a reciprocal back into a division."""
+    """Keep CasADi from turning a product with a reciprocal back into a division."""
     before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(False)
     try:

@@ -1,8 +1,8 @@
-"""Quintic splines that leave both ends of a curve alone: what a richer trajectory adds to a cubic.
+"""Quintic splines that do not change the ends of a curve: what a richer trajectory adds to a cubic.
 
-The spaces are nested: knots come by bisection, so every spline is one with twice as many spans, too. With one span it is a
-polynomial of degree five. A cubic through given end positions and velocities plus such a spline is any spline of degree five
-with these ends, and zero coefficients leave the cubic.
+The spaces are nested: every spline is also a spline with twice as many spans. With one span it is a polynomial of degree five. A
+cubic through given end positions and velocities plus such a spline is any spline of degree five with these ends; zero
+coefficients leave the cubic.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from nlp_gait.symbolic.trajectories import Motion
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DEGREE = 5  # positions have four continuous derivatives, so torques and their rates are smooth
-# The first and the last two of the basis functions are those that move an end or its velocity.
+# The first two and the last two basis functions move an end or its velocity.
 FIXED = 2
 
 
 def count_coefficients(spans: int) -> int:
-    """Number of coefficients of one curve; 0 spans stand for no spline at all."""
+    """Return the number of coefficients of one curve; 0 spans mean no spline."""
     return spans + DEGREE - 2 * FIXED if spans else 0
 
 
 def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
-    """Splines (k,) with zero value and zero velocity at both ends of a phase.
+    """Evaluate k splines with zero value and zero velocity at both ends of a phase.
 
     Args:
-        coefficients: (m, k) of k curves [u]; m = spans + 1, or 0 for curves that do not move.
+        coefficients: (m, k) of k curves [u]; m = spans + 1, or 0 for zero curves.
         duration: of the phase [s].
         phase: time / duration, in [0, 1].
 
@@ -47,7 +47,7 @@ def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
 
 
 def basis(spans: int, phase: SX, order: int) -> SX:
-    """(m,) derivatives of the basis functions with respect to the phase.
+    """Return (m,) derivatives of the basis functions with respect to the phase.
 
     Args:
         spans: equal parts of the phase, at least 1.
@@ -55,19 +55,19 @@ def basis(spans: int, phase: SX, order: int) -> SX:
         order: of the derivative, 0 to 5.
     """
     knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, spans + 1), np.ones(DEGREE)])
-    values = _pieces(spans, phase)
+    values = _start_basis(spans, phase)
     for degree in range(1, DEGREE + 1):
-        raised = _raised if degree <= DEGREE - order else _differentiated
-        values = raised(values, knots, degree, phase)
+        step = _raise_degree if degree <= DEGREE - order else _differentiate
+        values = step(values, knots, degree, phase)
     return ca.vertcat(*values[FIXED : len(values) - FIXED])
 
 
 def refine_spline(coefficients: Array, spans: int) -> Array:
-    """Coefficients of the same curve with more spans, which are averages of the given ones.
+    """Return the coefficients of the same curve with more spans.
 
     Args:
         coefficients: (m,) of a curve, or (m, k) of k curves.
-        spans: a multiple of the curve's own.
+        spans: a multiple of the curve's number of spans.
     """
     m = coefficients.shape[0]
     if m == 0:
@@ -77,12 +77,12 @@ def refine_spline(coefficients: Array, spans: int) -> Array:
 
 
 def fit_spline(values: Array, spans: int, phases: Array) -> Array:
-    """(m, k) coefficients of the splines that are nearest to values (n, k) at phases (n,), in the sense of least squares."""
+    """Return (m, k) coefficients of the least-squares fit to values (n, k) at phases (n,)."""
     return np.asarray(np.linalg.lstsq(tabulate_basis(spans, phases).T, values, rcond=None)[0], dtype=float)
 
 
 def tabulate_basis(spans: int, phases: Array, order: int = 0) -> Array:
-    """(m, n) derivatives of the basis functions at phases (n,)."""
+    """Return (m, n) derivatives of the basis functions at phases (n,)."""
     return np.array(_basis_function(spans, order).map(len(phases))(phases[None, :]).full())
 
 
@@ -92,32 +92,30 @@ def _basis_function(spans: int, order: int) -> ca.Function:
     return ca.Function("basis", [phase], [basis(spans, phase, order)])
 
 
-def _pieces(spans: int, phase: SX) -> list[SX]:
-    """Basis functions of degree 0: 1 on one span, those of the multiple end knots 0. The outer spans reach beyond the ends."""
+def _start_basis(spans: int, phase: SX) -> list[SX]:
+    """Return the basis functions of degree 0: 1 on one span, 0 at multiple end knots. The outer spans include the outside."""
     after = [SX(1), *(phase >= k / spans for k in range(1, spans)), SX(0)]
     inner = [after[k] - after[k + 1] for k in range(spans)]
     return [SX(0)] * DEGREE + inner + [SX(0)] * DEGREE
 
 
-def _raised(values: list[SX], knots: Array, degree: int, phase: SX) -> list[SX]:
-    """Basis functions of the next degree."""
+def _raise_degree(values: list[SX], knots: Array, degree: int, phase: SX) -> list[SX]:
     return [
-        _share(phase - knots[i], knots[i + degree] - knots[i]) * values[i]
-        + _share(knots[i + degree + 1] - phase, knots[i + degree + 1] - knots[i + 1]) * values[i + 1]
+        _divide(phase - knots[i], knots[i + degree] - knots[i]) * values[i]
+        + _divide(knots[i + degree + 1] - phase, knots[i + degree + 1] - knots[i + 1]) * values[i + 1]
         for i in range(len(values) - 1)
     ]
 
 
-def _differentiated(values: list[SX], knots: Array, degree: int, _: SX) -> list[SX]:
-    """Derivatives of the basis functions of the next degree."""
+def _differentiate(values: list[SX], knots: Array, degree: int, _: SX) -> list[SX]:
+    """Return the derivatives of the basis functions of the next degree."""
     one = SX(degree)
     return [
-        _share(one, knots[i + degree] - knots[i]) * values[i]
-        - _share(one, knots[i + degree + 1] - knots[i + 1]) * values[i + 1]
+        _divide(one, knots[i + degree] - knots[i]) * values[i]
+        - _divide(one, knots[i + degree + 1] - knots[i + 1]) * values[i + 1]
         for i in range(len(values) - 1)
     ]
 
 
-def _share(part: SX, width: float) -> SX:
-    """Quotient, or 0 on a span without width."""
-    return part / float(width) if width > 0.0 else SX(0)
+def _divide(part: SX, width: float) -> SX:
+    return part / float(width) if width > 0.0 else SX(0)  # 0 on a span without width

@@ -1,4 +1,4 @@
-"""Reader of CasADi's instruction tapes: the scalar operations of a function, in the order in which they are evaluated."""
+"""Reader of CasADi's instruction tapes: the scalar operations of a function in their order."""
 
 from __future__ import annotations
 

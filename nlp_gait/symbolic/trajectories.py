@@ -18,7 +18,7 @@ class Motion(NamedTuple):
 
 
 def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX, phase: SX) -> Motion:
-    """Cubic polynomial in time through given end positions and end velocities.
+    """Return the cubic polynomial in time with given end positions and end velocities.
 
     Args:
         start: position at phase 0 [u].
@@ -42,7 +42,7 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
 
 
 def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, phase: SX) -> Motion:
-    """Cubic polynomial over unit time through given ends; the same as ``cubic``, in other coefficients.
+    """Return the cubic polynomial over unit time with given ends: ``cubic`` with other coefficients.
 
     Args:
         start: position at phase 0 [u].
@@ -60,12 +60,12 @@ def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_differe
 
 
 def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX) -> Motion:
-    """Height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
+    """Return the height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
 
     Args:
         along: horizontal motion of the foot [m].
-        start: where the foot leaves the ground [m].
-        end: where it lands [m].
+        start: position at lift-off [m].
+        end: position at touch-down [m].
         height: greatest height [m].
 
     Source:
@@ -79,7 +79,7 @@ def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX)
 
 
 def map_motion(function: Callable[[SX], SX], argument: Motion) -> Motion:
-    """Motion of a smooth function of a moving quantity, by the chain rule with automatic differentiation.
+    """Return the motion of a smooth function of a moving quantity, by the chain rule with automatic differentiation.
 
     Args:
         function: from (n,) to (m,) or to a (k, m) matrix, twice differentiable.
@@ -93,20 +93,20 @@ def map_motion(function: Callable[[SX], SX], argument: Motion) -> Motion:
 
 
 def add_motions(first: Motion, second: Motion) -> Motion:
-    """Sum of two motions of one shape and unit."""
+    """Add two motions of the same shape and unit."""
     return Motion(*(a + b for a, b in zip(first, second, strict=True)))
 
 
 def constant_motion(value: float) -> Motion:
-    """A quantity that does not move."""
+    """Return a motion at rest."""
     return Motion(SX(value), SX(0), SX(0))
 
 
 def resting_point(place: Sequence[float]) -> Motion:
-    """A point (n,) that does not move."""
+    """Return the motion of a point (n,) at rest."""
     return Motion(SX(DM(list(place))), SX(len(place), 1), SX(len(place), 1))
 
 
 def stack(*motions: Motion) -> Motion:
-    """Motions one below the other as one vector motion."""
+    """Stack motions to one vector motion."""
     return Motion(*(ca.vertcat(*parts) for parts in zip(*motions, strict=True)))

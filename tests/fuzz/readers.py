@@ -20,7 +20,7 @@ from compare.study.record import read_record
 from compare.study.settings import StudySettings, read_settings
 from compare.study.store import Store
 from compare.study.study import Study, check_study
-from nlp_gait.backends.identity import problem_part
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion
 from nlp_gait.files import replace_nan
@@ -311,7 +311,7 @@ def _certificate() -> bytes:
     """With the hash that the problem has here: another CasADi writes the same formulas otherwise."""
     raw = json.loads((SEEDS / "certificate" / "closed.json").read_text(encoding="utf-8"))
     stored = raw["problem"]
-    raw["problem"] = problem_part(load(stored["name"], **stored["options"]).with_values(**stored["parameters"]))
+    raw["problem"] = identify_problem(load(stored["name"], **stored["options"]).with_values(**stored["parameters"]))
     return json.dumps(raw).encode()
 
 

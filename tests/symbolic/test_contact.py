@@ -19,7 +19,7 @@ from nlp_gait.symbolic.contact import (
     solve_definite,
 )
 from nlp_gait.symbolic.lagrange import equations_of_motion
-from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, implicit_quantum
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6
@@ -74,7 +74,7 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
     aim = QuantisedState(SX([0.0, 0.0, *HELD]), SX(11, 1))
     ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
     equations = implicit_quantum(motion, QuantisedState(q, v), control, aim, contacts, ground, SX(11, 1), QUANTUM)
-    following = after(QuantisedState(q, v), solve_definite(*equations), QUANTUM)
+    following = advance(QuantisedState(q, v), solve_definite(*equations), QUANTUM)
     step = ca.Function("step", [ca.vertcat(q, v)], [ca.cse(ca.vertcat(*following))])
     heights = ca.Function("heights", [q], [ca.vertcat(*(contact.height for contact in contacts))])
     start = np.concatenate([[0.0, DROP_M], HELD, np.zeros(11)])

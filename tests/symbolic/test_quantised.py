@@ -10,7 +10,7 @@ from casadi import SX
 from nlp_gait.formulation import Array
 from nlp_gait.symbolic.contact import Contact, Ground, solve_definite
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
-from nlp_gait.symbolic.quantised import Controller, QuantisedState, after, explicit_quantum, implicit_quantum
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, explicit_quantum, implicit_quantum
 
 QUANTUM = 0.01
 # Two links in numbers that have nothing in common.
@@ -43,7 +43,7 @@ def test_a_free_link_keeps_its_rate_unless_it_turns_by_a_radian_in_a_quantum(rat
     nothing, ground = Controller(SX(0), SX(0), SX(0)), Ground(SX(0), SX(0), SX(0))
     state = QuantisedState(SX(0.2), SX(rate))
     equations = implicit_quantum(motion, state, nothing, state, [], ground, SX(0), QUANTUM)
-    following = after(state, solve_definite(*equations), QUANTUM)
+    following = advance(state, solve_definite(*equations), QUANTUM)
     assert float(ca.evalf(following.v)) / rate == pytest.approx(kept, rel=1e-6)
 
 
@@ -74,6 +74,6 @@ def test_the_printed_scheme_acts_at_the_start_and_contacts_press_only_below_the_
 
 
 def test_a_quantum_of_constant_acceleration() -> None:
-    following = after(STATE, ca.SX([200.0, -300.0]), QUANTUM)
+    following = advance(STATE, ca.SX([200.0, -300.0]), QUANTUM)
     assert numbers(following.q) == pytest.approx(Q + V * 0.01 + np.array([0.01, -0.015]))
     assert numbers(following.v) == pytest.approx(V + np.array([2.0, -3.0]))

@@ -16,7 +16,7 @@ from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, 
 from compare.questions.certainty.multistart import multistart
 from compare.study.store import Store
 from compare.study.task import plain_problem
-from nlp_gait.backends.identity import fingerprint, sha256_of
+from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -177,7 +177,7 @@ def certainty(
 
     def proven() -> dict[str, Any]:
         x = np.array(best.x)
-        name = f"proof-{sha256_of({**identity, 'tolerance': tolerance})[:12]}.npz"
+        name = f"proof-{hash_json({**identity, 'tolerance': tolerance})[:12]}.npz"
         checkpoint = None if store.folder is None else store.folder / name
         limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
         found = certify(problem, x, **limits, progress=progress, checkpoint=checkpoint)

@@ -25,7 +25,15 @@ from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows, rows_at_sam
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import SOLE_FRICTION, above, below, combine_zmps, ground_load, sole_limits, zmp_of_wrench
+from nlp_gait.symbolic.balance import (
+    SOLE_FRICTION,
+    combine_zmps,
+    ground_load,
+    shift_down,
+    shift_up,
+    sole_limits,
+    zmp_of_wrench,
+)
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -197,9 +205,9 @@ def planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loa
     def loads(now: Instant) -> Instant:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
-        pushes = {right.link: above(wrench, right.ankle_height_m)}
+        pushes = {right.link: shift_up(wrench, right.ankle_height_m)}
         torques, at_ankle = newton_euler(tree, q, qd, qdd, gravity, upright=upright, pushes=pushes)
-        own = below(at_ankle, left.ankle_height_m)
+        own = shift_down(at_ankle, left.ankle_height_m)
         arm = ca.vertcat(feet["R"] - feet["L"], 0)
         both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
         offset = zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, weight)
@@ -222,7 +230,7 @@ def divided_loads(body: Body, rule: Division) -> Loader:
             own, wrench = newton_euler(tree, q, qd, qdd, gravity, {robot.root: shares[side]}, body.upright)
             height = robot.feet[BOTH_FEET[side]].ankle_height_m
             offset = zmp_of_wrench(wrench, height, weight)
-            wrenches[side] = below(wrench, height)
+            wrenches[side] = shift_down(wrench, height)
             torques |= own
             zmps.append(now.ankles[side][:2] + offset)
             ground_loads.append(ground_load(wrench, weight))

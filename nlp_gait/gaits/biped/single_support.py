@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.phase_problem import Criterion, goal_for, phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import below, zmp_of_wrench
+from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, parabola_lift, stack
@@ -167,7 +167,7 @@ def single_support_loads(body: Body) -> Loader:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         torques, wrench = newton_euler(tree, q, qd, qdd, body.gravity, upright=body.upright)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, body.weight)
-        wrenches = {"L": below(wrench, foot.ankle_height_m), "R": SX(6, 1)}
+        wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
         return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
 
     return loads

@@ -22,7 +22,7 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
     Controller,
     QuantisedState,
-    after,
+    advance,
     controller_torque,
     explicit_quantum,
     implicit_quantum,
@@ -108,7 +108,7 @@ class ClosedLoop:
     def step(self) -> ca.Function:
         """Function of (state (18,), given, tuned) to the state one quantum later."""
         state, inputs, parts = self._symbols()
-        following = after(state, solve_definite(*self._equations(state, parts)), QUANTUM)
+        following = advance(state, solve_definite(*self._equations(state, parts)), QUANTUM)
         return ca.Function(
             "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
         )

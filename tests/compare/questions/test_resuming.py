@@ -19,7 +19,7 @@ from compare.questions.certainty import multistart
 from compare.questions.motors import study as motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
-from nlp_gait.backends.identity import sha256_of
+from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.starts import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
@@ -62,7 +62,7 @@ def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
 
     def counted(self: Store, name: str, inputs: Any, *rest: Any) -> Any:
         result = save(self, name, inputs, *rest)
-        kept.append(f"{name} {sha256_of(inputs)}")
+        kept.append(f"{name} {hash_json(inputs)}")
         if len(kept) == steps:
             raise Killed
         return result
