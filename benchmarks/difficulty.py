@@ -19,7 +19,7 @@ import numpy as np
 
 import nlp_gait
 from compare.study.record import RunRecord
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import IPOPT, ProblemSpec, Task
 from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json

@@ -9,8 +9,8 @@ import numpy as np
 import nlp_gait
 from benchmarks.rows import Row, ratio, side_by_side
 from compare.analysis.comparison import compare_problems
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.starts import available_workers

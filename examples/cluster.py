@@ -15,7 +15,7 @@ from distributed import LocalCluster
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import summarise
 from compare.drawing.distributions import plot_final_gaps
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
 if __name__ == "__main__":  # workers import this file

@@ -7,8 +7,8 @@ This page can be downloaded as a notebook.
 """
 
 import nlp_gait
-from compare.study.rows import frame_of
-from compare.study.study import Study, run_study
+from compare.study.record import make_frame
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 
 # %%
@@ -43,5 +43,5 @@ study
 # %%
 
 records = run_study(study)
-runs = frame_of(records)
+runs = make_frame(records)
 runs.groupby("solver")[["objective", "calls_f", "time_s"]].median()

@@ -13,8 +13,8 @@ from pathlib import Path
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import summarise
 from compare.drawing.distributions import plot_final_gaps
-from compare.study.imported import imported
-from compare.study.study import Study, run_study
+from compare.study.import_runs import import_runs
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
 folder, spec = Path(sys.argv[1] if len(sys.argv) > 1 else "."), ProblemSpec(name="nao-dsp")
@@ -34,7 +34,7 @@ with (folder / "finals.csv").open("w", newline="") as file:
 # %%
 # The records are compared with those of solvers that run here.
 
-records = imported(spec, folder / "finals.csv", "paper (MATLAB)")
+records = import_runs(spec, folder / "finals.csv", "paper (MATLAB)")
 tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
 (comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
 for row in summarise(comparison):

@@ -16,7 +16,7 @@ from compare.analysis.solver_table import HEADER, format_cells, summarise
 from compare.drawing.convergence import plot_convergence
 from compare.report.document import Document, text_table
 from compare.report.writing import markdown_page
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
 

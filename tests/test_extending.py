@@ -19,7 +19,7 @@ import metaheuristics
 import nlp_gait
 from compare.cli import app
 from compare.judge import evaluate
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import registry as algorithms
 from metaheuristics.array import Array

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from benchmarks.budgets.opponents import OPPONENTS, reference_of, reference_tasks, tasks_of
 from benchmarks.budgets.page import Curves, curves_of, write_page
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec
 
 

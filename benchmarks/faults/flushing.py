@@ -16,8 +16,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.files import write_json
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from compare.bench.baseline import pack
 from compare.bench.tasks import BASELINE, RUNS, bench_tasks
 from compare.study.record import RunRecord
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import Task
 from nlp_gait import gaitbench
 

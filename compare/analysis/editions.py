@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from compare.study.definition import edition, group_of
+from compare.study.definition import describe_edition, select_shared
 from compare.study.record import RunRecord
 from nlp_gait.backends.identity import hash_json
 
@@ -25,7 +25,7 @@ def label_editions(records: Sequence[RunRecord]) -> list[RunRecord]:
     named: dict[tuple[str, str], str] = {}
     found = []
     for record in records:
-        whole = group_of(record.definition)
+        whole = select_shared(record.definition)
         problem = _name(record.problem, {"problem": whole["problem"], "solver": ""}, first, named)
         solver = _name(f"{problem}\0{record.solver}", whole, first, named).partition("\0")[2]
         found.append(replace(record, problem=problem, solver=solver))
@@ -40,7 +40,7 @@ def _name(
     if key not in named:
         name = label
         if label in first:
-            difference = NOT_IN_LABELS.sub("", edition(definition, first[label]))[:LONGEST]
+            difference = NOT_IN_LABELS.sub("", describe_edition(definition, first[label]))[:LONGEST]
             name = f"{label} ({difference})"
             name = name if name not in named.values() else f"{label} ({key[1][:8]})"
         first.setdefault(label, dict(definition))

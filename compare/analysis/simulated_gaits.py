@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.units import with_unit
-from compare.study.engine import Played
 from compare.study.record import RunRecord
+from compare.study.simulations import SimulatedGait
 from nlp_gait.simulation.drive import Drive
 
 HEADER = ("solver", "model", "engine", "error", "rank", "engine's", "fate")
@@ -98,12 +98,12 @@ def select_best_gaits(records: Sequence[RunRecord]) -> list[RunRecord]:
     ]
 
 
-def group_by_problem(plays: Sequence[Played]) -> dict[str, list[Played]]:
+def group_by_problem(plays: Sequence[SimulatedGait]) -> dict[str, list[SimulatedGait]]:
     """Group gaits by problem."""
     return {name: [p for p in plays if p.problem == name] for name in dict.fromkeys(p.problem for p in plays)}
 
 
-def make_engine_rows(plays: Sequence[Played]) -> list[tuple[str, ...]]:
+def make_engine_rows(plays: Sequence[SimulatedGait]) -> list[tuple[str, ...]]:
     """Return rows of text under ``HEADER`` for gaits of one problem, the model's best first."""
     ordered = sorted(plays, key=lambda played: (played.model, played.solver))
     model = [round_as_printed(played.model) for played in ordered]
@@ -132,7 +132,7 @@ def describe_drive(drive: Drive) -> str:
     return f"{drive.interpolation} set-points every {1e3 * drive.period_s:g} ms, {fed[drive.feed_forward]}"
 
 
-def measure_agreement(plays: Sequence[Played]) -> Agreement:
+def measure_agreement(plays: Sequence[SimulatedGait]) -> Agreement:
     """Return the agreement of model and engine on gaits of one problem."""
     return compute_agreement([played.model for played in plays], [played.engine for played in plays])
 
@@ -141,7 +141,7 @@ def _rank(values: Sequence[float], i: int) -> str:
     return str(1 + sum(value < values[i] for value in values))
 
 
-def _fate(played: Played) -> str:
+def _fate(played: SimulatedGait) -> str:
     if played.fell_at_s is not None:
         return f"falls at {played.fell_at_s:.2f} s"
     return "stays up" if played.way is None else f"walks {100.0 * played.way:.1f} %"

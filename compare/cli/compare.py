@@ -16,7 +16,7 @@ from compare.cli.common import end_interrupted, fail, print_result, print_table,
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, name_all, parse_names
 from compare.cli.report import plain_plays, play_best, print_plays
 from compare.cli.search_options import SearchOptions
-from compare.study.settings import SolverSpec, as_named, read_settings
+from compare.study.settings import SolverSpec, read_settings, resolve_user_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
@@ -81,9 +81,9 @@ def compare(
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import write_report
-    from compare.study.imported import imported_records
+    from compare.study.import_runs import read_imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
-    from compare.study.study import Study, check_study, run_study
+    from compare.study.run_study import Study, check_study, run_study
     from nlp_gait.backends.kernel.compiled import available_cores
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import load_mujoco
@@ -99,7 +99,7 @@ def compare(
         known = read_manifest(out).settings
         if known is None:
             raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
-        settings = as_named(known, f"the study in {str(out)!r}")
+        settings = resolve_user_code(known, f"the study in {str(out)!r}")
     else:
         specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = chosen_solvers(algorithms, starts, searches)
@@ -113,20 +113,20 @@ def compare(
             f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
         )
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
-    write_manifest(out, settings, Session.now(command_line, scheduler or str(study.jobs)))
+    write_manifest(out, settings, Session.begin(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
         try:
             records = run_study(
                 study,
                 progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
-                kept=lambda count: _advance_by(advance, count),
-                anew=say,
+                on_stored=lambda count: _advance_by(advance, count),
+                on_outdated=say,
             )
         except Interrupted as interrupt:
             end_interrupted(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
-    records += imported_records(out, records)
+    records += read_imported_records(out, records)
     plays = play_best(out, records, Drive()) if engine else []
     written = write_report(out, records, read_manifest(out), as_csv=as_csv)
     data = {"problems": summaries_of(records), **plain_plays(plays)} if as_json else {}
@@ -168,7 +168,7 @@ def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
 
 
 # What the first table on a narrow terminal holds, in the order in which it is to be read.
-READ_FIRST = ("solver", "judged feasible", "median gap", "median", "evaluations", "time a run")
+READ_FIRST = ("solver", "feasible", "median gap", "median", "evaluations", "time per run")
 HOW_TO_READ = (
     "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
 )

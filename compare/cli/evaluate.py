@@ -62,7 +62,7 @@ def evaluate(
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
     from compare.judge import evaluate as judge
-    from compare.study.imported import FINALS, read_points
+    from compare.study.import_runs import FINALS, read_points
 
     if (x is None) == (motion is None):
         fail("give a point with --x, or a motion with --motion")

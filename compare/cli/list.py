@@ -42,14 +42,14 @@ def list_problems(
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`
     """
-    from compare.study.description import described_names
+    from compare.study.description import list_described_names
 
     if robot is not None:
         _robot(robot, out, as_json)
         return
     if out is not None:
         raise InputError("--out is the picture of a robot; name one with --robot FILE")
-    known = described_names()
+    known = list_described_names()
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
     elif name is None:
@@ -59,16 +59,16 @@ def list_problems(
 
 
 def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
-    from compare.study.description import description_of
+    from compare.study.description import describe_solver
 
-    found = [description_of(name) for name in names]
+    found = [describe_solver(name) for name in names]
     if as_json:
         print_json({"algorithms": [asdict(one) for one in found]})
         return
     for one in found:
         stdout.print(f"{one.name}: {one.title}")
         if one.settings:
-            rows = [(setting.name, setting.default, setting.words) for setting in one.settings]
+            rows = [(setting.name, setting.default, setting.meaning) for setting in one.settings]
             print_table(f"{one.name}: settings", ("name", "default", "what"), rows)
         if one.source:
             stdout.print(f"Source: {one.source}\n")
@@ -104,7 +104,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
 
 
 def _overview(as_json: bool) -> None:
-    from compare.study.task import solver_names
+    from compare.study.task import list_solvers
     from metaheuristics.multi_objective import FRONT_ALGORITHMS
     from nlp_gait.robots import robot_names
     from nlp_gait.user_code import find_entry_points
@@ -114,7 +114,7 @@ def _overview(as_json: bool) -> None:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
-        algorithms = [*solver_names(), *find_entry_points("algorithm")]
+        algorithms = [*list_solvers(), *find_entry_points("algorithm")]
         data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names())}
         print_json(
             {
@@ -125,7 +125,7 @@ def _overview(as_json: bool) -> None:
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "what", "variables", "parameters"), rows)
-    stdout.print(f"algorithms: {', '.join(solver_names())}")
+    stdout.print(f"algorithms: {', '.join(list_solvers())}")
     stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
     for kind, listed in (("problems", find_entry_points("problem")), ("algorithms", find_entry_points("algorithm"))):

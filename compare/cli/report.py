@@ -17,8 +17,8 @@ from compare.cli.simulation_options import DriveOptions
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
-    from compare.study.engine import Played
     from compare.study.record import RunRecord
+    from compare.study.simulations import SimulatedGait
     from nlp_gait.simulation.drive import Drive
 
 
@@ -59,7 +59,7 @@ def report(
     from compare.analysis.editions import label_editions
     from compare.analysis.statistics.run_length import Weighting
     from compare.report import rebuild_report
-    from compare.study.study import read_records
+    from compare.study.record_files import read_records
 
     if not engine and servos != DriveOptions():
         raise InputError("the drive is that of gaits that are played: give --engine as well")
@@ -73,19 +73,19 @@ def report(
     print_result(as_json, plain_plays(plays), written, lambda: print_plays(plays))
 
 
-def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[Played]:
+def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
     """Play every solver's best gait, those that have not been played yet.
 
     Raises:
         InputError: none of the problems can be played.
     """
     from compare.analysis.simulated_gaits import select_best_gaits
-    from compare.study.engine import play_records
+    from compare.study.simulations import simulate_records
 
     gaits = select_best_gaits(records)
     try:
         with progress_bar("gaits", len(gaits)) as advance:
-            plays = play_records(folder, gaits, drive, advance)
+            plays = simulate_records(folder, gaits, drive, advance)
     except KeyboardInterrupt:
         end_interrupted(
             f"interrupted while gaits were played; those that ended are kept; continue with `nlp-gait report --engine {folder}`"
@@ -96,7 +96,7 @@ def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[
     return plays
 
 
-def plain_plays(plays: Sequence[Played]) -> dict[str, Any]:
+def plain_plays(plays: Sequence[SimulatedGait]) -> dict[str, Any]:
     """What was played, by problem, and how far the engine confirms the model, as plain data; nothing if nothing was."""
     from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
 
@@ -107,7 +107,7 @@ def plain_plays(plays: Sequence[Played]) -> dict[str, Any]:
     return {"engine": found} if found else {}
 
 
-def print_plays(plays: Sequence[Played]) -> None:
+def print_plays(plays: Sequence[SimulatedGait]) -> None:
     """A table for each problem, and how far the engine confirms the model."""
     from compare.analysis.simulated_gaits import (
         HEADER,

@@ -41,7 +41,7 @@ def search(
     Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
     `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
     """
-    from compare.study.study import Study, run_study
+    from compare.study.run_study import Study, run_study
     from nlp_gait.backends.kernel.compiled import available_cores
 
     spec = problem.spec()
@@ -52,7 +52,7 @@ def search(
             lambda: run_study(
                 Study(tasks=tasks, folder=out, jobs=jobs or available_cores()),
                 progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
-                anew=say,
+                on_outdated=say,
             ),
             nothing="",
         )

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from compare.study.record import RunRecord
-from compare.study.runner import Run, run_task
+from compare.study.record_files import locate_record
+from compare.study.run_study import Study, run_study
+from compare.study.run_task import Run, run_task
 from compare.study.store import Computation, Store
-from compare.study.study import Study, record_file, run_study
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
 from nlp_gait.errors import InputError
@@ -65,7 +66,7 @@ class Runner:
         )
         for task, record in zip(study.tasks, records, strict=True):
             if not record.x:
-                file = record_file(self.folder, task)
+                file = locate_record(self.folder, task)
                 raise InputError(f"{file.parent.name}/{file.stem} {record.status}; fix this and delete {str(file)!r}")
             runs.setdefault((record.problem, record.solver), []).append(record)
         return runs

@@ -1,12 +1,11 @@
-"""All runs and all judged points as CSV files."""
+"""All runs and all make_judged_cells points as CSV files."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare.study.record import RunRecord
-from compare.study.rows import HEADER, JUDGED, judged, row_of
+from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
 from nlp_gait.files import format_csv, replace_nan, write_text
 
 
@@ -22,7 +21,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
         OutputError: a file cannot be written.
     """
     files = [folder / "runs.csv"]
-    write_text(files[0], format_csv([HEADER, *(_cells(row_of(r)) for r in records)]))
+    write_text(files[0], format_csv([HEADER, *(_cells(make_row(r)) for r in records)]))
     for problem, stem in stems.items():
         own = [record for record in records if record.problem == problem]
         names = list(dict.fromkeys(name for record in own for name in record.x))
@@ -34,7 +33,7 @@ def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str,
                     r.solver,
                     r.run,
                     *(r.x.get(n) for n in names),
-                    *judged(r),
+                    *make_judged_cells(r),
                     *(r.verdict.indexes.get(n) for n in indexes),
                 ]
             )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from compare.analysis.simulated_gaits import HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.report.document import Part, Prose, Section, text_table
-from compare.study.engine import Played
+from compare.study.simulations import SimulatedGait
 
 HOW = Prose(
     "The best gaits of this study have not been simulated in a physics engine. `nlp-gait report DIR --engine` simulates those "
@@ -14,7 +14,7 @@ HOW = Prose(
 )
 
 
-def engine_section(plays: Sequence[Played]) -> Section | None:
+def engine_section(plays: Sequence[SimulatedGait]) -> Section | None:
     """Return the section on every solver's best gait in the engine, for each drive; None without simulations."""
     if not plays:
         return None

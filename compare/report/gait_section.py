@@ -5,7 +5,7 @@ from __future__ import annotations
 from compare.analysis.comparison import Comparison
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure
-from compare.study.record import RunRecord, gait_of
+from compare.study.record import RunRecord, load_gait
 from nlp_gait.errors import GaitError
 from nlp_gait.files import make_file_name
 
@@ -34,5 +34,5 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
 
 def _gait(record: RunRecord) -> GaitCurves | None:
     """Return a record's gait, or None for a problem without time histories."""
-    gait = gait_of(record)
+    gait = load_gait(record)
     return None if gait.problem.display.motion is None else prepare_gait(gait)

@@ -17,15 +17,15 @@ from compare.drawing.distributions import plot_ecdf, plot_final_gaps
 from compare.report.document import Figure, Section, text_table
 from compare.report.engine_section import engine_section
 from compare.report.gait_section import make_gaits_part
-from compare.study.engine import Played
 from compare.study.record import RunRecord
+from compare.study.simulations import SimulatedGait
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
 
 
-def problem_section(comparison: Comparison, plays: Sequence[Played] = ()) -> Section:
+def problem_section(comparison: Comparison, plays: Sequence[SimulatedGait] = ()) -> Section:
     """Return the section on one problem: tables, figures, lists, and its best gaits in the engine if simulated."""
     summaries = summarise(comparison)
     objective = comparison.objective

@@ -17,10 +17,10 @@ from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
 from compare.report.problem_section import problem_section
 from compare.report.writing import write_document
-from compare.study.engine import Played, kept_plays
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
-from compare.study.study import read_records
+from compare.study.record_files import read_records
+from compare.study.simulations import SimulatedGait, load_simulations
 from nlp_gait.files import make_file_name
 
 
@@ -46,7 +46,7 @@ def write_report(
 
     Simulations stored in the folder are included.
     """
-    plays = kept_plays(folder, select_best_gaits(records))
+    plays = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, plays))
     if as_csv:
         written += write_csv_files(
@@ -59,7 +59,7 @@ def make_study_document(
     records: Sequence[RunRecord],
     manifest: Manifest,
     weighting: Weighting = DEFAULT_WEIGHTING,
-    plays: Sequence[Played] = (),
+    plays: Sequence[SimulatedGait] = (),
 ) -> Document:
     """Return the document of a study's records and of their best gaits simulated in the engine."""
     comparisons = compare_problems(records, weighting)

@@ -1,7 +1,6 @@
-"""What a run depends on, by content: the one hash of a problem, and when two definitions are of the same run.
+"""What a run depends on: hashes of definitions, and their differences in words.
 
-Paths are part of a definition, for whoever reads it, and no part of its key: a robot or code of one's own is what its text says,
-wherever it lies.
+Paths are part of a definition, for its readers, but not of its hash: a robot or user code is identified by its content.
 """
 
 from __future__ import annotations
@@ -30,90 +29,97 @@ INPUT_WORDS = {
 }
 
 
-def source_of(algorithm: object) -> str | None:
-    """Hash of the source file of an object of a program's own; None for this package's, and without a file, as in a notebook."""
-    kind = algorithm if inspect.isroutine(algorithm) else type(algorithm)
+def hash_solver_source(solver: object) -> str | None:
+    """Return the hash of the source file of a user-defined solver.
+
+    None for those of this package, and without a file, as in a notebook.
+    """
+    kind = solver if inspect.isroutine(solver) else type(solver)
     if kind.__module__.partition(".")[0] == "metaheuristics":
         return None
     try:
         path = inspect.getsourcefile(kind)
     except (TypeError, OSError):
         return None
-    if path is None or not Path(path).is_file():
-        return None
-    return hash_file(Path(path))
+    return hash_file(Path(path)) if path is not None and Path(path).is_file() else None
 
 
-def key_of(definition: Mapping[str, Any]) -> str:
-    """Hash of a definition without what says only where something lies."""
-    return hash_json(_content(definition))
+def hash_definition(definition: Mapping[str, Any]) -> str:
+    """Return the hash of a definition without paths."""
+    return hash_json(_remove_paths(definition))
 
 
-def group_of(definition: Mapping[str, Any]) -> dict[str, Any]:
-    """What all runs of a solver in a study share: no seed, no start point, and nothing that says only where something lies."""
-    return {key: part for key, part in _content(definition).items() if key not in ("seed", "start", "imported")}
+def select_shared(definition: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what all runs of a solver in a study share: the definition without seed, start point and paths."""
+    return {key: part for key, part in _remove_paths(definition).items() if key not in ("seed", "start", "imported")}
 
 
-def _content(definition: Mapping[str, Any]) -> dict[str, Any]:
-    problem = dict(definition["problem"])
+def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """Return the differences of two definitions in words: ``evaluations 500 -> 1000, the solver's source``."""
+    return _join(_compare_definitions(old, new))
+
+
+def describe_input_differences(old: Any, new: Any) -> str:
+    """Return the differences of the inputs of a stored result in words: ``starts 5 -> 10``."""
+    places = list(_compare(old, new))
+    return _join([place for place in places if place[0][-1] != FORMULAS] or places)
+
+
+def describe_edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """Return what a definition has where it differs from another one: ``evaluations 500``, ``source 3fa9c1d2``."""
+    parts = []
+    for place, before, _ in _compare_definitions(old, new):
+        name = {HASH: "mathematics", SOURCE: "source"}.get(place[-1], place[-1])
+        parts.append(f"{name} {str(before)[:SHOWN_DIGITS] if place[-1] in (HASH, SOURCE, 'key') else _shorten(before)}")
+    return ", ".join(parts)
+
+
+Difference = tuple[tuple[str, ...], Any, Any]
+"""Place, and the values there."""
+
+
+def _remove_paths(definition: Mapping[str, Any]) -> dict[str, Any]:
+    problem, solver = dict(definition["problem"]), definition["solver"]
     if SOURCE in problem:
         problem["name"] = shorten_name(problem["name"])
     robot = problem["options"].get("robot")
     if isinstance(robot, str) and is_robot_file(robot):
         problem["options"] = {**problem["options"], "robot": ""}  # the hash includes the robot
-    solver = definition["solver"]
     if isinstance(solver, Mapping) and "name" in solver:
         solver = {**solver, "name": shorten_name(solver["name"])}
     return {**definition, "problem": problem, "solver": solver}
 
 
-def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """In words, what differs between two definitions: ``evaluations 500 -> 1000, the algorithm's source``."""
-    found = {
-        place: WORDS.get(place) or f"{place[-1]} {_shown(before)} -> {_shown(after)}"
-        for place, before, after in _changed(old, new)
-    }
-    return ", ".join(found.values())
+def _compare_definitions(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[Difference]:
+    """Differences of two definitions; that of the mathematics only if nothing else in the problem explains it."""
+    found = list(_compare(_remove_paths(old), _remove_paths(new)))
+    explained = any(place[0] == "problem" and place[-1] != HASH for place, _, _ in found)
+    return [difference for difference in found if not explained or difference[0] != ("problem", HASH)]
 
 
-def input_differences(old: Any, new: Any) -> str:
-    """In words, what differs between two steps' inputs: ``starts 5 -> 10``; the mathematics only where nothing else does."""
-    before, after = dict(_leaves(old)), dict(_leaves(new))
-    places = [place for place in {**before, **after} if before.get(place) != after.get(place)]
-    causes = [place for place in places if place[-1] != FORMULAS]
-    return ", ".join(
-        INPUT_WORDS.get(place[-1]) or f"{place[-1]} {_shown(before.get(place))} -> {_shown(after.get(place))}"
-        for place in causes or places
-    )
-
-
-def edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """In a few words, what a definition has where it differs from another one: ``evaluations 500``, ``source 3fa9c1d2``."""
-    said = []
-    for place, before, _ in _changed(old, new):
-        name = {HASH: "mathematics", SOURCE: "source"}.get(place[-1], place[-1])
-        said.append(f"{name} {str(before)[:SHOWN_DIGITS] if place[-1] in (HASH, SOURCE, 'key') else _shown(before)}")
-    return ", ".join(said)
-
-
-def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any, Any]]:
-    """Places at which two definitions differ, with both values; the mathematics only where nothing else explains it."""
-    before, after = dict(_leaves(_content(old))), dict(_leaves(_content(new)))
-    places = [place for place in {**before, **after} if before.get(place) != after.get(place)]
-    causes = [place for place in places if place[0] == "problem" and place[-1] != HASH]
-    for place in places:
-        if place != ("problem", HASH) or not causes:
+def _compare(old: Any, new: Any) -> Iterator[Difference]:
+    before, after = dict(_list_leaves(old)), dict(_list_leaves(new))
+    for place in {**before, **after}:
+        if before.get(place) != after.get(place):
             yield place, before.get(place), after.get(place)
 
 
-def _leaves(data: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _list_leaves(data: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
     if isinstance(data, Mapping):
         for key, value in data.items():
-            yield from _leaves(value, (*place, str(key)))
+            yield from _list_leaves(value, (*place, str(key)))
     else:
         yield place, data
 
 
-def _shown(value: Any) -> str:
+def _join(found: list[Difference]) -> str:
+    texts = [
+        WORDS.get(place) or INPUT_WORDS.get(place[-1]) or f"{place[-1]} {_shorten(before)} -> {_shorten(after)}"
+        for place, before, after in found
+    ]
+    return ", ".join(dict.fromkeys(texts))
+
+
+def _shorten(value: Any) -> str:
     text = "none" if value is None else str(value)
     return text if len(text) <= 40 else f"{text[:40]} ..."

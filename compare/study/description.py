@@ -1,4 +1,4 @@
-"""What an algorithm or solver can be told: settings with defaults, meaning and source, from its own docstring."""
+"""Settings of a solver with defaults, meaning and source, from its docstring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 import metaheuristics
-from compare.study.task import solver_names
+from compare.study.task import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
@@ -20,16 +20,16 @@ ENTRY = re.compile(r"^(\w+): (.*)$")
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One setting: its name, its default as text, and what it means."""
+    """A setting: its name, its default as text, and its meaning."""
 
     name: str
     default: str
-    words: str
+    meaning: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Description:
-    """An algorithm or solver in words; ``source`` is empty where its docstring names none."""
+    """A solver in words; ``source`` is empty if its docstring names none."""
 
     name: str
     title: str
@@ -37,24 +37,24 @@ class Description:
     source: str
 
 
-def described_names() -> tuple[str, ...]:
-    """Names of all that has a description: what a study runs, and the algorithms for several objectives."""
-    return (*solver_names(), *FRONT_ALGORITHMS)
+def list_described_names() -> tuple[str, ...]:
+    """Return the names of all solvers of a study and of the algorithms for several objectives."""
+    return (*list_solvers(), *FRONT_ALGORITHMS)
 
 
-def description_of(name: str) -> Description:
-    """Of an algorithm or solver by its name, as ``nlp-gait list`` shows it."""
+def describe_solver(name: str) -> Description:
+    """Return the description of a solver by its name, as ``nlp-gait list`` shows it."""
     factory: Any = {**metaheuristics.ALGORITHMS, **metaheuristics.ADAPTERS, **FRONT_ALGORITHMS, **SOLVERS}[name]
     bound = factory.keywords if isinstance(factory, partial) else {}
     kind: Any = factory.func if isinstance(factory, partial) else factory
-    # A class may leave its settings and its source to the one that it extends.
+    # A class may inherit the documentation of its settings and its source.
     sections = {
         k: text for base in reversed(kind.__mro__[:-1]) for k, text in _sections(inspect.cleandoc(base.__doc__ or ""))
     }
-    words = dict(_entries(sections.get("Attributes", "") or sections.get("Args", "")))
+    meanings = dict(_entries(sections.get("Attributes", "") or sections.get("Args", "")))
     parameters = inspect.signature(kind).parameters.values()
     settings = tuple(
-        Setting(name=p.name, default="" if p.default is p.empty else str(p.default), words=words.get(p.name, ""))
+        Setting(name=p.name, default="" if p.default is p.empty else str(p.default), meaning=meanings.get(p.name, ""))
         for p in parameters
         if p.name not in bound and p.kind is not p.VAR_KEYWORD
     )
@@ -67,7 +67,7 @@ def description_of(name: str) -> Description:
 
 
 def _sections(text: str) -> Iterator[tuple[str, str]]:
-    """Parts of a Google docstring by their headings; what stands before the first has none."""
+    """Yield the sections of a Google docstring with their headings; the first has none."""
     heading, lines = "", list[str]()
     for line in text.splitlines():
         found = SECTION.match(line)
@@ -80,7 +80,7 @@ def _sections(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _entries(text: str) -> Iterator[tuple[str, str]]:
-    """``name: words`` pairs, words over several lines joined."""
+    """Yield the ``name: text`` pairs of a section; lines are joined."""
     for block in re.split(r"\n(?=\S)", inspect.cleandoc(text)):
         found = ENTRY.match(" ".join(block.split()))
         if found:

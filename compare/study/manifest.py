@@ -1,4 +1,4 @@
-"""``study.json``: what a folder of records was made from, where, by which versions and which command."""
+"""``study.json``: settings of a study, and the commands, machines and versions that computed its records."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.settings import StudySettings, settings_from
+from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
 from nlp_gait.decoding import decode
@@ -22,19 +22,19 @@ from nlp_gait.files import convert_errors, read_json, write_json
 
 SCHEMA = 1
 FILE = "study.json"
-REMEDY = "delete it, the records are still good"
+REMEDY = "delete it; the records stay valid"
 PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """One call that ran a part of a study.
+    """One command that ran a part of a study.
 
     Attributes:
-        command: as it was given.
+        command: command line.
         started: date and time, UTC.
-        machine: processor, system, processors that may be used.
-        versions: of Python and of the packages that are there.
+        machine: processor, system, number of usable processors.
+        versions: of Python and the installed packages.
         kernel: compiler and flags of the objective, or why it is interpreted.
         jobs: worker processes, or the address of the scheduler.
     """
@@ -47,8 +47,8 @@ class Session:
     jobs: str
 
     @classmethod
-    def now(cls, command: str, jobs: str) -> Session:
-        """Session that begins now, in this process."""
+    def begin(cls, command: str, jobs: str) -> Session:
+        """Return a session that begins now, in this process."""
         return cls(
             command=command,
             started=datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
@@ -65,15 +65,15 @@ class Session:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """Settings of the study that was run last, None if a program made it, and the sessions that ran in its folder."""
+    """Settings of the study that was run last, None without a manifest, and the sessions in its folder."""
 
     settings: StudySettings | None
     sessions: tuple[Session, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Kept:
-    """Content of the file."""
+class _File:
+    """Content of ``study.json``."""
 
     schema: Literal[1]
     study: Mapping[str, Any]
@@ -81,10 +81,10 @@ class _Kept:
 
 
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
-    """Add a session to the folder's manifest, whose study is now this one.
+    """Write the settings and one more session to the manifest of a folder.
 
     Raises:
-        InputError: the manifest that is there is damaged.
+        InputError: the earlier manifest is damaged.
     """
     sessions: Sequence[Session] = read_manifest(folder).sessions
     data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
@@ -92,19 +92,19 @@ def write_manifest(folder: Path, settings: StudySettings, session: Session) -> N
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Manifest of a folder; empty if the folder has none.
+    """Return the manifest of a folder; an empty one if there is none.
 
     Raises:
-        InputError: it is damaged or of another schema.
+        InputError: it is damaged or has another schema.
     """
     path = folder / FILE
     if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())
     raw = read_json(path, "manifest", remedy=REMEDY)
     with convert_errors(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
-        kept = decode(_Kept, raw)
+        file = decode(_File, raw)
     return Manifest(
-        settings=settings_from(kept.study, f"manifest {str(path)!r}", runs_code=False), sessions=kept.sessions
+        settings=parse_settings(file.study, f"manifest {str(path)!r}", runs_code=False), sessions=file.sessions
     )
 
 

@@ -1,10 +1,10 @@
-"""One finished run as plain data and as one JSON file."""
+"""One finished run: as plain data, as a JSON file, and as a row of a table."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,20 @@ from nlp_gait.files import convert_errors, read_json, replace_nan
 from nlp_gait.formulation import Objective, Result
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
-from nlp_gait.notebook import format_html_table
+from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
 from nlp_gait.user_code import resolve_code
 
 SCHEMA = 3
-REMEDY = "delete it to have it made anew"
-CALLS = frozenset(field.name for field in fields(Evaluations))
+REMEDY = "delete it to have the run repeated"
+CALLS = tuple(field.name for field in fields(Evaluations))
+JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
+HEADER = (
+    *("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation"),
+    *JUDGED,
+    *(f"calls_{kind}" for kind in CALLS),
+    *("failed_evaluations", "iterations", "time_s"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,8 +38,8 @@ class History:
     """Best so far over a run.
 
     Attributes:
-        evaluations: calls of f until then.
-        objective: in the problem's sense; None while nothing was feasible.
+        evaluations: calls of f so far.
+        objective: in the problem's sense; None before the first feasible point.
     """
 
     evaluations: tuple[int, ...]
@@ -41,14 +48,14 @@ class History:
 
 @dataclass(frozen=True, kw_only=True)
 class Times:
-    """Wall time [s]: all that differs between two equal runs.
+    """Wall times [s], the only difference between two equal runs.
 
     Attributes:
-        build: symbolic problem and NLP, near 0 where the process had them already.
-        compile: compiled objective, or derivatives and solver; likewise.
-        solve: the run itself.
-        objective: part of it in the objective; NaN where it is not known.
-        history: at each entry of the history, from the beginning of the solve.
+        build: of the symbolic problem and NLP; near 0 if the process had them already.
+        compile: of the objective, or of derivatives and solver; likewise.
+        solve: of the run itself.
+        objective: share of ``solve`` in the objective; NaN if unknown.
+        history: at each entry of the history, from the start of the solve.
     """
 
     build: float
@@ -60,17 +67,17 @@ class Times:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What the judge finds at a run's point.
+    """The judge's verdict on the point of a run.
 
     Attributes:
         objective: exact value, in the problem's sense; NaN without a point.
         violation: exact total violation; infinite without a point.
-        feasible: on the problem's own samples.
+        feasible: at the problem's samples.
         indexes: performance figures.
-        dense: the same on the dense grid, if there is one.
-        dense_feasible: no row violated on the dense grid; None without one.
-        violated: names of the worst violated rows with the amount, own samples first.
-        guaranteed: what is proven between the samples; None where the point is infeasible.
+        dense: the same on the dense grid; None without one.
+        dense_feasible: whether all rows are satisfied on the dense grid; None without one.
+        violated: names of the worst violated rows with their violation, those at the problem's samples first.
+        guaranteed: what is proven between the samples; None if the point is infeasible.
     """
 
     objective: float
@@ -83,8 +90,8 @@ class Verdict:
     guaranteed: Guarantee | None
 
     @classmethod
-    def of(cls, evaluation: Evaluation) -> Verdict:
-        """Verdict from a full evaluation."""
+    def from_evaluation(cls, evaluation: Evaluation) -> Verdict:
+        """Return the verdict of an evaluation."""
         worst = [*evaluation.violations[:5], *evaluation.dense_violations[:5]]
         return cls(
             objective=float(evaluation.objective["value"]),
@@ -97,44 +104,30 @@ class Verdict:
             guaranteed=evaluation.guaranteed,
         )
 
-    @classmethod
-    def without_point(cls) -> Verdict:
-        """Verdict on a run that failed before it had a point."""
-        return cls(
-            objective=math.nan,
-            violation=math.inf,
-            feasible=False,
-            indexes={},
-            dense=None,
-            dense_feasible=None,
-            violated=(),
-            guaranteed=None,
-        )
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RunRecord:
-    """A run of one solver on one problem: its claim, the judge's verdict, its cost.
+    """One run of a solver on a problem: the claim, the judge's verdict, the cost.
 
     Attributes:
         problem: label, or name without one.
         solver: label, or name without one.
         run: number within the study.
-        seed: of this run alone: it repeats the run.
-        definition: all that the result depends on.
+        seed: of this run.
+        definition: everything that the result depends on, see ``Task.definition``.
         settings: of the solver, defaults included.
-        status: why it ended, in words.
+        status: why the run ended, in words.
         claimed: whether the solver claims a feasible result.
-        x: by variable name; empty if the run failed before it had a point.
+        x: by variable name; empty without a point.
         claimed_objective: in the problem's sense; None without a claim.
         claimed_violation: total; None without a claim.
-        verdict: of the judge.
+        verdict: what the judge finds at x.
         evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
-        failed_evaluations: calls that gave NaN or infinity.
+        failed_evaluations: calls that returned NaN or infinity.
         iterations: generations of a population, iterations of an NLP solver.
-        active_constraints: bounds with a price, dearest first, where the solver knows prices.
+        active_constraints: bounds with a price, largest first, from solvers with multipliers.
         history: best so far.
-        time_s: wall times; the only part that two equal runs do not share.
+        time_s: wall times.
     """
 
     problem: str
@@ -157,29 +150,38 @@ class RunRecord:
     time_s: Times
 
     @classmethod
-    def of(cls, task: Task, **found: Any) -> RunRecord:
-        """Record of a task, with what its run found: the fields from ``settings`` on."""
+    def from_task(cls, task: Task, **results: Any) -> RunRecord:
+        """Return the record of a task with the results of its run: the fields from ``settings`` on."""
         return cls(
             problem=task.problem.title,
             solver=task.title,
             run=task.run,
             seed=task.run_seed,
             definition=task.definition(),
-            **found,
+            **results,
         )
 
     @classmethod
-    def failed(cls, task: Task, status: str) -> RunRecord:
-        """Record of a run that has no result."""
-        return cls.of(
+    def make_failed(cls, task: Task, reason: str) -> RunRecord:
+        """Return the record of a run without a result."""
+        return cls.from_task(
             task,
             settings={},
-            status=status,
+            status=f"failed: {reason}",
             claimed=False,
             x={},
             claimed_objective=None,
             claimed_violation=None,
-            verdict=Verdict.without_point(),
+            verdict=Verdict(
+                objective=math.nan,
+                violation=math.inf,
+                feasible=False,
+                indexes={},
+                dense=None,
+                dense_feasible=None,
+                violated=(),
+                guaranteed=None,
+            ),
             evaluations={"f": 0},
             failed_evaluations=0,
             iterations=0,
@@ -189,16 +191,15 @@ class RunRecord:
         )
 
     @property
-    def objective_in_words(self) -> str:
-        """Of the judge, for example ``power 0.845869 W``."""
+    def objective_text(self) -> str:
+        """The judge's objective, for example ``power 0.845869 W``."""
         if not self.verdict.feasible:
             return "infeasible"
-        asked = self.definition["objective"]
-        return f"{asked['name']} {self.verdict.objective:.6g} {asked['unit']}".removesuffix(" 1")
+        objective = self.definition["objective"]
+        return f"{objective['name']} {self.verdict.objective:.6g} {objective['unit']}".removesuffix(" 1")
 
     def __repr__(self) -> str:
-        """One line: whose run on what, and what the judge finds."""
-        return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_in_words}>"
+        return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_text}>"
 
     def _repr_html_(self) -> str:
         calls = ", ".join(f"{kind} {count}" for kind, count in self.evaluations.items())
@@ -208,13 +209,13 @@ class RunRecord:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers, with a schema version; what is not finite is null."""
+        """Return plain data with a schema version; numbers that are not finite become null."""
         return {"schema": SCHEMA, **replace_nan(asdict(self))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Definition:
-    """Shape of a definition, see ``Task.definition``."""
+    """Fields of a definition, see ``Task.definition``."""
 
     problem: StoredProblem
     objective: Objective
@@ -228,48 +229,29 @@ class _Definition:
     start: Mapping[str, float] | None = None
 
 
-def gait_of(record: RunRecord) -> Result:
-    """Problem and x of a record.
-
-    Raises:
-        GaitError: the problem cannot be loaded: it is a file or module of one's own that is not named in this call, say; or it
-            has other variables than the record.
-    """
-    stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
-    name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
-    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
-    return Result(problem=problem, x=problem.check_x(record.x))
-
-
-def run_file(folder: Path, problem: str, solver: str, run: int) -> Path:
-    """``<folder>/<problem>/<solver>-<run>.json``, where what belongs to a run is kept; a colon becomes a full stop."""
-    problem, solver = (title.replace(":", ".") for title in (problem, solver))
-    return folder / problem / f"{solver}-{run:04d}.json"
-
-
 def read_record(path: Path) -> RunRecord:
-    """Record from its file.
+    """Return the record in a file.
 
     Raises:
-        InputError: the file is damaged or of another schema.
+        InputError: the file is damaged or has another schema.
     """
     raw = read_json(path, "record", remedy=REMEDY)
-    found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-    if type(found) is not int or found != SCHEMA:
-        newer = type(found) is int and found > SCHEMA
-        remedy = "a newer version of nlp-gait wrote it" if newer else "run the study anew"
-        raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {found!r}; {remedy}")
+    schema = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+    if type(schema) is not int or schema != SCHEMA:
+        newer = type(schema) is int and schema > SCHEMA
+        remedy = "a newer version of nlp-gait wrote it" if newer else "rerun the study"
+        raise InputError(f"record {str(path)!r}: 'schema' must be {SCHEMA}, got {schema!r}; {remedy}")
     with convert_errors(f"record {str(path)!r} is damaged", InputError, REMEDY):
-        return record_from(raw)
+        return parse_record(raw)
 
 
-def record_from(raw: Any) -> RunRecord:
-    """Record from what ``to_json`` gives; ValueError if it is none."""
-    return _checked(decode(RunRecord, raw, unread=("schema",)))
+def parse_record(raw: Any) -> RunRecord:
+    """Return the record of which ``RunRecord.to_json`` made plain data.
 
-
-def _checked(record: RunRecord) -> RunRecord:
-    """The record, if its parts agree with each other."""
+    Raises:
+        ValueError: a field is missing or wrong, or fields contradict each other.
+    """
+    record = decode(RunRecord, raw, unread=("schema",))
     objective = decode(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
@@ -277,13 +259,13 @@ def _checked(record: RunRecord) -> RunRecord:
     for title in (record.problem, record.solver):
         if not LABEL.fullmatch(title):  # names of files are made from it
             raise ValueError(f"{title!r} is not a label of a problem or solver")
-    history, times, verdict = record.history, record.time_s, record.verdict
-    if not len(history.evaluations) == len(history.objective) == len(times.history):
+    history, verdict = record.history, record.verdict
+    if not len(history.evaluations) == len(history.objective) == len(record.time_s.history):
         raise ValueError("the columns of the history differ in length")
     counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
     if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
         raise ValueError("counts must be at least 0, and those of the history ascend")
-    if "f" not in record.evaluations or not CALLS.issuperset(record.evaluations):
+    if "f" not in record.evaluations or not set(CALLS).issuperset(record.evaluations):
         raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
     if record.definition["seed"] != record.seed:
         raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
@@ -291,3 +273,45 @@ def _checked(record: RunRecord) -> RunRecord:
         raise ValueError("a feasible verdict without an objective")
     violation = math.inf if math.isnan(verdict.violation) else verdict.violation
     return replace(record, verdict=replace(verdict, violation=violation))
+
+
+def load_gait(record: RunRecord) -> Result:
+    """Return the problem and the point of a record.
+
+    Raises:
+        GaitError: the problem cannot be loaded, for example user code that this command does not name; or its variables have
+            changed.
+    """
+    stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
+    name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
+    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
+    return Result(problem=problem, x=problem.check_x(record.x))
+
+
+def make_row(record: RunRecord) -> list[object]:
+    """Return a run under ``HEADER``; None for unknown values."""
+    calls = [record.evaluations.get(kind) for kind in CALLS]
+    claims = (record.claimed, record.status, record.claimed_objective, record.claimed_violation)
+    return [
+        *(record.problem, record.solver, record.run, record.seed, *claims),
+        *make_judged_cells(record),
+        *(*calls, record.failed_evaluations, record.iterations, record.time_s.solve),
+    ]
+
+
+def make_judged_cells(record: RunRecord) -> list[object]:
+    """Return what the judge finds of a run, under ``JUDGED``."""
+    verdict = record.verdict
+    guaranteed = None if verdict.guaranteed is None else verdict.guaranteed.satisfied
+    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible, guaranteed]
+
+
+def make_frame(records: Sequence[RunRecord]) -> Any:
+    """Return records as a pandas data frame: one row for each run, ``HEADER``, and a column ``x.<name>`` for each variable.
+
+    Raises:
+        MissingExtraError: pandas is not installed.
+    """
+    names = list(dict.fromkeys(name for record in records for name in record.x))
+    rows = [[*make_row(record), *(record.x.get(name) for name in names)] for record in records]
+    return import_pandas().DataFrame(rows, columns=[*HEADER, *(f"x.{name}" for name in names)])

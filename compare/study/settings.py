@@ -1,4 +1,4 @@
-"""A study as plain settings: of a command line, a TOML file, or an earlier session's folder."""
+"""A study as plain settings: from a command line, a TOML file or a study's manifest."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, solver_names
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, list_solvers
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, convert_errors, read_text
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
 
-SCHEMA = 1  # of study files; they may leave it out
+SCHEMA = 1  # of study files; the default
 LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
 MOST_RUNS = 100_000
 
@@ -26,10 +26,10 @@ class SolverSpec:
 
     Attributes:
         name: as in ``nlp-gait list``, or user code as ``file.py:name`` or ``module:name``.
-        label: what the study calls it; the name if empty.
-        runs: how many; None for the study's.
-        settings: of the algorithm, where they differ from its defaults.
-        polish: IPOPT from each of its results, as a solver of its own called ``<label>+ipopt``.
+        label: its name in the study; empty for ``name``.
+        runs: number; None for the study's.
+        settings: that differ from its defaults.
+        polish: whether IPOPT starts from each of its results, as another solver ``<label>+ipopt``.
     """
 
     name: str
@@ -41,13 +41,13 @@ class SolverSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class StudySettings:
-    """Everything that decides what a study computes.
+    """Everything that determines what a study computes.
 
     Attributes:
         problems: at least one.
         solvers: at least one.
         runs: of each search algorithm.
-        starts: of each gradient method; each is one run.
+        starts: of each NLP solver; each is one run.
         handling: of constraints, in searches.
         stop: of each run.
         seed: run k has the seed ``seed + k``.
@@ -62,7 +62,7 @@ class StudySettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse counts and seeds that no study can have."""
+        """Check counts and seed."""
         solvers = ((f"runs of {solver.label or solver.name}", solver.runs) for solver in self.solvers)
         for name, count in (("runs", self.runs), ("starts", self.starts), *solvers):
             if count is not None and not 1 <= count <= MOST_RUNS:
@@ -71,8 +71,8 @@ class StudySettings:
             raise InputError(f"seed must be a whole number of at least 0, got {self.seed}")
 
     def tasks(self) -> tuple[Task, ...]:
-        """Every run of the study: for each problem and solver its runs, then those that polish them."""
-        found: list[Task] = []
+        """Return every run of the study: for each problem and solver its runs, then those that polish them."""
+        tasks: list[Task] = []
         for problem in self.problems:
             for solver in self.solvers:
                 task = Task(
@@ -85,19 +85,19 @@ class StudySettings:
                     label=solver.label,
                 )
                 runs = range(self._runs(solver))
-                found += [replace(task, run=run) for run in runs]
+                tasks += [replace(task, run=run) for run in runs]
                 if solver.polish:
                     polish = replace(
                         task, solver=IPOPT, settings={}, label=f"{task.title}+{IPOPT}", polishes=task.title
                     )
-                    found += [replace(polish, run=run, polished=replace(task, run=run)) for run in runs]
-        return tuple(found)
+                    tasks += [replace(polish, run=run, polished=replace(task, run=run)) for run in runs]
+        return tuple(tasks)
 
     def to_json(self) -> dict[str, Any]:
-        """As ``settings_from`` reads it."""
+        """Return plain data as ``parse_settings`` reads it."""
         return {
             "problem": [
-                {"name": p.called, "label": p.label, "options": dict(p.options), "set": dict(p.values)}
+                {"name": p.address, "label": p.label, "options": dict(p.options), "set": dict(p.values)}
                 for p in self.problems
             ],
             "solver": [{key: v for key, v in asdict(s).items() if v is not None} for s in self.solvers],
@@ -114,47 +114,47 @@ class StudySettings:
         return self.starts if solver.name in GRADIENT_SOLVERS else self.runs
 
 
-def as_named(settings: StudySettings, owner: str) -> StudySettings:
-    """Settings that were read from a folder, with code of one's own as it was named in this process.
+def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
+    """Return settings from a folder with user code as this command names it.
 
     Raises:
-        UserCodeError: it was not named.
+        UserCodeError: this command does not name it.
     """
     return replace(
         settings,
-        problems=tuple(replace(p, name=resolve_code(p.called, "problem", owner)) for p in settings.problems),
+        problems=tuple(replace(p, name=resolve_code(p.address, "problem", owner)) for p in settings.problems),
         solvers=tuple(
-            s if s.name in solver_names() else replace(s, name=resolve_code(s.name, "algorithm", owner))
+            s if s.name in list_solvers() else replace(s, name=resolve_code(s.name, "algorithm", owner))
             for s in settings.solvers
         ),
     )
 
 
 def read_settings(path: Path) -> StudySettings:
-    """Settings from a TOML file.
+    """Return the settings in a TOML file.
 
     Raises:
-        InputError: the file cannot be read, or something in it is not allowed; the message says what and where.
+        InputError: the file cannot be read, or contains something that is not allowed.
     """
     text = read_text(path, "study file", at_most=LARGEST_FILE)
     with convert_errors(f"study file {str(path)!r} is not valid TOML", InputError):
         raw = tomllib.loads(text)
-    return settings_from(raw, f"study file {str(path)!r}")
+    return parse_settings(raw, f"study file {str(path)!r}")
 
 
-def settings_from(raw: Any, source: str, *, runs_code: bool = True) -> StudySettings:
-    """Settings from plain data.
+def parse_settings(raw: Any, source: str, *, runs_code: bool = True) -> StudySettings:
+    """Return settings from plain data.
 
     Args:
-        raw: tables ``problem`` and ``solver``, and the study's own values.
-        source: where it comes from, for messages.
-        runs_code: False where nobody named what stands in it: then no problem is built.
+        raw: tables ``problem`` and ``solver``, and the values of the study.
+        source: of the data, for messages.
+        runs_code: False if the user did not name this source: then no problem is built.
 
     Raises:
-        InputError: a key that does not exist, or a value of the wrong kind or that is not allowed.
-        UnknownNameError: a problem, or a variable to fix, that does not exist.
+        InputError: a key does not exist, or a value has the wrong type or is not allowed.
+        UnknownNameError: a problem or a variable to fix does not exist.
     """
-    with convert_errors(f"{source} may hold finite numbers, texts, lists and tables only", InputError):
+    with convert_errors(f"{source} may contain only finite numbers, texts, lists and tables", InputError):
         check_plain(raw)
     for name in ("problem", "solver"):
         if isinstance(raw, Mapping) and not (isinstance(raw.get(name), list) and raw[name]):
@@ -181,7 +181,7 @@ def settings_from(raw: Any, source: str, *, runs_code: bool = True) -> StudySett
 
 @dataclass(frozen=True, kw_only=True)
 class _Problem:
-    """A table ``problem`` of a study."""
+    """Table ``problem`` of a study."""
 
     name: str
     label: str = ""
@@ -192,7 +192,7 @@ class _Problem:
     def spec(self, source: str, runs_code: bool) -> ProblemSpec:
         if self.fix and not runs_code and self.name not in PROBLEMS:
             raise InputError(
-                f"{source}: 'fix' of {self.name!r} would run code that nobody named; write bounds under 'set'"
+                f"{source}: 'fix' of {self.name!r} would run code that this command does not name; write bounds under 'set'"
             )
         spec = ProblemSpec(name=self.name, options=self.options, label=self.label, values=self.set)
         return replace(spec, values=dict(spec.load().fix(**self.fix).values)) if self.fix else spec
@@ -200,7 +200,7 @@ class _Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class _Study(Stop):
-    """A whole study as files hold it."""
+    """A study as in a file."""
 
     problem: tuple[_Problem, ...]
     solver: tuple[SolverSpec, ...]

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.study.definition import input_differences
-from compare.study.workers import side_by_side
+from compare.study.definition import describe_input_differences
+from compare.study.workers import run_in_processes
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, OutputError
@@ -129,7 +129,7 @@ class Store:
                 values[name] = result.value
         workers = min(jobs or available_cores(), len(waiting))
         if workers > 1:
-            for name, value in side_by_side(waiting, workers):
+            for name, value in run_in_processes(waiting, workers):
                 progress(notes[name])
                 values[name] = self.save(name, inputs[name], value)
         else:
@@ -216,7 +216,7 @@ class Store:
         outdated = self.load(name) if result is None and KEY not in name else None
         if outdated is None:
             return result, name
-        message = f"{name}: recomputed: {input_differences(outdated.inputs, as_json(inputs))}"
+        message = f"{name}: recomputed: {describe_input_differences(outdated.inputs, as_json(inputs))}"
         if self._report is None:
             return None, message
         self._report(message)

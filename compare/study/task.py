@@ -1,4 +1,4 @@
-"""What to run, as plain data that can be passed to other processes and written to files."""
+"""What to run, as plain data for files and other processes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.study.definition import group_of, source_of
+from compare.study.definition import hash_solver_source, select_shared
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
@@ -30,14 +30,14 @@ from nlp_gait.user_code import check_reference, find_entry_points, hash_source, 
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
 LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])?")
-PYMOO = "pymoo:"  # before the names of that package's algorithms, which are no modules' names
+PYMOO = "pymoo:"  # prefix of names that are not user code
 FUNCTION = "function"  # kind of a plain function in settings
-# Stands for an algorithm of one's own in checks before its code runs.
+# Replaces a user-defined solver in checks before its code runs.
 UNREAD: Any = PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
 
-def solver_names() -> tuple[str, ...]:
-    """Names of all solvers that a study can run; other packages' algorithms need the extra ``algorithms``."""
+def list_solvers() -> tuple[str, ...]:
+    """Return the names of all solvers of a study; those of other packages need the extra ``algorithms``."""
     return (*GRADIENT_SOLVERS, *ALGORITHMS, *ADAPTERS)
 
 
@@ -46,11 +46,10 @@ class ProblemSpec:
     """A problem as plain data.
 
     Attributes:
-        name: as in ``nlp-gait list``, or of one's own, see ``nlp_gait.formulation.registry.find_maker``; or a ``GaitProblem``
-            itself, which then has its options already.
-        options: what it is built with, where that differs from the defaults.
-        values: parameters, where they differ from the defaults.
-        label: what a study calls it; the name if empty, of one's own without file or module.
+        name: as in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.problem_maker``), or a ``GaitProblem``.
+        options: that differ from the defaults; none for a ``GaitProblem``.
+        values: parameters that differ from the defaults.
+        label: its name in a study; empty for ``name``, without file or module.
     """
 
     name: str | GaitProblem
@@ -59,25 +58,25 @@ class ProblemSpec:
     label: str = ""
 
     @property
-    def called(self) -> str:
-        """Name."""
+    def address(self) -> str:
+        """Name from which the problem is loaded."""
         return self.name if isinstance(self.name, str) else self.name.address
 
     @property
     def title(self) -> str:
-        """Label, or name without one."""
-        return self.label or (self.called if self.called in PROBLEMS else shorten_name(self.called))
+        """Name in a study."""
+        return self.label or (self.address if self.address in PROBLEMS else shorten_name(self.address))
 
     def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
-        """The same with other options beside those that it has."""
+        """Return a copy with further options."""
         return replace(self, options={**self.options, **options})
 
     def load(self) -> GaitProblem:
-        """The problem, built once in each process for each content of what it is built from."""
+        """Return the problem; each is built once in a process, as long as its robot and source do not change."""
         if isinstance(self.name, GaitProblem):
             if self.options:
                 raise InputError(
-                    f"{self.called!r} is built already, so it takes no options; got {', '.join(self.options)}"
+                    f"problem {self.address!r} is already built; options are not allowed: {', '.join(self.options)}"
                 )
             return self.name.with_values(**self.values)
         check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
@@ -96,7 +95,7 @@ def _load(name: str, options: tuple[tuple[str, Any], ...], contents: tuple[str, 
 
 @dataclass(frozen=True, kw_only=True)
 class Handling:
-    """Constraint handling of the search algorithms: ``"deb"``, ``"penalty"`` or ``"epsilon"``, and its settings."""
+    """Constraint handling of searches: ``"deb"``, ``"penalty"`` or ``"epsilon"``, and its settings."""
 
     name: str = "deb"
     settings: Mapping[str, float] = field(default_factory=dict)
@@ -107,10 +106,10 @@ class Stop:
     """When a run ends.
 
     Attributes:
-        evaluations: budget of a search, and of SLSQP; an NLP solver ends by itself.
-        target: a feasible objective at least this good ends a search, in the problem's sense.
-        stagnation: so many generations without a better point end a search.
-        time_limit_s: wall time [s]; refused for a solver that cannot heed it (fatrop).
+        evaluations: budget of a search and of SLSQP; other NLP solvers end by themselves.
+        target: feasible objective that ends a search, in the problem's sense.
+        stagnation: generations without improvement that end a search.
+        time_limit_s: wall time [s]; not for solvers without a time limit (fatrop).
     """
 
     evaluations: int = 10_000
@@ -125,17 +124,17 @@ class Task:
 
     Attributes:
         problem: what is solved.
-        solver: name of the solver, also of one's own as ``file.py:name`` or ``module:name``; or a search algorithm itself, or
-            a plain function (see ``metaheuristics.as_algorithm``), which must be picklable.
-        settings: of the named algorithm, where they differ from its defaults.
+        solver: name, or user code as ``file.py:name`` or ``module:name``, or a picklable search algorithm or plain function (see
+            ``metaheuristics.as_algorithm``).
+        settings: of the named solver, that differ from its defaults.
         handling: of constraints, in searches.
         stop: criteria.
         seed: of the study.
-        run: number of the run; its own seed is ``seed + run``, so that equal runs of all algorithms start alike.
-        label: what the study calls the solver; the algorithm's name if empty.
-        polishes: label of the search whose equal run gives the start point; empty for a random one.
-        polished: that run, where it is known.
-        start: values of all variables by name, where IPOPT or another NLP solver begins; empty for a random point.
+        run: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike.
+        label: of the solver in the study; empty for its name.
+        polishes: label of the search whose run of this number gives the start point; empty for a random start.
+        polished: that run, if it is known.
+        start: values of all variables by name at which an NLP solver starts; empty for a random point.
     """
 
     problem: ProblemSpec
@@ -152,12 +151,12 @@ class Task:
 
     @property
     def run_seed(self) -> int:
-        """Seed that repeats this run alone."""
+        """Seed of this run."""
         return self.seed + self.run
 
     @property
     def title(self) -> str:
-        """Label, or the algorithm's name without one."""
+        """Name of the solver in the study."""
         if isinstance(self.solver, str):
             return self.label or (shorten_name(self.solver) if self.is_user_code else self.solver)
         kind = type(self.solver).__name__
@@ -167,7 +166,7 @@ class Task:
     def is_user_code(self) -> bool:
         """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
         name = self.solver
-        if not isinstance(name, str) or name in solver_names() or name.startswith(PYMOO):
+        if not isinstance(name, str) or name in list_solvers() or name.startswith(PYMOO):
             return False
         return is_user_code(name, "algorithm")
 
@@ -177,7 +176,7 @@ class Task:
         return self.solver not in GRADIENT_SOLVERS
 
     def definition(self) -> dict[str, Any]:
-        """All that the result depends on, as JSON gives it back; equal definitions have equal results."""
+        """Return everything that the result depends on, as plain data; equal definitions have equal results."""
         problem = self.problem.load()
         parts: dict[str, Any] = {
             "problem": identify_problem(problem),
@@ -197,27 +196,26 @@ class Task:
         if self.polishes:
             parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
             if self.polished is not None:
-                parts["polishes"]["key"] = hash_json(group_of(self.polished.definition()))
+                parts["polishes"]["key"] = hash_json(select_shared(self.polished.definition()))
         try:
             return json.loads(json.dumps(parts, allow_nan=False))
         except (TypeError, ValueError) as error:
             raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
 
     def _solver_part(self) -> str | dict[str, Any]:
-        """Name, or settings, and the hash of the source where it is not this package's."""
         if not isinstance(self.solver, str):
-            source = source_of(self.solver)
-            return {**plain_settings(self.solver), **({} if source is None else {SOURCE: source})}
+            source = hash_solver_source(self.solver)
+            return {**describe_settings(self.solver), **({} if source is None else {SOURCE: source})}
         if self.is_user_code:
             return {"name": self.solver, SOURCE: hash_source(self.solver, "algorithm")}
         return self.solver
 
     def make_search(self) -> Algorithm:
-        """Settings of the search algorithm; code of one's own runs here for the first time.
+        """Return the search algorithm with its settings; this runs user code for the first time.
 
         Raises:
-            SearchError: it is no algorithm, or does not take its settings.
-            UserCodeError: its code cannot be found or fails.
+            SearchError: it is not an algorithm, or does not take the settings.
+            UserCodeError: user code cannot be found or fails.
         """
         if not isinstance(self.solver, str):
             return as_algorithm(self.solver, self.title, self.settings)
@@ -227,22 +225,22 @@ class Task:
         return algorithm(self.solver, **self.settings)
 
     def make_solver(self) -> Solver:
-        """NLP solver with its settings and the limits that it heeds.
+        """Return the NLP solver with its settings and the limits that it respects.
 
         Raises:
-            InputError: a time limit that it cannot heed, or a setting that is not allowed.
+            InputError: it has no time limit, or a setting is not allowed.
         """
         name = str(self.solver)
         known = list_settings(name)
         if self.stop.time_limit_s is not None and "time_limit_s" not in known:
-            raise InputError(f"{name} cannot be stopped at a time limit; leave out {name}, or the limit")
+            raise InputError(f"{name} cannot be stopped at a time limit; remove {name} or the limit")
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
-        heeded = {limit: value for limit, value in limits.items() if limit in known and value is not None}
-        return make_solver(name, **{**heeded, **self.settings})
+        respected = {limit: value for limit, value in limits.items() if limit in known and value is not None}
+        return make_solver(name, **{**respected, **self.settings})
 
 
 def check_task(task: Task) -> None:
-    """Refuse now what would fail later: unknown problem, option, parameter, algorithm or setting; a bad label or limit."""
+    """Raise now what would fail later: unknown problem, option, parameter, solver or setting; a bad label or limit."""
     problem = task.problem.load()
     for title in (task.problem.title, task.title):
         if not LABEL.fullmatch(title):
@@ -251,8 +249,8 @@ def check_task(task: Task) -> None:
             )
     if task.is_user_code:
         check_reference(str(task.solver), "algorithm")  # without running it
-    elif isinstance(task.solver, str) and task.solver not in solver_names():
-        raise unknown("algorithm", task.solver, [*solver_names(), *find_entry_points("algorithm")])
+    elif isinstance(task.solver, str) and task.solver not in list_solvers():
+        raise unknown("algorithm", task.solver, [*list_solvers(), *find_entry_points("algorithm")])
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
     if not task.is_search:
@@ -263,19 +261,19 @@ def check_task(task: Task) -> None:
         check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
     if task.start:
         if task.is_search:
-            raise InputError(f"{task.title!r} takes no start point; NLP solvers do")
+            raise InputError(f"search {task.title!r} takes no start point; only NLP solvers do")
         problem.check_within(task.start)
 
 
-def plain_problem(problem: GaitProblem) -> dict[str, Any]:
-    """Name, options and changed parameter values of a problem, as plain data from which ``load_result`` makes it again."""
+def describe_problem(problem: GaitProblem) -> dict[str, Any]:
+    """Return name, options and changed parameter values of a problem, as plain data for ``load_result``."""
     return {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
 
 
-def plain_settings(settings: Any) -> dict[str, Any]:
-    """Settings with their class name, as plain data; of an object that is no data class what is plain among its attributes."""
+def describe_settings(settings: Any) -> dict[str, Any]:
+    """Return settings with their class name as plain data; of other objects than data classes, the public attributes."""
     if isinstance(settings, PlainFunction):
-        return {**plain_settings(settings.function), **settings.settings}
+        return {**describe_settings(settings.function), **settings.settings}
     if inspect.isroutine(settings):
         return {"kind": FUNCTION, "function": settings.__qualname__}
     kind = type(settings).__name__
@@ -285,7 +283,7 @@ def plain_settings(settings: Any) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it; what it has not is named by its type."""
+    """Return a value as JSON has it, or the name of its type."""
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):

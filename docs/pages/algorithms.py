@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import metaheuristics
-from compare.study.description import Description, description_of
+from compare.study.description import Description, describe_solver
 from docs.pages.markdown import code, literal, page, table, write_all
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
@@ -31,12 +31,12 @@ def write(folder: Path) -> None:
     """Write ``algorithms.md`` and nothing else."""
     blocks = [INTRODUCTION]
     for title, (words, names) in PARTS.items():
-        blocks += [f"## {title}", words, *(_section(description_of(name)) for name in names)]
+        blocks += [f"## {title}", words, *(_section(describe_solver(name)) for name in names)]
     write_all(folder, {"algorithms.md": page(*blocks)})
 
 
 def _section(description: Description) -> str:
-    rows = [(code(s.name), code(s.default), literal(s.words)) for s in description.settings]
+    rows = [(code(s.name), code(s.default), literal(s.meaning)) for s in description.settings]
     return page(
         f"### {description.name}",
         literal(description.title),

@@ -12,7 +12,7 @@ import typer
 
 from benchmarks.difficulty import Difficulty, difficulties
 from compare.cli import NAMES, PANELS, app
-from compare.study.task import solver_names
+from compare.study.task import list_solvers
 from docs.check import faults_of
 from docs.pages import algorithms, api, commands, problems
 from docs.pages.gallery import ORDER
@@ -79,7 +79,7 @@ def test_a_page_for_each_command_with_every_option(tmp_path: Path) -> None:
 def test_every_algorithm_and_solver_is_described(tmp_path: Path) -> None:
     algorithms.write(tmp_path)
     page = (tmp_path / "algorithms.md").read_text(encoding="utf-8")
-    assert all(f"\n### {name}\n" in page for name in solver_names())
+    assert all(f"\n### {name}\n" in page for name in list_solvers())
 
 
 def test_every_problem_has_a_page() -> None:

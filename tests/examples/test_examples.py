@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import pytest
 from matplotlib.figure import Figure
 
+from compare.study.run_study import Study, check_study
 from compare.study.settings import read_settings
-from compare.study.study import Study, check_study
 
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 60  # of code

@@ -16,9 +16,9 @@ import pytest
 
 import nlp_gait
 from compare.study.record import read_record
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from compare.study.workers import side_by_side
+from compare.study.workers import run_in_processes
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.files import remove_leftovers
@@ -49,7 +49,7 @@ def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path)
     for path in (record, leftover):
         os.utime(path, (ahead, ahead))
     kept: list[int] = []
-    run_study(Study(tasks=(task,), folder=tmp_path), kept=kept.append)
+    run_study(Study(tasks=(task,), folder=tmp_path), on_stored=kept.append)
     assert kept == [1] and record.stat().st_mtime == pytest.approx(ahead) and not leftover.exists()
     fresh = tmp_path / ".def.tmp"
     fresh.write_text("{")
@@ -91,7 +91,7 @@ def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_whoever_stops_asking_hears_nothing_of_what_is_cancelled() -> None:
     """Ctrl-C in a study is one sentence: joblib's warning of cancelled calls is not a second one."""
-    results = side_by_side({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
+    results = run_in_processes({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
     assert next(results) == (0, None)
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")

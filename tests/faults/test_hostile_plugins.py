@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-import compare.study.apart
+import compare.study.run_task
 from compare.study.record import RunRecord
-from compare.study.runner import attempt
+from compare.study.record_files import read_records
+from compare.study.run_study import Study, run_study
+from compare.study.run_task import try_task
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, read_records, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.user_code import load_object
 from tests.compare.cli.calls import nlp_gait
@@ -88,7 +89,7 @@ def written(folder: Path, name: str, way: str) -> Path:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare.study.apart, "GRACE_S", 0.3)
+    monkeypatch.setattr(compare.study.run_task, "GRACE_S", 0.3)
 
 
 @pytest.mark.slow
@@ -147,7 +148,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient:
     )
 
     def record(name: str, stop: Stop) -> RunRecord:
-        return attempt(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:{name}", stop=stop))
+        return try_task(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:{name}", stop=stop))
 
     def status(name: str) -> str:
         return record(name, PATIENT).status

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from compare.study.manifest import Session, write_manifest
+from compare.study.record_files import locate_record, write_record
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.store import Store
-from compare.study.study import Study, keep_record, record_file, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.tables import write_npz
@@ -53,14 +54,14 @@ def a_study(folder: Path, finished: Finished) -> None:
             record("random", task.run, [(9, 1.0)], problem="walk12"), definition=task.definition()
         ),
     )
-    run_study(study, lambda task, _: finished(record_file(folder, task)))
+    run_study(study, lambda task, _: finished(locate_record(folder, task)))
 
 
 def a_record_of_another_definition(folder: Path, finished: Finished) -> None:
     old = record("pso", 0, [(9, 1.0)])
-    finished(keep_record(old, folder))
+    finished(write_record(old, folder))
     new = replace(old, definition={**old.definition, "stop": {"evaluations": 10}})
-    path = keep_record(new, folder)
+    path = write_record(new, folder)
     finished(path)
     (other,) = [file for file in path.parent.glob("*.json") if file != path]
     finished(other)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.study.runner import attempt
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
+from compare.study.run_task import try_task
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.solvers import iteration_watch, nlpsol
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -67,13 +67,13 @@ def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     slow_iterations(monkeypatch, 0.02)
     end = make_solver(name, time_limit_s=0.03).run(problem, problem.start_point(np.random.default_rng(0)))
     assert (end.converged, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
-    record = attempt(Task(problem=WALK, solver=name, stop=Stop(time_limit_s=0.03)))
+    record = try_task(Task(problem=WALK, solver=name, stop=Stop(time_limit_s=0.03)))
     assert record.status == "stopped at the time limit" and not record.claimed and record.x
 
 
 def test_a_solver_that_cannot_heed_it_is_refused_by_name(tmp_path: Path) -> None:
     task = Task(problem=WALK, solver="fatrop", stop=Stop(time_limit_s=1.0))
-    with pytest.raises(InputError, match="fatrop cannot be stopped at a time limit; leave out fatrop, or the limit"):
+    with pytest.raises(InputError, match="fatrop cannot be stopped at a time limit; remove fatrop or the limit"):
         run_study(Study(tasks=(task,), folder=tmp_path))
     with pytest.raises(InputError, match="fatrop has no settings, got 'time_limit_s'"):
         make_solver("fatrop", time_limit_s=1.0)

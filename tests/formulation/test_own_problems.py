@@ -11,7 +11,7 @@ import casadi as ca
 import pytest
 from casadi import MX
 
-from compare.study.definition import key_of
+from compare.study.definition import hash_definition
 from compare.study.task import ProblemSpec, Task
 from nlp_gait import load, solve, user_code
 from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
@@ -75,8 +75,10 @@ def test_a_study_takes_a_problem_itself() -> None:
     spec = ProblemSpec(name=toy(corner), values={"limit": 0.25})
     assert spec.load().value("limit") == 0.25 and spec.title == "toy"
     task = Task(problem=spec, solver="pso")
-    assert key_of(task.definition()) != key_of(Task(problem=ProblemSpec(name=toy(corner)), solver="pso").definition())
-    with pytest.raises(InputError, match="is built already, so it takes no options; got intervals"):
+    assert hash_definition(task.definition()) != hash_definition(
+        Task(problem=ProblemSpec(name=toy(corner)), solver="pso").definition()
+    )
+    with pytest.raises(InputError, match="is already built; options are not allowed: intervals"):
         spec.with_options(intervals=3).load()
 
 

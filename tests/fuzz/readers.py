@@ -17,9 +17,9 @@ import numpy as np
 
 from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
+from compare.study.run_study import Study, check_study
 from compare.study.settings import StudySettings, read_settings
 from compare.study.store import Store
-from compare.study.study import Study, check_study
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.export.webots import motion_text, parse_motion, read_motion

@@ -48,7 +48,7 @@ def bench(
     from compare.bench.page import leaderboard_page, verdict
     from compare.report.writing import write_document
     from compare.study.record import RunRecord
-    from compare.study.study import Study, check_study, run_study
+    from compare.study.run_study import Study, check_study, run_study
     from nlp_gait import gaitbench
     from nlp_gait.backends.kernel.compiled import available_cores
 

@@ -39,14 +39,14 @@ def import_results(
     """
     from compare.analysis.editions import label_editions
     from compare.report import write_report
-    from compare.study.imported import imported
+    from compare.study.import_runs import import_runs
     from compare.study.manifest import read_manifest
-    from compare.study.study import keep_record, read_records
+    from compare.study.record_files import read_records, write_record
     from nlp_gait.files import make_writable_folder
 
     spec = problem.spec()
-    records = imported(spec, finals, label, history, evaluations)
-    kept = [keep_record(record, make_writable_folder(out)) for record in records]
+    records = import_runs(spec, finals, label, history, evaluations)
+    kept = [write_record(record, make_writable_folder(out)) for record in records]
     everything = label_editions(read_records(out))
     written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
     shown = [record for record in everything if record.problem == spec.title]

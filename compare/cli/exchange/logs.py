@@ -32,7 +32,7 @@ def logs(
     from compare.analysis.comparison import compare_problems
     from compare.bench.leaderboard import references
     from compare.logs import write_coco, write_ioh
-    from compare.study.study import read_records
+    from compare.study.record_files import read_records
     from nlp_gait import gaitbench
 
     records = read_records(folder)

@@ -60,7 +60,7 @@ def walk(
     from compare.questions.walk.planners import checked_planners, rivals
     from compare.questions.walk.report import walk_answer
     from compare.questions.walk.study import CYCLES, default_speeds, optimal_gaits, played
-    from compare.study.engine import STEPS
+    from compare.study.simulations import STEPS
     from compare.study.store import Store
     from nlp_gait.simulation.engine import load_mujoco
 

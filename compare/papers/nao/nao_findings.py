@@ -89,7 +89,10 @@ class PhaseFindings:
     @cached_property
     def printed_here(self) -> dict[str, Verdict]:
         """The judge's verdicts on the paper's solutions, by search."""
-        return {name: Verdict.of(evaluate(self.problem, optimum.x)) for name, optimum in self.paper.optima.items()}
+        return {
+            name: Verdict.from_evaluation(evaluate(self.problem, optimum.x))
+            for name, optimum in self.paper.optima.items()
+        }
 
     @cached_property
     def printed_with_legs_twice(self) -> dict[str, float]:

@@ -30,8 +30,8 @@ from compare.papers.nao.nao_runs import (
 from compare.papers.nao.nao_tables import make_tables
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
+from compare.study.record_files import locate_record
 from compare.study.store import Computation, Store
-from compare.study.study import record_file
 from compare.study.task import IPOPT, Task
 
 
@@ -42,7 +42,7 @@ def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
     searches = [task for task in tasks if task.is_search]
     for task in searches:
         if load_points(store, task) is None:
-            record_file(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
+            locate_record(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
     runs = runner.run_tasks(tasks, partial(run_and_store_points, runner.folder))
     points = {phase.problem: _read_all_points(store, phase, searches) for phase in PHASES}
     sweeps = make_special_sweeps(effort)

@@ -13,7 +13,7 @@ from compare.judge import evaluate
 from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.paper_runs import Effort
 from compare.study.record import RunRecord
-from compare.study.runner import run_task
+from compare.study.run_task import run_task
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import fingerprint

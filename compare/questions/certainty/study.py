@@ -15,7 +15,7 @@ from compare.analysis.units import with_unit
 from compare.questions.certainty.clusters import LocalOptimum, Unseen, cluster, unseen
 from compare.questions.certainty.multistart import multistart
 from compare.study.store import Store
-from compare.study.task import plain_problem
+from compare.study.task import describe_problem
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decode
@@ -112,7 +112,7 @@ class Certainty:
         """Plain data; the ends of the starts stay in their files."""
         certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
         return {
-            **plain_problem(self.problem),
+            **describe_problem(self.problem),
             "starts": self.starts,
             "statuses": self.statuses,
             "optima": [asdict(optimum) for optimum in self.optima],

@@ -101,7 +101,7 @@ def motor_variants(
     published = spec.load()
     if "motors" in spec.options:
         raise InputError("the command goes through all variants of motors itself; leave out --option motors")
-    if "motors" not in inspect.signature(find_maker(spec.called)).parameters:
+    if "motors" not in inspect.signature(find_maker(spec.address)).parameters:
         raise InputError(f"only nao-ssp and nao-dsp know their motors, got {spec.name!r}")
     store = store or Store()
     store.report_changes("motors", published, starts=starts, seed=seed)

@@ -15,7 +15,7 @@ from compare.questions.pareto.knees import Bends, bends
 from compare.questions.pareto.search import Scale, SearchFront, best_of_all, search_fronts
 from compare.study.store import Store
 from compare.study.stored_solver import store_runs
-from compare.study.task import plain_problem
+from compare.study.task import describe_problem
 from metaheuristics.multi_objective import check_budgets, front_algorithm
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
@@ -50,7 +50,7 @@ class ParetoStudy:
         """Plain data; the points that searches found stay in their files."""
         answers = {} if self.challenge is None else asdict(self.challenge)
         return {
-            **plain_problem(self.problem),
+            **describe_problem(self.problem),
             "criterion": {"name": self.criterion.name, "unit": self.criterion.unit},
             "front": [asdict(point) for point in self.front],
             "knees": asdict(self.bends),

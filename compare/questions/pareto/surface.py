@@ -20,7 +20,7 @@ from compare.questions.pareto.front import front_ends
 from compare.report.document import Figure
 from compare.study.store import Store
 from compare.study.stored_solver import store_runs
-from compare.study.task import plain_problem
+from compare.study.task import describe_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
@@ -139,7 +139,7 @@ def surface_answer(surface: Surface) -> Answer:
         verdict=(f"{met} of {all_pairs} pairs of demands can be met.",),
         parts=(figure,),
         data={
-            **plain_problem(problem),
+            **describe_problem(problem),
             "criteria": [{"name": criterion.name, "unit": criterion.unit} for criterion in criteria],
             "points": [asdict(point) for point in surface.points],
             "infeasible": [list(at) for at in surface.infeasible],

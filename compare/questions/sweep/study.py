@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from compare.study.record import RunRecord, record_from
-from compare.study.runner import attempt, run_task
+from compare.study.record import RunRecord, parse_record
+from compare.study.run_task import run_task, try_task
 from compare.study.store import Store
 from compare.study.stored_solver import store_runs
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
@@ -181,7 +181,7 @@ def _searched(tasks: Sequence[Task], store: Store, progress: Progress) -> list[R
     records: list[RunRecord] = []
     try:
         for task in tasks:
-            records.append(record_from(store.compute("search-{key}", task.definition(), partial(_run, task))))
+            records.append(parse_record(store.compute("search-{key}", task.definition(), partial(_run, task))))
             progress("")
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted after {len(records)} of {len(tasks)} points", records) from None
@@ -190,7 +190,7 @@ def _searched(tasks: Sequence[Task], store: Store, progress: Progress) -> list[R
 
 def _run(task: Task) -> dict[str, Any]:
     with remember_interrupts() as check:
-        record = attempt(task) if task.is_user_code else run_task(task)
+        record = try_task(task) if task.is_user_code else run_task(task)
         check()
     return record.to_json()
 

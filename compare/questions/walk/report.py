@@ -18,7 +18,7 @@ from compare.questions.walk.planners import Rival
 from compare.questions.walk.planners_report import planners_parts
 from compare.questions.walk.study import Gait, result_of
 from compare.report.document import Figure, Part, Table, Value
-from compare.study.task import ProblemSpec, plain_problem
+from compare.study.task import ProblemSpec, describe_problem
 from nlp_gait.formulation import GaitProblem, Result, sample_finely
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.simulation.measurements import Measurements, Walk
@@ -90,7 +90,7 @@ def walk_answer(spec: ProblemSpec, gaits: Sequence[Gait], rivals: Sequence[Rival
         title=f"{problem.name}: cheapest cycles over {name}",
         parts=parts,
         data={"gaits": [gait.to_json() for gait in gaits], "planners": [rival.to_json() for rival in rivals]},
-        results={file: {**plain_problem(r.problem), "x": r.problem.by_name(r.x)} for file, r in placed.items()},
+        results={file: {**describe_problem(r.problem), "x": r.problem.by_name(r.x)} for file, r in placed.items()},
     )
 
 

@@ -12,14 +12,14 @@ from compare.analysis.simulated_gaits import (
     make_engine_rows,
     measure_agreement,
 )
-from compare.study.engine import Played
+from compare.study.simulations import SimulatedGait
 from nlp_gait.simulation.drive import DRIVES
 
 
 def played(
     solver: str, model: float, engine: float | None, *, way: float | None = None, problem: str = "nao-dsp"
-) -> Played:
-    return Played(
+) -> SimulatedGait:
+    return SimulatedGait(
         problem=problem,
         solver=solver,
         run=0,

@@ -18,7 +18,7 @@ from compare.bench.page import leaderboard_page
 from compare.bench.tasks import BASELINE, RUNS, bench_tasks
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError
 

@@ -100,11 +100,11 @@ def test_the_solution_is_in_its_file_although_the_reader_of_the_output_has_gone(
 
 
 def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():
-    from compare.study.description import described_names, description_of
+    from compare.study.description import describe_solver, list_described_names
 
-    for name in described_names():
-        found = description_of(name)
-        assert found.title and all(setting.words for setting in found.settings), name
+    for name in list_described_names():
+        found = describe_solver(name)
+        assert found.title and all(setting.meaning for setting in found.settings), name
     (swarm,) = as_json("list", "pso")["algorithms"]
     assert {"name": "inertia_damping", "default": "0.99"}.items() <= swarm["settings"][2].items()
     assert "Kennedy, Eberhart (1995)" in swarm["source"]

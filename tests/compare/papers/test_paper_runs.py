@@ -10,7 +10,7 @@ import pytest
 import nlp_gait
 from compare.papers.paper_runs import Runner, choose_best, make_start_tasks
 from compare.study.record import RunRecord
-from compare.study.runner import run_task
+from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Task, check_task
 from nlp_gait.errors import InputError
 from nlp_gait.progress import ignore_progress

@@ -14,7 +14,7 @@ from compare.analysis.solver_table import summarise
 from compare.analysis.statistics.run_length import Weighting
 from compare.report import rebuild_report, write_report
 from compare.study.manifest import Manifest, Session
-from compare.study.study import RECORDS
+from compare.study.record_files import RECORDS
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
 from tests.compare.records import record, study

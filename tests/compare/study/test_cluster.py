@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from compare.study.record import RunRecord
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.errors import InputError
 from tests.compare.study.test_study import contents

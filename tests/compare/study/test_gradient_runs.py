@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.study.runner import run_task
-from compare.study.study import Study, run_study
+from compare.study.run_study import Study, run_study
+from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
@@ -63,7 +63,7 @@ def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
 @pytest.mark.slow
 def test_other_nlp_solvers_print_nothing() -> None:
     program = (
-        "from compare.study.runner import run_task; from compare.study.task import ProblemSpec, Task\n"
+        "from compare.study.run_task import run_task; from compare.study.task import ProblemSpec, Task\n"
         "run_task(Task(problem=ProblemSpec(name='walk12'), solver='sqpmethod'))"
     )
     done = subprocess.run(

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from compare.study.definition import source_of
+from compare.study.definition import hash_solver_source
 from compare.study.record import RunRecord
+from compare.study.record_files import locate_record, read_records
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, read_records, record_file, run_study
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
@@ -28,10 +29,10 @@ STUDY = StudySettings(
 
 
 def grown(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int, list[str]]:
-    """Records, how many were kept, and what is said of runs that are made again."""
+    """Records, how many were kept, and what is reported of runs that are recomputed."""
     kept: list[int] = []
     said: list[str] = []
-    records = run_study(Study(tasks=settings.tasks(), folder=folder), kept=kept.append, anew=said.append)
+    records = run_study(Study(tasks=settings.tasks(), folder=folder), on_stored=kept.append, on_outdated=said.append)
     return records, kept[0], said
 
 
@@ -48,7 +49,7 @@ def test_a_larger_budget_is_another_run_and_the_smaller_ones_stay(tmp_path: Path
     first = grown(tmp_path, STUDY)[0]
     more = replace(STUDY, stop=Stop(evaluations=300))
     records, kept, said = grown(tmp_path, more)
-    assert kept == 0 and said == [f"{s} on walk12: 2 runs made again: evaluations 200 -> 300" for s in ("pso", "ga")]
+    assert kept == 0 and said == [f"{s} on walk12: 2 runs recomputed: evaluations 200 -> 300" for s in ("pso", "ga")]
     assert {r.evaluations["f"] for r in records} == {300}
     assert sorted(r.evaluations["f"] for r in read_records(tmp_path)) == [200] * 4 + [300] * 4
     again, kept, said = grown(tmp_path, STUDY)
@@ -70,8 +71,8 @@ def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None
     grown(tmp_path, polishing(20))
     _, kept, said = grown(tmp_path, polishing(30))
     assert kept == 0 and said == [
-        "swarm on walk12: 1 run made again: population 20 -> 30",
-        "swarm+ipopt on walk12: 1 run made again: the search that it polishes",
+        "swarm on walk12: 1 run recomputed: population 20 -> 30",
+        "swarm+ipopt on walk12: 1 run recomputed: the search that it polishes",
     ]
 
 
@@ -95,7 +96,7 @@ def test_a_robot_is_its_content_wherever_its_file_lies(tmp_path: Path, monkeypat
     (elsewhere / "my.json").write_text(json.dumps(heavier))
     monkeypatch.chdir(elsewhere)
     (second,), kept, said = grown(out, study("my.json"))
-    assert kept == 0 and said == ["pso on nao-ssp: 1 run made again: the problem's mathematics or limits"]
+    assert kept == 0 and said == ["pso on nao-ssp: 1 run recomputed: the problem's mathematics or limits"]
     assert second.verdict.objective != first.verdict.objective
     monkeypatch.chdir(tmp_path)
     assert grown(out, study("my.json"))[1:] == (1, [])
@@ -103,7 +104,7 @@ def test_a_robot_is_its_content_wherever_its_file_lies(tmp_path: Path, monkeypat
 
 def test_a_copy_of_a_record_under_a_key_is_refused(tmp_path: Path) -> None:
     grown(tmp_path, STUDY)
-    path = record_file(tmp_path, STUDY.tasks()[0])
+    path = locate_record(tmp_path, STUDY.tasks()[0])
     path.with_name(f"{path.stem}.00000000.json").write_text(path.read_text())
     with pytest.raises(InputError, match="belongs to walk12/pso-0000.json"):
         read_records(tmp_path)
@@ -116,5 +117,5 @@ def test_an_algorithm_of_a_notebook_has_no_source_to_hash(monkeypatch: pytest.Mo
     text = "class Mine: ...\ndef search(f, lower, upper, evaluations, seed): ...\n"
     monkeypatch.setitem(linecache.cache, "/tmp/ipykernel_1/1.py", (len(text), None, text.splitlines(True), ""))
     exec(compile(text, "/tmp/ipykernel_1/1.py", "exec"), notebook.__dict__)
-    assert source_of(notebook.Mine()) is None and source_of(notebook.search) is None
-    assert source_of(test_an_algorithm_of_a_notebook_has_no_source_to_hash) is not None
+    assert hash_solver_source(notebook.Mine()) is None and hash_solver_source(notebook.search) is None
+    assert hash_solver_source(test_an_algorithm_of_a_notebook_has_no_source_to_hash) is not None

@@ -98,12 +98,12 @@ def test_there_are_as_many_workers_as_required_and_no_more_than_computations(
     """Without workers all in this process."""
     asked: list[int] = []
 
-    def side_by_side(work: dict[str, Any], workers: int) -> Iterator[tuple[str, Any]]:
+    def run_in_processes(work: dict[str, Any], workers: int) -> Iterator[tuple[str, Any]]:
         asked.append(workers)
         yield from ((name, function()) for name, function in work.items())
 
     monkeypatch.setattr(module, "available_cores", lambda: processors)
-    monkeypatch.setattr(module, "side_by_side", side_by_side)
+    monkeypatch.setattr(module, "run_in_processes", run_in_processes)
     todo = [Computation(name=f"root-{k}", inputs={"k": k}, function=partial(math.sqrt, k)) for k in range(count)]
     assert list(Store(tmp_path).compute_all(todo, jobs=jobs).values()) == [math.sqrt(k) for k in range(count)]
     assert asked == workers

@@ -18,9 +18,10 @@ import pytest
 
 import compare.study.workers
 from compare.study.record import read_record
-from compare.study.runner import attempt
-from compare.study.settings import SolverSpec, StudySettings, read_settings, settings_from
-from compare.study.study import Study, read_records, record_file, run_study
+from compare.study.record_files import locate_record, read_records
+from compare.study.run_study import Study, run_study
+from compare.study.run_task import try_task
+from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_settings
 from compare.study.task import Handling, ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.array import Array
@@ -83,17 +84,17 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
 
 
 def test_finished_runs_are_kept_and_not_run_again(undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare.study.workers, "attempt", lambda *_: pytest.fail("run twice"))
+    monkeypatch.setattr(compare.study.workers, "try_task", lambda *_: pytest.fail("run twice"))
     kept: list[int] = []
-    records = run_study(Study(tasks=SMALL.tasks(), folder=undisturbed), kept=kept.append)
+    records = run_study(Study(tasks=SMALL.tasks(), folder=undisturbed), on_stored=kept.append)
     assert kept == [8] and [r.run for r in records] == [task.run for task in SMALL.tasks()]
 
 
 def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     task = SMALL.tasks()[0]
-    path = record_file(tmp_path, task)
+    path = locate_record(tmp_path, task)
     path.parent.mkdir(parents=True)
-    good = record_file(undisturbed, task).read_text()
+    good = locate_record(undisturbed, task).read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
         ("[]", "'schema' must be 3, got 'list'"),
@@ -160,8 +161,8 @@ def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
 
 
 def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
-    failed = attempt(Task(problem=SSP, solver=Broken()))
-    polished = attempt(Task(problem=SSP, solver="ipopt", label="broken+ipopt", polishes="broken"), failed)
+    failed = try_task(Task(problem=SSP, solver=Broken()))
+    polished = try_task(Task(problem=SSP, solver="ipopt", label="broken+ipopt", polishes="broken"), failed)
     assert "has no point to polish: failed: RuntimeError" in polished.status
 
 
@@ -197,7 +198,7 @@ def test_what_cannot_run_is_said_before_the_work(task: Task, message: str, tmp_p
 
 def test_two_solvers_of_one_name_are_refused() -> None:
     task = Task(problem=SSP, solver="pso")
-    with pytest.raises(InputError, match="label them apart"):
+    with pytest.raises(InputError, match="give them different labels"):
         Study(tasks=(task, replace(task, settings={"population": 20})))
 
 
@@ -241,7 +242,7 @@ def test_study_file(tmp_path: Path) -> None:
     problem = tasks[0].problem.load()
     assert problem.options["robot"] == "nao-v6" and problem.value("swing_height_m.upper") == 0.02
     assert tasks[2].make_search() == ParticleSwarm(population=20) and tasks[2].stop == Stop(evaluations=700, target=0.9)
-    assert settings_from(json.loads(json.dumps(settings.to_json())), "again").tasks() == tasks
+    assert parse_settings(json.loads(json.dumps(settings.to_json())), "again").tasks() == tasks
 
 
 @pytest.mark.parametrize(
@@ -288,10 +289,10 @@ def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
-            return attempt(*job)
+            return try_task(*job)
 
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(compare.study.workers, "attempt", swallowing)
+    monkeypatch.setattr(compare.study.workers, "try_task", swallowing)
     with pytest.raises(KeyboardInterrupt):
         run_study(Study(tasks=(Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
     assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from compare.study.workers import side_by_side
+from compare.study.workers import run_in_processes
 from nlp_gait.errors import WorkerError
 
 
@@ -22,4 +22,4 @@ def no_reader() -> None:
 def test_a_process_that_is_gone_is_one_sentence(call: Callable[[], None]) -> None:
     """Also outside studies, where nothing is tried again; a broken pipe is not taken for the reader of the output."""
     with pytest.raises(WorkerError, match="a worker process died"):
-        list(side_by_side({0: call, 1: os.getpid}, workers=2))
+        list(run_in_processes({0: call, 1: os.getpid}, workers=2))

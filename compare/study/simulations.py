@@ -9,7 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.record import RunRecord, gait_of, run_file
+from compare.study.record import RunRecord, load_gait
+from compare.study.record_files import locate_run
 from compare.study.store import FOLDER as STORE
 from compare.study.store import Store
 from nlp_gait.decoding import decode
@@ -28,7 +29,7 @@ REMEDY = "delete it and rerun with --engine"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Played:
+class SimulatedGait:
     """How one gait fared in the engine, beside what the model says of it.
 
     Attributes:
@@ -56,9 +57,9 @@ class Played:
     way: float | None
 
 
-def play_records(
+def simulate_records(
     folder: Path, records: Sequence[RunRecord], drive: Drive, progress: Callable[[str], None] | None = None
-) -> list[Played]:
+) -> list[SimulatedGait]:
     """Simulate the gaits of records whose problem can be simulated, a cycle for ten steps; load what is stored.
 
     A stored gait is simulated again only if its gait, drive, robot or engine have changed.
@@ -77,19 +78,19 @@ def play_records(
     store = Store(folder, ignore_progress)
     found = []
     for record in records:
-        result = gait_of(record)
+        result = load_gait(record)
         if (model := result.problem.display.simulation_model) is not None:
             steps = STEPS if model.repeats else None
             plan = make_plan(result, steps)
             inputs = {**_gait(record), "drive": asdict(drive), "model": f"{_digest(plan, drive)}, {version}"}
             played = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
-            found.append(decode(Played, played))
+            found.append(decode(SimulatedGait, played))
         if progress is not None:
             progress(f"{record.problem} {record.solver}")
     return found
 
 
-def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
+def load_simulations(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
     """Return the stored simulations of these records' gaits; none of a gait that has changed since. Needs no MuJoCo.
 
     Raises:
@@ -102,7 +103,7 @@ def kept_plays(folder: Path, records: Sequence[RunRecord]) -> list[Played]:
         stored = store.load(_name(record))
         if stored is not None and _gait(record).items() <= stored.inputs.items():
             with convert_errors(f"simulation {_name(record)!r} in {str(folder)!r} is damaged", InputError, REMEDY):
-                found.append(decode(Played, stored.value))
+                found.append(decode(SimulatedGait, stored.value))
     return found
 
 
@@ -116,7 +117,7 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
         model, engine = walk.model_J_per_m, walk.engine_J_per_planned_m
         way = None if walk.walked_m is None else walk.walked_m / walk.planned_m
     return asdict(
-        Played(
+        SimulatedGait(
             problem=record.problem,
             solver=record.solver,
             run=record.run,
@@ -132,7 +133,7 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
 
 
 def _name(record: RunRecord) -> str:
-    return run_file(Path("simulations"), record.problem, record.solver, record.run).with_suffix("").as_posix()
+    return locate_run(Path("simulations"), record.problem, record.solver, record.run).with_suffix("").as_posix()
 
 
 def _gait(record: RunRecord) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Results from elsewhere as records of a study: judged like everything else; what is not known stays unknown."""
+"""Results from elsewhere as records of a study: judged like all others; unknown values stay unknown."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.study import RECORDS, read_records
+from compare.study.record_files import RECORDS, read_records
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.backends.identity import hash_json, identify_problem
 from nlp_gait.columns import Table, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 
-# Columns beside the variables.
+# Table next to the variables.
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
 
 
-def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) -> tuple[Table, Array]:
-    """Points (m, n) of a CSV file: columns by the variables' names in any order, or without a header in the order of x.
+def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) -> tuple[Table, Array]:
+    """Read the points (m, n) in a CSV file: columns by the variables' names in any order, or without a header in the order of x.
 
     Args:
         path: of the file.
-        problem: whose points they are.
-        beside: names of columns that may stand beside the variables.
+        problem: of the points.
+        others: names of further columns that are allowed.
 
     Raises:
-        InputError: the file cannot be read, or a row is no point.
-        UnknownNameError: a column that nobody reads.
+        InputError: the file cannot be read, or a row is not a point.
+        UnknownNameError: an unknown column.
     """
     table = read_table(path, "points")
     if table.header:
-        table.check_header(problem.names, beside)
+        table.check_header(problem.names, others)
         order = [table.header.index(name) for name in problem.names]
     elif table.width == len(problem.names):
         order = list(range(table.width))
@@ -55,21 +55,22 @@ def read_points(path: Path, problem: GaitProblem, beside: Sequence[str] = ()) ->
     return table, points
 
 
-def imported(
+def import_runs(
     spec: ProblemSpec, finals: Path, label: str, histories: Path | None = None, evaluations: int | None = None
 ) -> list[RunRecord]:
-    """A record for each row of a file of final points.
+    """Return a record for each row of a file of final points.
 
     Args:
         spec: the problem.
-        finals: one row a run: the variables and, where known, ``run``, ``seed``, ``objective`` and ``violation`` as claimed,
-            ``evaluations``, ``time_s``.
-        label: what the study calls the solver.
-        histories: best so far: ``run``, ``evaluations``, ``objective`` (empty while nothing was feasible) and maybe ``time_s``.
-        evaluations: of every run, where neither file says it.
+        finals: one row for each run: the variables and, where known, ``run``, ``seed``, ``objective`` and ``violation`` as
+            claimed, ``evaluations``, ``time_s``.
+        label: of the solver in the study.
+        histories: best so far: ``run``, ``evaluations``, ``objective`` (empty before the first feasible point) and optionally
+            ``time_s``.
+        evaluations: of every run, if neither file has them.
 
     Raises:
-        InputError: a file cannot be read, or holds what no run can have.
+        InputError: a file cannot be read, or contains impossible values.
     """
     if not LABEL.fullmatch(label):
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
@@ -78,20 +79,19 @@ def imported(
     given = {name: None if name in problem.names else table.column(name) for name in FINALS}
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
-        raise InputError(f"{table.owner}: a run stands twice")
+        raise InputError(f"{table.owner}: a run is duplicated")
     known = {} if histories is None else _histories(histories, runs)
     part, objective = identify_problem(problem), asdict(problem.objective)
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
-        verdict = Verdict.of(evaluate(problem, x))
+        verdict = Verdict.from_evaluation(evaluate(problem, x))
         history, seconds = known.get(run, (None, ()))
         if history is None:
             count = row["evaluations"] if given["evaluations"] else evaluations
             if count is None:
                 raise InputError(
-                    f"{table.owner} says nothing of evaluations: add a column 'evaluations', give --history, or --evaluations N "
-                    "for all runs"
+                    f"{table.owner} has no evaluations: add a column 'evaluations', or use --history or --evaluations"
                 )
             history = History(
                 evaluations=(table.count("evaluations", k, count, 1),),
@@ -138,7 +138,6 @@ def imported(
 
 
 def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
-    """Best so far and times by run."""
     table = read_table(path, "history")
     table.check_header(HISTORY, ("time_s",))
     columns = [table.column(name) or () for name in HISTORY]
@@ -165,8 +164,8 @@ def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tupl
     }
 
 
-def imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
-    """Imported records of a folder that are of the very problems of some records."""
+def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Return the imported records in a folder whose problems are those of some records."""
     if not (folder / RECORDS).is_dir():
         return []
     known = {record.problem: record.definition["problem"].get("sha256") for record in records}

@@ -12,11 +12,11 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study import engine, task
-from compare.study.engine import kept_plays, play_records
+from compare.study import simulations, task
 from compare.study.record import RunRecord
+from compare.study.record_files import RECORDS
+from compare.study.simulations import load_simulations, simulate_records
 from compare.study.store import Store
-from compare.study.study import RECORDS
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Display
@@ -81,19 +81,19 @@ def test_a_later_report_shows_it_without_the_engine(
 def test_what_is_kept_is_not_played_again(
     report: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "simulate_plan", refuse)
+    monkeypatch.setattr(simulations, "simulate_plan", refuse)
     gaits = report["gaits"]
     assert isinstance(gaits, list)
-    assert [p.engine for p in play_records(folder, [dsp("pso", 3.0)], Drive())] == [gaits[0]["engine"]]
+    assert [p.engine for p in simulate_records(folder, [dsp("pso", 3.0)], Drive())] == [gaits[0]["engine"]]
     with pytest.raises(AssertionError, match="played again"):
-        play_records(folder, [dsp("pso", 3.0)], DRIVES["held"])
+        simulate_records(folder, [dsp("pso", 3.0)], DRIVES["held"])
     with pytest.raises(AssertionError, match="played again"):
-        play_records(folder, [dsp("pso", 3.0, 0.5)], Drive())
+        simulate_records(folder, [dsp("pso", 3.0, 0.5)], Drive())
 
 
 def test_a_gait_that_has_changed_has_no_playback_to_show(report: dict[str, object], folder: Path) -> None:
-    assert len(kept_plays(folder, [dsp("pso", 3.0), dsp("ga", 4.0, 0.35)])) == 2
-    assert kept_plays(folder, [dsp("pso", 3.0, 0.5), dsp("aco", 3.0)]) == []
+    assert len(load_simulations(folder, [dsp("pso", 3.0), dsp("ga", 4.0, 0.35)])) == 2
+    assert load_simulations(folder, [dsp("pso", 3.0, 0.5), dsp("aco", 3.0)]) == []
 
 
 def test_problems_that_cannot_be_played_are_left_out_or_refused(
@@ -101,8 +101,8 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
 ) -> None:
     pytest.importorskip("mujoco")
     still = SimpleNamespace(problem=SimpleNamespace(display=Display()))
-    monkeypatch.setattr(engine, "gait_of", lambda _: still)
-    assert play_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
+    monkeypatch.setattr(simulations, "load_gait", lambda _: still)
+    assert simulate_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
     write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
     refused = CliRunner().invoke(app, ["report", str(tmp_path), "--engine"])
@@ -114,7 +114,7 @@ def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
     inputs = {"problem": gait.definition["problem"], "x": dict(gait.x)}
     Store(tmp_path).save("simulations/nao-dsp/pso-0000", inputs, {})
     with pytest.raises(InputError, match="delete it and rerun with --engine"):
-        kept_plays(tmp_path, [dsp("pso", 3.0)])
+        load_simulations(tmp_path, [dsp("pso", 3.0)])
 
 
 def test_a_report_without_playbacks_says_how_to_get_them(tmp_path: Path) -> None:

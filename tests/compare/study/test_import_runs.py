@@ -15,9 +15,10 @@ from compare.analysis.editions import label_editions
 from compare.analysis.solver_table import format_cells, summarise
 from compare.judge import evaluate
 from compare.report import rebuild_report
-from compare.study.imported import imported, imported_records, read_points
+from compare.study.import_runs import import_runs, read_imported_records, read_points
+from compare.study.record_files import read_records, write_record
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, keep_record, read_records, run_study
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import as_json, nlp_gait
@@ -38,7 +39,7 @@ def finals(folder: Path, *, header: bool = True, extra: dict[str, list[object]] 
 
 def test_each_row_is_a_judged_record(tmp_path: Path) -> None:
     extra = {"run": [4, 5, 6], "objective": [0.5, "", 0.7], "violation": [0, 0, 2.5], "evaluations": [100, 200, 300]}
-    records = imported(WALK, finals(tmp_path, extra=extra), "GA (MATLAB)")
+    records = import_runs(WALK, finals(tmp_path, extra=extra), "GA (MATLAB)")
     assert [(r.run, r.claimed, r.claimed_objective, r.evaluations["f"]) for r in records] == [
         (4, True, 0.5, 100),
         (5, False, None, 200),
@@ -62,7 +63,7 @@ def test_columns_in_any_order_without_a_header_and_with_other_separators(tmp_pat
 def test_histories_give_runs_their_course(tmp_path: Path) -> None:
     history = tmp_path / "h.csv"
     history.write_text("run,evaluations,objective,time_s\n0,10,,0.1\n0,50,0.3,0.5\n1,10,0.2,0.1\n2,10,0.1,0.2\n")
-    first, *_ = imported(WALK, finals(tmp_path), "ga", history)
+    first, *_ = import_runs(WALK, finals(tmp_path), "ga", history)
     assert first.history.evaluations == (10, 50) and first.history.objective == (None, 0.3)
     assert first.time_s.history == (0.1, 0.5) and first.time_s.solve == 0.5
 
@@ -71,9 +72,9 @@ def test_histories_give_runs_their_course(tmp_path: Path) -> None:
 def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     study = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
-    records = imported(WALK, finals(tmp_path), "GA (MATLAB)", evaluations=5000)
+    records = import_runs(WALK, finals(tmp_path), "GA (MATLAB)", evaluations=5000)
     for record in records:
-        keep_record(record, tmp_path)
+        write_record(record, tmp_path)
     again = read_records(tmp_path)
     assert {record.solver for record in again} == {"pso", "GA (MATLAB)"}
     (comparison,) = compare_problems(again)
@@ -95,12 +96,12 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
 
 
 def test_a_file_that_grows_keeps_the_rows_that_it_had(tmp_path: Path) -> None:
-    for record in imported(WALK, finals(tmp_path), "ga", evaluations=100):
-        keep_record(record, tmp_path)
+    for record in import_runs(WALK, finals(tmp_path), "ga", evaluations=100):
+        write_record(record, tmp_path)
     before = read_records(tmp_path)
     (tmp_path / "finals.csv").write_text((tmp_path / "finals.csv").read_text() + ",".join(map(str, POINTS[0])) + "\n")
-    for record in imported(WALK, tmp_path / "finals.csv", "ga", evaluations=100):
-        keep_record(record, tmp_path)
+    for record in import_runs(WALK, tmp_path / "finals.csv", "ga", evaluations=100):
+        write_record(record, tmp_path)
     assert [r.definition for r in read_records(tmp_path)][:3] == [r.definition for r in before]
     assert len(read_records(tmp_path)) == 4
 
@@ -123,12 +124,12 @@ def test_a_file_that_is_none_is_refused_by_its_line(text: str, message: str, tmp
 
 
 def test_what_nobody_can_know_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(GaitError, match="says nothing of evaluations: add a column"):
-        imported(WALK, finals(tmp_path), "ga")
+    with pytest.raises(GaitError, match="has no evaluations: add a column"):
+        import_runs(WALK, finals(tmp_path), "ga")
     with pytest.raises(GaitError, match="--as takes letters"):
-        imported(WALK, finals(tmp_path), "../ga", evaluations=3)
+        import_runs(WALK, finals(tmp_path), "../ga", evaluations=3)
     with pytest.raises(GaitError, match="unknown column of .* 'objectiv'; did you mean .*'objective'"):
-        imported(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
+        import_runs(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
 
 
 def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
@@ -170,14 +171,14 @@ def test_the_commands(tmp_path: Path) -> None:
 def test_a_history_that_is_none_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "h.csv").write_text(f"run,evaluations,objective\n{text}")
     with pytest.raises(GaitError, match=message):
-        imported(WALK, finals(tmp_path), "ga", tmp_path / "h.csv")
+        import_runs(WALK, finals(tmp_path), "ga", tmp_path / "h.csv")
 
 
 def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: Path) -> None:
     """Runs are rows, seeds are runs; several entries at one count are allowed; every value is in the key."""
-    with pytest.raises(GaitError, match="a run stands twice"):
-        imported(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)
-    plain = imported(WALK, finals(tmp_path), "ga", evaluations=3)
+    with pytest.raises(GaitError, match="a run is duplicated"):
+        import_runs(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)
+    plain = import_runs(WALK, finals(tmp_path), "ga", evaluations=3)
     assert [(r.run, r.seed, r.evaluations, r.claimed, r.claimed_violation) for r in plain] == [
         (k, k, {"f": 3}, False, None) for k in range(3)
     ]
@@ -185,23 +186,23 @@ def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: 
         assert record.history.objective == (record.verdict.objective if record.verdict.feasible else None,)
         assert (record.failed_evaluations, record.iterations) == (0, 0)
     said = {"seed": [7, 8, 9], "time_s": [0.5, "", 2.0], "objective": [1, 2, 3]}
-    full = imported(WALK, finals(tmp_path, extra=said), "ga", evaluations=3)
+    full = import_runs(WALK, finals(tmp_path, extra=said), "ga", evaluations=3)
     assert [(r.seed, r.claimed, r.definition["seed"]) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
     assert (full[0].time_s.solve, full[2].time_s.history) == (0.5, (2.0,)) and math.isnan(full[1].time_s.solve)
     keys = {r.definition["imported"]["sha256"] for r in (*plain, *full)}
     assert len(keys) == 6
     (tmp_path / "h.csv").write_text("run,evaluations,objective\n0,10,\n0,10,0.5\n1,10,0.5\n2,10,0.5\n")
-    first, second, _ = imported(WALK, finals(tmp_path), "ga", tmp_path / "h.csv", evaluations=3)
+    first, second, _ = import_runs(WALK, finals(tmp_path), "ga", tmp_path / "h.csv", evaluations=3)
     assert first.history.evaluations == (10, 10) and second.evaluations == {"f": 10}
     assert len(first.time_s.history) == 2 and math.isnan(first.time_s.solve)
 
 
 def test_records_from_elsewhere_belong_to_the_very_problem(tmp_path: Path) -> None:
     """Another value of a parameter is another problem; a folder without records has none."""
-    own = imported(WALK, finals(tmp_path), "ga", evaluations=3)
-    assert imported_records(tmp_path / "absent", own) == []
+    own = import_runs(WALK, finals(tmp_path), "ga", evaluations=3)
+    assert read_imported_records(tmp_path / "absent", own) == []
     for record in own:
-        keep_record(record, tmp_path)
-    assert [record.run for record in imported_records(tmp_path, own)] == [0, 1, 2]
-    other = imported(ProblemSpec(name="walk12", values={"lambda": 0.5}), finals(tmp_path), "ga", evaluations=3)
-    assert imported_records(tmp_path, other) == []
+        write_record(record, tmp_path)
+    assert [record.run for record in read_imported_records(tmp_path, own)] == [0, 1, 2]
+    other = import_runs(ProblemSpec(name="walk12", values={"lambda": 0.5}), finals(tmp_path), "ga", evaluations=3)
+    assert read_imported_records(tmp_path, other) == []

@@ -1,0 +1,104 @@
+"""The records of a study in its folder: ``<folder>/records/<problem>/<solver>-<run>.json``, one file for each run.
+
+A record that belongs to another definition keeps its content under ``<solver>-<run>.<key>.json``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from compare.study.definition import hash_definition
+from compare.study.record import RunRecord, read_record
+from compare.study.task import Task
+from nlp_gait.disk import rename
+from nlp_gait.errors import InputError, OutputError
+from nlp_gait.files import convert_errors, make_writable_folder, write_json
+
+RECORDS = "records"
+KEY_DIGITS = 8
+
+
+def locate_run(folder: Path, problem: str, solver: str, run: int) -> Path:
+    """Return ``<folder>/<problem>/<solver>-<run>.json``; a colon in a label becomes a full stop."""
+    problem, solver = (title.replace(":", ".") for title in (problem, solver))
+    return folder / problem / f"{solver}-{run:04d}.json"
+
+
+def locate_record(folder: Path, task: Task) -> Path:
+    """Return the file to which a task's record is written in the folder of a study."""
+    return locate_run(folder / RECORDS, task.problem.title, task.title, task.run)
+
+
+def write_record(record: RunRecord, folder: Path) -> Path:
+    """Write a record to the folder of a study, and return its file; a record of another definition there is renamed.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = locate_run(folder / RECORDS, record.problem, record.solver, record.run)
+    if not path.parent.is_dir():
+        make_writable_folder(path.parent)
+    if path.exists():
+        with suppress(InputError):  # a damaged record is overwritten
+            earlier = read_record(path).definition
+            if hash_definition(earlier) != hash_definition(record.definition):
+                with convert_errors(f"cannot write to {str(path.parent)!r}", OutputError):
+                    rename(path, _add_key(path, earlier))
+    write_json(path, record.to_json())
+    return path
+
+
+def read_records(folder: Path) -> list[RunRecord]:
+    """Return all records in the folder of a study, by file name; those of other definitions come last.
+
+    Raises:
+        InputError: there are none, or one is damaged.
+    """
+    with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
+        paths = sorted((folder / RECORDS).glob("*/*.json"))
+    if not paths:
+        raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>.json)")
+    records = [(path, _read_checked(path)) for path in paths]
+    records.sort(key=lambda item: item[0] != locate_run(folder / RECORDS, item[1].problem, item[1].solver, item[1].run))
+    return [record for _, record in records]
+
+
+def find_record(folder: Path, task: Task) -> tuple[RunRecord | None, RunRecord | None]:
+    """Return the record of a task, or None and, if there is one, the record of another definition in its place.
+
+    Raises:
+        InputError: a record is damaged.
+    """
+    path = locate_record(folder, task)
+    if not path.exists():
+        return None, None
+    definition, other = task.definition(), None
+    for candidate in (path, _add_key(path, definition)):
+        if candidate.exists():
+            record = _read_checked(candidate)
+            if hash_definition(record.definition) == hash_definition(definition):
+                return record, None
+            other = other or record
+    return None, other
+
+
+def _add_key(path: Path, definition: Mapping[str, Any]) -> Path:
+    return path.with_name(f"{path.stem}.{hash_definition(definition)[:KEY_DIGITS]}.json")
+
+
+def _read_checked(path: Path) -> RunRecord:
+    """Return the record; a copy under another name is refused, because it would count twice."""
+    record = read_record(path)
+    own = locate_run(path.parents[1], record.problem, record.solver, record.run)
+    if path not in (own, _add_key(own, record.definition)):
+        raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
+    if (
+        path != own
+        and own.exists()
+        and hash_definition(read_record(own).definition) == hash_definition(record.definition)
+    ):
+        raise InputError(f"record {str(path)!r} is also {own.parent.name}/{own.name}; delete one of them")
+    return record

@@ -1,0 +1,195 @@
+"""One run of a solver on a problem: from a task to its record."""
+
+from __future__ import annotations
+
+import json
+import math
+import multiprocessing
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.study.record import History, RunRecord, Times, Verdict, parse_record
+from compare.study.task import IPOPT, Task, describe_settings
+from metaheuristics.minimize import minimize
+from metaheuristics.registry import handling
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.backends.solve import make_solution
+from nlp_gait.errors import InputError, WorkerError
+from nlp_gait.files import LARGEST_FILE, replace_nan
+from nlp_gait.formulation.solution import Best
+from nlp_gait.processes import run_isolated
+
+Run = Callable[[Task, RunRecord | None], RunRecord]
+"""Performs one run of a task, from the run that it polishes if it does; it is sent to worker processes."""
+
+MOST_REASON = 500  # characters of an error in a record
+# A run that respects its time limit ends within it and is then judged; its process is killed this long after the limit.
+GRACE_S = 5.0
+# Number of runs of one solver for which compiling is weighed. The same number in every study: compiled and interpreted functions
+# differ in the last bits, and no run may depend on how many others there are.
+PLANNED_RUNS = 20
+
+
+def run_task(task: Task, start: RunRecord | None = None, callback: Callable[..., None] | None = None) -> RunRecord:
+    """Perform one run and judge its result.
+
+    Args:
+        task: what to run.
+        start: the run that this one polishes, if it does; its cost is included.
+        callback: called with X, f, violation of every generation of a search.
+
+    Raises:
+        InputError: the run to polish has no point.
+    """
+    return _search(task, callback) if task.is_search else _solve(task, start)
+
+
+def try_task(task: Task, start: RunRecord | None = None, run: Run = run_task) -> RunRecord:
+    """Perform one run; whatever fails in it becomes its record instead of ending the study.
+
+    User code runs in its own process, which is killed if it does not return.
+    """
+    return _run_isolated(task, start, run) if task.is_user_code else _run_caught(task, start, run)
+
+
+def _run_caught(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
+    try:
+        return run(task, start)
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split())[:MOST_REASON]
+        return RunRecord.make_failed(task, ": ".join(filter(None, (type(error).__name__, reason))))
+
+
+def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
+    """Run in a forked process, in this one where it may not fork (Windows, Dask's workers).
+
+    Everything but the run is built before the fork, so that the time limit is for the run alone. What it prints is dropped.
+    """
+    if "fork" not in multiprocessing.get_all_start_methods() or multiprocessing.current_process().daemon:
+        return _run_caught(task, start, run)
+    problem = task.problem.load()
+    compile_objective(problem, threads=1)
+    evaluate(problem, 0.5 * (problem.lower + problem.upper))
+
+    def call() -> bytes:
+        return json.dumps(replace_nan(_run_caught(task, start, run).to_json()), allow_nan=False).encode()
+
+    limit = task.stop.time_limit_s
+    try:
+        record = parse_record(json.loads(run_isolated(call, None if limit is None else limit + GRACE_S, LARGEST_FILE)))
+    except TimeoutError:
+        return RunRecord.make_failed(
+            task, f"it did not return within {GRACE_S:g} s after the time limit of {limit:g} s"
+        )
+    except WorkerError as error:
+        return RunRecord.make_failed(task, str(error))
+    except (ValueError, RecursionError) as error:
+        return RunRecord.make_failed(task, f"its process sent no record: {error}")
+    if (record.problem, record.solver, record.run) != (task.problem.title, task.title, task.run):
+        return RunRecord.make_failed(task, "its process sent the record of another run")
+    return record
+
+
+def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
+    started = time.perf_counter()
+    problem = task.problem.load()
+    built = time.perf_counter()
+    objective = compile_objective(problem, threads=1)  # runs take the processors
+    compiled = time.perf_counter()
+    sign, stop = problem.objective.sign, task.stop
+    result = minimize(
+        objective,
+        task.make_search(),
+        evaluations=stop.evaluations,
+        seed=task.run_seed,
+        handling=handling(task.handling.name, **task.handling.settings),
+        target=None if stop.target is None else sign * stop.target,
+        stagnation=stop.stagnation,
+        time_limit_s=stop.time_limit_s,
+        callback=callback,
+    )
+    history = result.history
+    best = [
+        sign * float(f) if v == 0.0 and math.isfinite(f) else None
+        for f, v in zip(history.objective, history.violation, strict=True)
+    ]
+    return RunRecord.from_task(
+        task,
+        settings={**describe_settings(result.algorithm), "handling": describe_settings(result.handling)},
+        status="; ".join(result.reasons),
+        claimed=result.feasible,
+        x=problem.by_name(result.x),
+        claimed_objective=sign * result.objective if math.isfinite(result.objective) else None,
+        claimed_violation=result.violation if math.isfinite(result.violation) else None,
+        verdict=Verdict.from_evaluation(evaluate(problem, result.x)),
+        evaluations={"f": result.evaluations},
+        failed_evaluations=result.failed_evaluations,
+        iterations=result.generations,
+        active_constraints=(),
+        history=History(evaluations=tuple(int(e) for e in history.evaluations), objective=tuple(best)),
+        time_s=Times(
+            build=built - started,
+            compile=compiled - built,
+            solve=result.time_s,
+            objective=result.objective_time_s,
+            history=tuple(float(t) for t in history.elapsed_s),
+        ),
+    )
+
+
+def _solve(task: Task, start: RunRecord | None) -> RunRecord:
+    started = time.perf_counter()
+    problem, solver = task.problem.load(), task.make_solver()
+    if task.start:
+        x0 = problem.check_within(task.start)
+    elif start is None:
+        x0 = problem.start_point(np.random.default_rng(task.run_seed))
+    elif not start.x:
+        raise InputError(f"{start.solver}, run {start.run}, has no point to polish: {start.status}")
+    else:
+        x0 = problem.check_within(start.x)
+    outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
+    prepared_s = time.perf_counter() - started - outcome.time_s
+    compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
+    settings = solver.to_dict()
+    if outcome.linear_solver:
+        settings["linear_solver"] = outcome.linear_solver
+    solution = make_solution(problem, [outcome])
+    evaluations, earlier = outcome.evaluations.by_kind(), list[Best]()
+    before, before_s = (0, 0.0) if start is None else (start.evaluations["f"], start.time_s.solve)
+    if start is not None:
+        evaluations["f"] += before
+        earlier = list(map(Best, start.history.evaluations, start.history.objective, start.time_s.history))
+    # A solver that keeps no history has its end.
+    own = outcome.history or (
+        Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s),
+    )
+    history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
+    verdict = Verdict.from_evaluation(evaluate(problem, outcome.x))
+    return RunRecord.from_task(
+        task,
+        settings=settings,
+        status=solution.status if task.solver == IPOPT else outcome.status,  # other solvers are quoted
+        claimed=outcome.claimed,
+        x=problem.by_name(outcome.x),
+        claimed_objective=verdict.objective if math.isfinite(verdict.objective) else None,
+        claimed_violation=outcome.violation if math.isfinite(outcome.violation) else None,
+        verdict=verdict,
+        evaluations=evaluations,
+        failed_evaluations=0,
+        iterations=outcome.iterations,
+        active_constraints=solution.active_constraints,
+        history=History(
+            evaluations=tuple(best.calls for best in history), objective=tuple(best.objective for best in history)
+        ),
+        time_s=Times(
+            build=prepared_s - compile_s,
+            compile=compile_s,
+            solve=before_s + outcome.time_s,
+            objective=outcome.objective_s,
+            history=tuple(best.time_s for best in history),
+        ),
+    )

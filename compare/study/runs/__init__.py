@@ -1,1 +1,0 @@
-"""One kind of solver a file: from a task to its record."""
