@@ -1,12 +1,13 @@
-"""Inverse kinematics of any leg of six turning joints under any pose of the torso, over a flat sole: root and rates.
+"""Inverse kinematics of a leg with six revolute joints for any pose of the torso, over a flat sole: root and rates.
 
-The leg is seen from the foot, whose axes are the world's: the torso turns and moves at its far end. Newton's method starts at
-the nearest leg with a spherical hip and a universal ankle, and works on pairs (cosine, sine) of the angles: there is one
-transcendental function for each joint, at the end.
+The chain begins at the foot, whose axes are the world's, and ends at the torso. Newton's method starts at the nearest leg with a
+spherical hip and a universal ankle, and works on pairs (cosine, sine) of the angles: there is one transcendental function for
+each joint, at the end.
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,7 +17,6 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
-from nlp_gait.symbolic.leg_poses import sample_flat_foot_poses
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -24,25 +24,30 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # Keeps square roots and norms away from zero, where a pose is out of reach.
 TINY = 1e-20
-# A pivot is at least this far from zero, with lengths in those of a leg: a knee bent by 0.14 rad has 0.07. The second one is for
-# a solver on its way, which may come by poses that no gait has.
-LEAST_PIVOT, LEAST_PIVOT_ON_THE_WAY = 1e-6, 1e-3
-# How far a leg may miss its foot before its rates are taken as zero, as a share of its length: a leg out of reach has none.
+# Least absolute value of a pivot, with lengths in units of the leg's length: a knee bent by 0.14 rad has 0.07. The second one is
+# for the iterates of a solver, which may be poses that no gait has.
+LEAST_PIVOT, LEAST_PIVOT_OF_ITERATES = 1e-6, 1e-3
+# Misfit of a leg as a share of its length beyond which its rates are zero: the pose is out of reach.
 CLOSED = 1e-6
-# Newton's last step but one must have come this near, in lengths of a leg and rad; else the guess stays.
+# Largest misfit before Newton's last step, in lengths of a leg and rad; else the guess is used.
 NEAR = 0.01
-ORDER_POSES = 400  # on which the order of elimination is chosen
+# Random poses on which Newton's method is tried, and those on which the order of elimination is chosen.
+POSES, ORDER_POSES, SEED = 2000, 400, 0
+# Distance of hip and ankle as a share of the leg's length, its direction to the front and to the side, and the lean of the torso.
+DISTANCES = (0.59, 0.97)
+LARGEST_PITCH, LARGEST_ROLL = math.radians(28.0), math.radians(15.0)
+LEAN_PITCH, LEAN_ROLL = 0.3, 0.15
 
 
 class TorsoMotion(NamedTuple):
-    """How the torso moves against a standing or swinging flat foot, in the world's axes.
+    """Motion of the torso relative to a standing or swinging flat foot, in the world's axes.
 
     Attributes:
         rotation: (3, 3) from the torso's axes.
         spin: (3,) [rad/s].
         spin_rate: (3,) [rad/s^2].
         point_m: (3,) a point of the torso from its origin, in its axes [m].
-        place: (3,) of that point from the origin of the foot's link [m].
+        place: (3,) position of that point from the origin of the foot's link [m].
     """
 
     rotation: SX
@@ -58,7 +63,7 @@ class LegMotion(NamedTuple):
     Attributes:
         joints: (6,) [rad] with both derivatives.
         reach: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach.
-        miss: by how much the angles miss the torso's pose: the larger of distance and turn times the leg's length [m].
+        miss: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m].
     """
 
     joints: Motion
@@ -70,7 +75,7 @@ class _Chain(NamedTuple):
     """Forward kinematics of a leg from its foot.
 
     Attributes:
-        rotations: (3, 3) of the links before each joint, the torso's first.
+        rotations: (3, 3) of the links before each joint, the torso first.
         axes: (3,) of each joint in the world.
         levers: (3,) from each joint to the hip centre.
         segments: (3,) from each joint to the one before it, the hip centre before the first; in the link between.
@@ -85,15 +90,15 @@ class _Chain(NamedTuple):
 
 
 def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmooth, *, held: bool) -> LegMotion:
-    """Angles, velocities and accelerations of a leg, defined for every finite input.
+    """Return the angles, velocities and accelerations of a leg, defined for every finite input.
 
     Args:
-        leg: its numbers.
-        steps: of Newton's method after the guess; see ``steps_needed``.
-        torso: what is asked for.
+        leg: data of the leg.
+        steps: of Newton's method after the guess.
+        torso: its motion.
         margin: on the reach of the knee (see ``Nonsmooth.acos``).
         ops: interpretation of acos and root.
-        held: whether a leg that misses its foot stands still; else its rates are those of the angles found.
+        held: whether the rates of a leg that misses its foot are zero; else they are those of its angles.
     """
     arm = torso.rotation @ DM(leg.hip_m - torso.point_m)
     swept = ca.cross(torso.spin, arm)
@@ -103,13 +108,13 @@ def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmo
         torso.place.acceleration + ca.cross(torso.spin_rate, arm) + ca.cross(torso.spin, swept),
     )
     q = ops.root(make_leg_root(leg, steps, ops, margin), ca.vertcat(hip.position, ca.vec(torso.rotation)))
-    bent = q if ops.exact else _kept_bent(leg, q, margin)
-    chain = _chain(leg, ca.cos(bent), ca.sin(bent))
-    off = _misfit(leg, chain, hip.position, torso.rotation)
+    bent = q if ops.exact else _keep_bent(leg, q, margin)
+    chain = _build_chain(leg, ca.cos(bent), ca.sin(bent))
+    off = _compute_misfit(leg, chain, hip.position, torso.rotation)
     miss = leg.length_m * ca.sqrt(ca.fmax(ca.sumsqr(off[:3]), ca.sumsqr(off[3:])))
-    factors = _factors(leg, chain, LEAST_PIVOT if ops.exact else LEAST_PIVOT_ON_THE_WAY)
+    factors = _factorise(leg, chain, LEAST_PIVOT if ops.exact else LEAST_PIVOT_OF_ITERATES)
     qd = factors.solve(ca.vertcat(hip.velocity / leg.length_m, torso.spin))
-    linear, angular = _bias(chain, qd)
+    linear, angular = _compute_bias(chain, qd)
     qdd = factors.solve(ca.vertcat((hip.acceleration - linear) / leg.length_m, torso.spin_rate - angular))
     if held:
         closed = miss <= CLOSED * leg.length_m
@@ -117,10 +122,10 @@ def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmo
     return LegMotion(Motion(q, qd, qdd), _knee_cosine(leg, ca.sumsqr(hip.position - _ankle(leg))), miss)
 
 
-def _kept_bent(leg: Leg, q: SX, margin: SX) -> SX:
-    """Angles with a knee that is bent by at least half of what the reach margin asks for.
+def _keep_bent(leg: Leg, q: SX, margin: SX) -> SX:
+    """Bend the knee by at least half of what the reach margin requires.
 
-    At a straight knee rates are infinite, a wall that a solver on its way cannot pass; where the reach is kept nothing changes.
+    At a straight knee rates are infinite, which a solver cannot pass; within the reach margin nothing changes.
     """
     least = ca.acos(1 - ca.fmax(margin, LEAST_REACH_MARGIN)) / 2
     knee = leg.straight_rad + leg.bend * ca.fmax(leg.bend * (q[3] - leg.straight_rad), least)
@@ -128,26 +133,26 @@ def _kept_bent(leg: Leg, q: SX, margin: SX) -> SX:
 
 
 def make_leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
-    """The leg's six equations: inputs are the hip centre from the foot's origin (3,) [m] and the torso's rotation (9,)."""
+    """Return the six equations of a leg; inputs: hip centre from the foot's origin (3,) [m], rotation of the torso (9,)."""
 
     def residual(q: SX, inputs: SX) -> SX:
-        return _misfit(leg, _chain(leg, ca.cos(q), ca.sin(q)), inputs[:3], ca.reshape(inputs[3:], 3, 3))
+        return _compute_misfit(leg, _build_chain(leg, ca.cos(q), ca.sin(q)), inputs[:3], ca.reshape(inputs[3:], 3, 3))
 
     def newton(inputs: SX) -> SX:
         hip, rotation = inputs[:3], ca.reshape(inputs[3:], 3, 3)
         cosines, sines = first = guess(leg, hip, rotation, margin, ops)
         off = SX(0)
         for _ in range(steps):
-            chain = _chain(leg, cosines, sines)
-            off = _misfit(leg, chain, hip, rotation)
-            step = _factors(leg, chain).solve(off)
+            chain = _build_chain(leg, cosines, sines)
+            off = _compute_misfit(leg, chain, hip, rotation)
+            step = _factorise(leg, chain).solve(off)
             half = step / 2  # Cayley's map: tan(step / 2) taken as step / 2
             share = 1 / (1 + half**2)
             turn_cos, turn_sin = (1 - half**2) * share, 2 * half * share
             cosines, sines = cosines * turn_cos - sines * turn_sin, sines * turn_cos + cosines * turn_sin
         if not steps:
             return ca.atan2(sines, cosines)
-        near = ca.sumsqr(off) <= NEAR**2  # else out of reach: the guess is sane there
+        near = ca.sumsqr(off) <= NEAR**2  # else out of reach, where the guess is reasonable
         cosines, sines = (ca.if_else(near, new, old) for new, old in zip((cosines, sines), first, strict=True))
         return ca.atan2(sines, cosines)
 
@@ -155,12 +160,12 @@ def make_leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
 
 
 def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[SX, SX]:
-    """Cosines and sines (6,) of the nearest leg with a spherical hip and a universal ankle: its own if it is such a leg.
+    """Return cosines and sines (6,) of the nearest leg with a spherical hip and a universal ankle.
 
     Args:
-        leg: its numbers.
-        hip: (3,) hip centre from the foot's origin, along the foot's axes [m].
-        rotation: (3, 3) of the torso against the foot.
+        leg: data of the leg.
+        hip: (3,) hip centre from the foot's origin, in the foot's axes [m].
+        rotation: (3, 3) of the torso relative to the foot.
         margin: on the reach of the knee.
         ops: interpretation of acos.
     """
@@ -170,24 +175,24 @@ def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[
     bent = leg.bend * ops.acos(_knee_cosine(leg, ca.sumsqr(from_ankle)), margin).value
     knee = leg.straight_rad + bent if leg.straight_rad else bent
     knee_turn = ca.cos(knee), ca.sin(knee)
-    # Ankle: in the shank the hip lies at m; turned by the fifth joint, that is the direction turned back by the sixth.
-    m = -(_turned(a[3], *_back(knee_turn), SX(DM(leg.thigh_m))) + DM(leg.shank_m))
-    five, six = _pair(leg.axes[4], leg.axes[5], m, from_ankle, leg.hip_m - leg.ankle_m)
+    # Ankle: m is the hip in the axes of the shank; rotated by the fifth joint it is the direction rotated back by the sixth.
+    m = -(_rotate(a[3], *_invert(knee_turn), SX(DM(leg.thigh_m))) + DM(leg.shank_m))
+    five, six = _solve_ankle(leg.axes[4], leg.axes[5], m, from_ankle, leg.hip_m - leg.ankle_m)
     # Hip: three axes through one point.
-    in_torso = _turned(a[3], *_back(knee_turn), a[2])
+    in_torso = _rotate(a[3], *_invert(knee_turn), a[2])
     for axis, turn in ((a[4], five), (a[5], six)):
-        in_torso = _turned(axis, *_back(turn), in_torso)
+        in_torso = _rotate(axis, *_invert(turn), in_torso)
     third = rotation.T @ in_torso
     first = rotation @ a[0]
     for axis, turn in ((a[5], six), (a[4], five), (a[3], knee_turn)):
-        first = _turned(axis, *turn, first)
-    turns = (*_triple(leg.axes[:3], third, first), knee_turn, five, six)
+        first = _rotate(axis, *turn, first)
+    turns = (*_solve_hip(leg.axes[:3], third, first), knee_turn, five, six)
     return ca.vertcat(*(cos for cos, _ in turns)), ca.vertcat(*(sin for _, sin in turns))
 
 
 def compute_reach(leg: Leg, q: SX) -> SX:
-    """Cosine of the knee's angle from straight, as in ``LegMotion``, for angles (6,) that are given [rad]."""
-    return _knee_cosine(leg, ca.sumsqr(_chain(leg, ca.cos(q), ca.sin(q)).hip - _ankle(leg)))
+    """Return the cosine of the knee's angle from straight, as in ``LegMotion``, for given angles (6,) [rad]."""
+    return _knee_cosine(leg, ca.sumsqr(_build_chain(leg, ca.cos(q), ca.sin(q)).hip - _ankle(leg)))
 
 
 def _ankle(leg: Leg) -> SX:
@@ -195,13 +200,13 @@ def _ankle(leg: Leg) -> SX:
 
 
 def _knee_cosine(leg: Leg, distance_squared: SX) -> SX:
-    """Cosine of the knee's angle from straight, by the law of cosines for a skew knee."""
+    """Return the cosine of the knee's angle from straight, by the law of cosines for a skew knee."""
     u, w = leg.thigh_m, leg.shank_m
     return (distance_squared - float(u @ u + w @ w) - 2 * leg.knee_terms[0]) / (2 * leg.knee_gain)
 
 
-def _pair(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
-    """Turns of the ankle's joints with Rot(fifth) Rot(sixth) seen = m: Paden's and Kahan's second subproblem."""
+def _solve_ankle(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
+    """Solve Rot(fifth) Rot(sixth) seen = m for the rotations of the ankle: Paden's and Kahan's second subproblem."""
     c = float(fifth @ sixth)
     normal = np.cross(fifth, sixth)
     sine_squared = float(normal @ normal)
@@ -210,15 +215,15 @@ def _pair(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) -> tuple[
     left = (ca.sumsqr(seen) - alpha**2 - beta**2 - 2 * c * alpha * beta) / sine_squared
     sign = 1.0 if float(at_zero @ normal) >= 0 else -1.0
     between = alpha * DM(fifth) + beta * DM(sixth) + sign * ca.sqrt(ca.fmax(left, TINY)) * DM(normal)
-    return _turn_between(fifth, between, m), _turn_between(sixth, seen, between)
+    return _find_rotation(fifth, between, m), _find_rotation(sixth, seen, between)
 
 
-def _triple(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX, SX], tuple[SX, SX]]:
-    """Turns of the hip's joints, from where they take the third axis to, and whence the first one comes.
+def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX, SX], tuple[SX, SX]]:
+    """Return the rotations of the hip's joints from the images of the first and the third axis.
 
     Args:
         axes: (3, 3).
-        third: (3,) third axis after all three turns.
+        third: (3,) third axis after all three rotations.
         first: (3,) first axis before them.
     """
     a, b, c = axes
@@ -230,13 +235,13 @@ def _triple(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX,
     rest = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, TINY))
     cos_d, sin_d = along / gain, across / gain
     two = cos_d * kappa - sin_d * rest, sin_d * kappa + cos_d * rest
-    one = _turn_between(a, _turned(SX(DM(b)), *two, SX(DM(c))), third)
-    back = _turn_between(c, _turned(SX(DM(b)), *_back(two), SX(DM(a))), first)
-    return one, two, _back(back)
+    one = _find_rotation(a, _rotate(SX(DM(b)), *two, SX(DM(c))), third)
+    back = _find_rotation(c, _rotate(SX(DM(b)), *_invert(two), SX(DM(a))), first)
+    return one, two, _invert(back)
 
 
-def _turn_between(axis: Array, before: SX, after: SX) -> tuple[SX, SX]:
-    """Cosine and sine of the turn about an axis that takes one vector as near as can be to another."""
+def _find_rotation(axis: Array, before: SX, after: SX) -> tuple[SX, SX]:
+    """Return cosine and sine of the rotation about an axis that takes one vector nearest to another."""
     k = DM(axis)
     cos = ca.dot(before, after) - ca.dot(k, before) * ca.dot(k, after)
     sin = ca.dot(k, ca.cross(before, after))
@@ -244,23 +249,21 @@ def _turn_between(axis: Array, before: SX, after: SX) -> tuple[SX, SX]:
     return cos * scale, sin * scale
 
 
-def _back(turn: tuple[SX, SX]) -> tuple[SX, SX]:
+def _invert(turn: tuple[SX, SX]) -> tuple[SX, SX]:
     return turn[0], -turn[1]
 
 
-def _turned(axis: SX, cos: SX, sin: SX, vector: SX) -> SX:
-    """A vector turned about a unit axis."""
+def _rotate(axis: SX, cos: SX, sin: SX, vector: SX) -> SX:
     return cos * vector + sin * ca.cross(axis, vector) + ((1 - cos) * ca.dot(axis, vector)) * axis
 
 
 def _rotation(axis: Array, cos: SX, sin: SX) -> SX:
-    """(3, 3) rotation about a fixed unit axis."""
     k = DM(axis)
     along = k @ k.T
     return SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)
 
 
-def _chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
+def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
     points, n = leg.meeting_points, LEG_JOINT_COUNT
     rotations, axes, segments = [SX.eye(3)] * n, [SX(3, 1)] * n, [SX(3, 1)] * n
     rotation = SX.eye(3)
@@ -279,15 +282,15 @@ def _chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
     return _Chain(rotations, axes, levers, segments, SX(DM(points[-1] - leg.foot_m)) + levers[-1])
 
 
-def _misfit(leg: Leg, chain: _Chain, hip: SX, rotation: SX) -> SX:
-    """(6,) what is missing of the hip centre's place in lengths of the leg, and of the torso's turn as a vector [rad]."""
+def _compute_misfit(leg: Leg, chain: _Chain, hip: SX, rotation: SX) -> SX:
+    """Return (6,) the misfit of the hip centre in lengths of the leg, and of the torso's rotation as a vector [rad]."""
     found = chain.rotations[0]
     turn = sum((ca.cross(found[:, k], rotation[:, k]) for k in range(3)), SX(3, 1)) / 2
     return ca.vertcat((hip - chain.hip) / leg.length_m, turn)
 
 
-def _jacobian(leg: Leg, chain: _Chain) -> SX:
-    """(6, 6) what the hip centre and the torso do when a joint turns, in the units of ``_misfit``."""
+def _compute_jacobian(leg: Leg, chain: _Chain) -> SX:
+    """Return (6, 6) derivatives of hip centre and torso by the joints, in the units of the misfit."""
     columns = [
         ca.vertcat(-ca.cross(axis, lever) / leg.length_m, -axis)
         for axis, lever in zip(chain.axes, chain.levers, strict=True)
@@ -295,16 +298,16 @@ def _jacobian(leg: Leg, chain: _Chain) -> SX:
     return ca.horzcat(*columns)
 
 
-def _factors(leg: Leg, chain: _Chain, least_pivot: float = LEAST_PIVOT) -> Factors:
-    return factorise(_jacobian(leg, chain), _order(leg), least_pivot)
+def _factorise(leg: Leg, chain: _Chain, least_pivot: float = LEAST_PIVOT) -> Factors:
+    return factorise(_compute_jacobian(leg, chain), _choose_order(leg), least_pivot)
 
 
 @lru_cache(maxsize=64)
-def _order(leg: Leg) -> tuple[tuple[int, int], ...]:
-    """Order of elimination that is sound for the poses that gaits ask for; the guess is near enough."""
+def _choose_order(leg: Leg) -> tuple[tuple[int, int], ...]:
+    """Choose an order of elimination for the poses of gaits; there the guess is near enough."""
     q, inputs = SX.sym("q", LEG_JOINT_COUNT), SX.sym("inputs", 12)
     cosines, sines = guess(leg, inputs[:3], ca.reshape(inputs[3:], 3, 3), SX(0.0), Exact())
-    matrix = _jacobian(leg, _chain(leg, ca.cos(q), ca.sin(q)))
+    matrix = _compute_jacobian(leg, _build_chain(leg, ca.cos(q), ca.sin(q)))
     function = ca.Function("matrix", [q], [ca.densify(matrix)])
     angles = ca.Function("angles", [inputs], [ca.atan2(sines, cosines)])
     poses = np.array(angles.map(ORDER_POSES)(sample_flat_foot_poses(leg, ORDER_POSES)))
@@ -313,8 +316,23 @@ def _order(leg: Leg) -> tuple[tuple[int, int], ...]:
     return choose_pivots(matrices, np.array(pattern))
 
 
-def _bias(chain: _Chain, qd: SX) -> tuple[SX, SX]:
-    """Linear and angular acceleration of hip centre and torso while the joints turn evenly."""
+def sample_flat_foot_poses(leg: Leg, count: int = POSES) -> Array:
+    """Return random poses (12, N) of a gait over flat soles: hip centres from the foot's origin [m] and torso rotations."""
+    rng = np.random.default_rng(SEED)
+    distance = rng.uniform(*DISTANCES, count) * leg.length_m
+    front, aside = (rng.uniform(-most, most, count) for most in (LARGEST_PITCH, LARGEST_ROLL))
+    pitch, roll = (rng.uniform(-most, most, count) for most in (LEAN_PITCH, LEAN_ROLL))
+    direction = np.stack([np.sin(front), np.sin(aside)])
+    direction = np.concatenate([direction, np.sqrt(1.0 - (direction**2).sum(axis=0, keepdims=True))])
+    hips = distance * direction + (leg.ankle_m - leg.foot_m)[:, None]
+    c, s, cr, sr = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
+    zero = np.zeros(count)
+    columns = [c, zero, -s, s * sr, cr, c * sr, s * cr, -sr, c * cr]  # Ry(pitch) Rx(roll)
+    return np.asarray(np.concatenate([hips, np.stack(columns)]))
+
+
+def _compute_bias(chain: _Chain, qd: SX) -> tuple[SX, SX]:
+    """Return linear and angular acceleration of hip centre and torso at constant joint velocities."""
     spin, spin_rate, linear = SX.zeros(3), SX.zeros(3), SX.zeros(3)
     for i in reversed(range(LEG_JOINT_COUNT)):
         turn = -chain.axes[i] * qd[i]

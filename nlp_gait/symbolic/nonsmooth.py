@@ -1,9 +1,9 @@
-"""The operations at which a gait model is not smooth or not explicit, in two interpretations.
+"""Operations at which a gait model is not smooth or not explicit, in two interpretations.
 
-A problem is assembled once, against ``Nonsmooth``. ``Exact`` gives what the papers evaluate: it is compiled, searched and
-judged. ``Lifted`` gives an NLP that IPOPT can solve: absolute values and minima become variables with inequalities, an
-exact reformulation where the sense allows it (see ``backends/nlp.py``, which checks the sense); only a true jump is smoothed.
-An equation that has no closed solution is solved by Newton's method under ``Exact``; its unknowns are variables under ``Lifted``.
+A problem is assembled once, with the operations of ``Nonsmooth``. ``Exact`` is what the papers evaluate: it is compiled, searched
+and judged. ``Lifted`` is an NLP that IPOPT can solve: absolute values and minima become variables with inequalities, which is
+exact where the sense allows it (``backends/nlp.py`` checks the sense); only a true jump is smoothed. An equation without a closed
+solution is solved by Newton's method under ``Exact``; its unknowns are variables under ``Lifted``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from casadi import MX, SX
 
 # Keeps the slope of acos finite where its argument reaches 1 to machine precision.
 LEAST_SINE_SQUARED = 1e-16
-# The lifted acos is continued by its tangent from here at the latest, should the user ask for a smaller reach margin.
+# Smallest margin from which the lifted acos is continued by its tangent.
 LEAST_REACH_MARGIN = 1e-6
 
 
@@ -31,11 +31,11 @@ class Angle(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Root:
-    """An equation of one instant, residual(unknown, inputs) = 0, and a method that solves it; expressions in, expressions out.
+    """An equation of one instant, residual(unknown, inputs) = 0, with a method that solves it, as functions of expressions.
 
     Attributes:
-        residual: of unknown (n,) and inputs: (n,) in units of 1, zero at the solution.
-        newton: of the inputs: (n,) a guess followed by a fixed number of Newton steps, defined for all inputs.
+        residual: (n,) of unknown (n,) and inputs, dimensionless, zero at the solution.
+        newton: (n,) of the inputs: a guess and a fixed number of Newton steps, defined for all inputs.
         lift: whether ``Lifted`` makes the unknown a variable; else it differentiates through ``newton``.
     """
 
@@ -45,12 +45,12 @@ class Root:
 
 
 class OpenRoots(NamedTuple):
-    """Equations of one instant that are to be tied by rows, one below the other.
+    """Equations of one instant that rows must tie, one below the other.
 
     Attributes:
         unknowns: (n,) symbols.
-        residual: (n,) that must be zero.
-        start: (n,) what Newton's method finds.
+        residual: (n,) must be zero.
+        start: (n,) result of Newton's method.
     """
 
     unknowns: SX
@@ -59,70 +59,70 @@ class OpenRoots(NamedTuple):
 
 
 class Nonsmooth(Protocol):
-    """What a problem may use besides smooth functions.
+    """Operations that a problem may use in addition to smooth functions.
 
     Attributes:
-        exact: whether the values are those that are judged; else a solver's on its way.
+        exact: whether the values are the exact ones, which are judged.
     """
 
     exact: bool
 
     def root(self, root: Root, inputs: SX) -> SX:
-        """Solution (n,) of an equation of one instant, for its inputs."""
+        """Return the solution (n,) of an equation of one instant, for its inputs."""
 
     def open_roots(self) -> OpenRoots | None:
-        """Equations of the instant built last whose unknowns were left as symbols, once; None if there are none."""
+        """Return and forget the equations of the last instant whose unknowns are still symbols; None if there are none."""
 
-    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """Unknowns (n, N) of N instants whose ``open_roots`` are tied by residual(unknowns) = 0, near a start (n, N)."""
+    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """Return the unknowns (n, N) of N instants, tied by residual(unknowns) = 0, near a start (n, N); see ``open_roots``."""
 
     def acos(self, argument: SX, margin: SX) -> Angle:
-        """acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""
+        """Return acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""
 
     def abs(self, v: MX) -> MX:
-        """Elementwise |v|."""
+        """Return |v| elementwise."""
 
     def min(self, a: MX, b: MX) -> MX:
-        """Elementwise minimum."""
+        """Return the minimum elementwise."""
 
     def largest(self, v: MX) -> MX:
-        """Largest |v_i| of a vector (m, 1)."""
+        """Return the largest |v_i| of a vector (m, 1)."""
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """Elementwise: ``below`` where switch < 0, else ``above``."""
+        """Return ``below`` where switch < 0, else ``above``, elementwise."""
 
     def tie(self, v: MX) -> MX:
-        """The vector v (m, 1), a variable of its own where that spares a solver to differentiate through it."""
+        """Return the vector v (m, 1), as a separate variable if that saves a solver from differentiating through it."""
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
-        """States (n, N) after each of N steps.
+        """Return the states (n, N) after each of N steps.
 
         Args:
             step: from a state (n, 1) and a column of each input to the next state.
             initial: (n, 1) state before the first step.
-            inputs: (m, N) each, a column for every step.
+            inputs: (m, N) each, one column per step.
         """
 
 
 class Exact:
-    """The functions as the papers mean them."""
+    """The functions as the papers define them."""
 
     exact = True
 
     def root(self, root: Root, inputs: SX) -> SX:
-        """What Newton's method finds, as part of the instant's expressions."""
+        """See ``Nonsmooth``."""
         return root.newton(inputs)
 
     def open_roots(self) -> OpenRoots | None:
-        """None: all are solved."""
+        """See ``Nonsmooth``."""
         return None
 
-    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """The start, which is the solution."""
+    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """See ``Nonsmooth``."""
         return start
 
     def acos(self, argument: SX, margin: SX) -> Angle:
-        """Argument clamped to [-1, 1]: every reachable pose is exact, an unreachable one finite and still."""
+        """Clamp the argument to [-1, 1]: reachable poses are exact, unreachable ones finite and at rest."""
         clamped = ca.fmax(-1, ca.fmin(1, argument))
         reachable = ca.fabs(argument) <= 1
         sine_squared = ca.fmax(1 - clamped * clamped, LEAST_SINE_SQUARED)
@@ -130,15 +130,15 @@ class Exact:
         return Angle(ca.acos(clamped), first, first * clamped / sine_squared)
 
     def abs(self, v: MX) -> MX:
-        """|v|."""
+        """See ``Nonsmooth``."""
         return ca.fabs(v)
 
     def min(self, a: MX, b: MX) -> MX:
-        """Minimum."""
+        """See ``Nonsmooth``."""
         return ca.fmin(a, b)
 
     def largest(self, v: MX) -> MX:
-        """Largest |v_i|, by halves: elementwise operations only."""
+        """Halve the vector repeatedly, by elementwise operations only."""
         v = ca.fabs(v)
         while v.shape[0] > 1:
             half = (v.shape[0] + 1) // 2
@@ -146,28 +146,28 @@ class Exact:
         return v
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """A true jump, written without a branch so that it vectorises."""
+        """Return a true jump, without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
 
     def tie(self, v: MX) -> MX:
-        """The same v."""
+        """See ``Nonsmooth``."""
         return v
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
-        """One step after the other, in a loop at run time."""
+        """Make one step after the other, in a loop at run time."""
         return step.mapaccum(inputs[0].shape[1])(initial, *inputs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lift:
-    """New NLP variables that stand for a non-smooth expression.
+    """New NLP variables that replace a non-smooth expression.
 
     Attributes:
         variable: (k, 1) symbols.
-        value: (k, 1) what they equal at the exact function (a start value, in terms of x and earlier lifts).
+        value: (k, 1) exact values (start values, in terms of x and earlier lifts).
         rows: (r, 1) expressions that must be >= 0, or == 0 if the lift is tight.
-        from_above: True if the variable may only exceed the exact value (abs), False if only fall short of it (min).
-        tight: True if the rows leave the variable no freedom: it equals the exact value at every feasible point.
+        from_above: True if the variable may only exceed the exact value (abs), False if it may only be less (min).
+        tight: whether the rows determine the variable: it equals the exact value at every feasible point.
     """
 
     variable: MX
@@ -193,7 +193,7 @@ class Lifted:
         self._open: list[OpenRoots] = []
 
     def root(self, root: Root, inputs: SX) -> SX:
-        """A symbol of the instant, to be tied by a row; or what Newton's method finds, to be differentiated."""
+        """Return a symbol that a row must tie; or the result of Newton's method, to be differentiated."""
         found = root.newton(inputs)
         if not root.lift:
             return found
@@ -202,18 +202,18 @@ class Lifted:
         return unknowns
 
     def open_roots(self) -> OpenRoots | None:
-        """All equations of the instant one below the other."""
+        """See ``Nonsmooth``."""
         found, self._open = self._open, []
         return OpenRoots(*(ca.vertcat(*parts) for parts in zip(*found, strict=True))) if found else None
 
-    def solved(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """Variables, tied by one equation each."""
+    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """See ``Nonsmooth``."""
         columns = start.shape
-        lifted = self._lifted("root", ca.vec(start), lambda v: ca.vec(residual(ca.reshape(v, *columns))), tight=True)
+        lifted = self._lift("root", ca.vec(start), lambda v: ca.vec(residual(ca.reshape(v, *columns))), tight=True)
         return ca.reshape(lifted, *columns)
 
     def acos(self, argument: SX, margin: SX) -> Angle:
-        """acos continued by its tangents beyond +-(1 - margin): smooth, with a slope that draws a solver back."""
+        """Continue acos by its tangents outside +-(1 - margin): smooth, with a slope that draws a solver back."""
         limit = 1 - ca.fmax(margin, LEAST_REACH_MARGIN)
         clamped = ca.fmax(-limit, ca.fmin(limit, argument))
         inside = ca.fabs(argument) <= limit
@@ -222,29 +222,29 @@ class Lifted:
         return Angle(ca.acos(clamped) + first * (argument - clamped), first, inside * first * clamped / sine_squared)
 
     def abs(self, v: MX) -> MX:
-        """A variable s with s >= v and s >= -v."""
-        return self._lifted("abs", ca.fabs(v), lambda s: ca.vertcat(s - v, s + v))
+        """Return a variable s with s >= v and s >= -v."""
+        return self._lift("abs", ca.fabs(v), lambda s: ca.vertcat(s - v, s + v))
 
     def min(self, a: MX, b: MX) -> MX:
-        """A variable d with d <= a and d <= b."""
-        return self._lifted("min", ca.fmin(a, b), lambda d: ca.vertcat(a - d, b - d), from_above=False)
+        """Return a variable d with d <= a and d <= b."""
+        return self._lift("min", ca.fmin(a, b), lambda d: ca.vertcat(a - d, b - d), from_above=False)
 
     def largest(self, v: MX) -> MX:
-        """A variable s with s >= v_i and s >= -v_i for all i."""
-        return self._lifted("largest", ca.norm_inf(v), lambda s: ca.vertcat(s - v, s + v))
+        """Return a variable s with s >= v_i and s >= -v_i for all i."""
+        return self._lift("largest", ca.norm_inf(v), lambda s: ca.vertcat(s - v, s + v))
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """A sigmoid between the two branches."""
+        """Return a sigmoid between the two branches."""
         self.smoothed = True
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
 
     def tie(self, v: MX) -> MX:
-        """A variable that an equation ties to v."""
-        return self._lifted("tied", v, lambda tied: tied - v, tight=True)
+        """Return a variable that an equation ties to v."""
+        return self._lift("tied", v, lambda tied: tied - v, tight=True)
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
-        """Multiple shooting: all states are variables, tied by one equation for each step."""
+        """Use multiple shooting: all states are variables, tied by one equation for each step."""
         n, steps = initial.shape[0], inputs[0].shape[1]
         states = MX.sym(f"states_{len(self.lifts)}", n * steps)
         path = ca.reshape(states, n, steps)
@@ -253,8 +253,7 @@ class Lifted:
         self.lifts.append(Lift(variable=states, value=ca.vec(exact), rows=ca.vec(path - reached), tight=True))
         return path
 
-    def _lifted(self, name: str, value: MX, rows: Callable[[MX], MX], **kind: bool) -> MX:
-        """A new variable that stands for a value; see ``Lift``."""
+    def _lift(self, name: str, value: MX, rows: Callable[[MX], MX], **kind: bool) -> MX:
         variable = MX.sym(f"{name}_{len(self.lifts)}", value.shape[0])
         self.lifts.append(Lift(variable=variable, value=value, rows=rows(variable), **kind))
         return variable

@@ -179,7 +179,7 @@ def test_a_root_is_newtons_result_or_a_variable_that_an_equation_ties() -> None:
     assert unknown.is_symbolic() and float(ca.Function("s", [number], [opened.start])(2.0)) == pytest.approx(2.0**0.5)
     instant = ca.Function("instant", [opened.unknowns, number], [opened.residual])
     numbers = ca.DM([[2.0, 3.0]])
-    solved = ops.solved(MX(ca.DM([[1.4, 1.7]])), lambda x: instant.map(2)(x, numbers))
+    solved = ops.tie_roots(MX(ca.DM([[1.4, 1.7]])), lambda x: instant.map(2)(x, numbers))
     assert solved.shape == (1, 2)
     (lift,) = ops.lifts
     assert lift.tight

@@ -260,7 +260,7 @@ class Phase:
             found.extend(rest)
             return rows
 
-        ops.solved(start, residual)
+        ops.tie_roots(start, residual)
         return found
 
     def _sample(

@@ -9,8 +9,7 @@ from casadi import SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots.leg import Leg
-from nlp_gait.symbolic.general_leg import make_leg_root
-from nlp_gait.symbolic.leg_poses import POSES, sample_flat_foot_poses
+from nlp_gait.symbolic.general_leg import POSES, make_leg_root, sample_flat_foot_poses
 from nlp_gait.symbolic.nonsmooth import Exact
 
 # Nearly all poses are closed to this [1, rad] before the last step, which squares what is left.
