@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import operator
+from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
+from nlp_gait.formulation.power_form import Integers
 from nlp_gait.symbolic.tape import read_tape
 
 # Operations of a tape, as in native/quadratic.hpp.
 INPUT, NUMBER, OUTPUT, SUM, DIFFERENCE, SHIFT, SCALE, PRODUCT, INVERSE, ROOT, ABSOLUTE, LARGER, BELOW, WHERE_BELOW = (
     range(14)
 )
-Integers = np.ndarray[Any, np.dtype[np.int32]]
+UNARY = {ca.OP_SQRT: ROOT, ca.OP_INV: INVERSE, ca.OP_FABS: ABSOLUTE}
+FACTORS = {ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0}
+COMMUTATIVE = {ca.OP_ADD: SUM, ca.OP_MUL: PRODUCT}
+WITH_NUMBER = {ca.OP_ADD: SHIFT, ca.OP_MUL: SCALE, ca.OP_FMIN: BELOW, ca.OP_FMAX: LARGER}
+EXACT: Mapping[int, Callable[[Fraction, Fraction], Fraction]]
+EXACT = {ca.OP_ADD: operator.add, ca.OP_SUB: operator.sub, ca.OP_MUL: operator.mul, ca.OP_DIV: operator.truediv}
 
 
-@dataclass(frozen=True, slots=True)
-class _Node:
+class _Node(NamedTuple):
     """Operation on earlier quantities; equal nodes are one quantity."""
 
     code: int
@@ -50,59 +56,41 @@ class _Graph:
         return self._numbers[node]
 
     def add_unary(self, operation: int, x: int) -> int:
-        codes = {ca.OP_SQRT: ROOT, ca.OP_INV: INVERSE, ca.OP_FABS: ABSOLUTE}
-        factors = {ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0}
         if operation == ca.OP_SQ:
             return self.add(PRODUCT, x, x)
-        if operation in factors:
-            return self.add(SCALE, x, value=factors[operation])
-        if operation not in codes:
-            raise self._refuse(operation)
-        return self.add(codes[operation], x)
+        if operation in FACTORS:
+            return self.add(SCALE, x, value=FACTORS[operation])
+        return self.add(self._code(UNARY, operation), x)
 
     def add_binary(self, operation: int, x: int, y: int) -> int:
         if operation == ca.OP_DIV:
             return self.add(PRODUCT, x, self.add(INVERSE, y))
-        if operation in (ca.OP_ADD, ca.OP_MUL):
-            return self.add(SUM if operation == ca.OP_ADD else PRODUCT, min(x, y), max(x, y))
-        if operation != ca.OP_SUB:
-            raise self._refuse(operation)
-        return self.add(DIFFERENCE, x, y)
+        if operation == ca.OP_SUB:
+            return self.add(DIFFERENCE, x, y)
+        return self.add(self._code(COMMUTATIVE, operation), min(x, y), max(x, y))
 
     def add_with_number(self, operation: int, x: int, number: float, number_first: bool) -> int:
-        if operation == ca.OP_ADD:
-            return self.add(SHIFT, x, value=number)
         if operation == ca.OP_SUB:
-            if number_first:
-                return self.add(SHIFT, self.add(SCALE, x, value=-1.0), value=number)
-            return self.add(SHIFT, x, value=-number)
-        if operation == ca.OP_MUL:
-            return self.add(SCALE, x, value=number)
-        if operation == ca.OP_DIV:  # a rounded reciprocal errs by less than a scaled form is widened
-            if number_first:
-                return self.add(SCALE, self.add(INVERSE, x), value=number)
-            return self.add(SCALE, x, value=1.0 / number)
-        if operation in (ca.OP_FMIN, ca.OP_FMAX):
-            return self.add(BELOW if operation == ca.OP_FMIN else LARGER, x, value=number)
-        raise self._refuse(operation)
+            operation, number = ca.OP_ADD, number if number_first else -number
+            x = self.add(SCALE, x, value=-1.0) if number_first else x
+        elif operation == ca.OP_DIV:  # the rounding error of a reciprocal is less than what a scaled form is widened by
+            operation, number = ca.OP_MUL, number if number_first else 1.0 / number
+            x = self.add(INVERSE, x) if number_first else x
+        return self.add(self._code(WITH_NUMBER, operation), x, value=number)
 
     def compute(self, operation: int, a: float, b: float) -> float:
         """Return the result for two numbers if it is exact."""
-        exact = {
-            ca.OP_ADD: lambda: Fraction(a) + Fraction(b),
-            ca.OP_SUB: lambda: Fraction(a) - Fraction(b),
-            ca.OP_MUL: lambda: Fraction(a) * Fraction(b),
-            ca.OP_DIV: lambda: Fraction(a) / Fraction(b),
-        }
-        value = exact[operation]() if operation in exact else None
+        value = EXACT[operation](Fraction(a), Fraction(b)) if operation in EXACT else None
         if value is None or Fraction(float(value)) != value:
             raise InputError(
                 f"function {self._name!r} combines the numbers {a} and {b}, and the result is rounded; simplify it first"
             )
         return float(value)
 
-    def _refuse(self, operation: int) -> InputError:
-        return InputError(f"function {self._name!r}: CasADi's operation number {operation} has no quadratic form")
+    def _code(self, codes: Mapping[int, int], operation: int) -> int:
+        if operation not in codes:
+            raise InputError(f"function {self._name!r}: CasADi's operation number {operation} has no quadratic form")
+        return codes[operation]
 
 
 class _Condition(NamedTuple):
