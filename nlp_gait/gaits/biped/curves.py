@@ -1,7 +1,7 @@
-"""Curves of a phase: the papers' cubics of the hip, and quintics and splines on top of any cubic.
+"""Curves of a phase: the paper's cubics of the hip, and quintics and splines that are added to any cubic.
 
-A curve is the papers' cubic plus a spline that leaves its ends alone. The spline's coefficients are variables after the papers'
-own; with all of them at zero the motion is the papers'.
+A curve is the paper's cubic plus a spline that leaves both ends unchanged. The spline's coefficients are variables after those of
+the paper; if all are zero, the motion is the paper's.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic, stack
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
 SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))
 
-# Samples in each interval if none are asked for: a cubic has no room between 11 samples, a spline has.
+# Default samples in each interval: a cubic cannot bend between 11 samples, a spline can.
 SAMPLES, SPLINE_SAMPLES = 1, 4
 # Coefficients of a spline lie within these bounds, wider than any optimum's, and start within a share of them.
 BOUNDS = {"m": 0.3, "rad": 3.0}
@@ -32,7 +32,7 @@ HIP_CURVES = ("hip_x", "hip_y", "hip_z")
 
 @dataclass(frozen=True, kw_only=True)
 class Splines:
-    """Splines on top of the papers' cubics.
+    """Splines that are added to cubics.
 
     Attributes:
         trajectory: their order.
@@ -74,13 +74,13 @@ class Splines:
         return BOUNDS[unit] * (self.length_scale if unit == "m" else 1.0)
 
     def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
-        """What each curve adds to its cubic."""
+        """Return what each curve adds to its cubic."""
         coefficients = ca.vertcat(*(at[variable.name] for variable in self.variables))
         added = spline(ca.reshape(coefficients, self.count, len(self.units)), duration, phase)
         return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
 
     def start_of(self, names: Sequence[str]) -> Start | None:
-        """Start points of variables: the papers' anywhere within their bounds, coefficients near zero; None without any."""
+        """Return start points with coefficients near zero and the other variables within their bounds; None without splines."""
         if self.count == 0:
             return None
         own = {variable.name for variable in self.variables}
@@ -97,7 +97,7 @@ class Splines:
 def hip_motion(
     at: InstantPoint, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
 ) -> Motion:
-    """Motion of the torso's origin as cubics in x, y and z (3,) [m].
+    """Return the hip's motion as cubics in x, y and z (3,) [m].
 
     Args:
         at: values of the variables hip_height_m and hip_v<axis>_<end>_m_s.
@@ -127,12 +127,12 @@ def hip_on_spline(
     duration: SX,
     phase: SX,
 ) -> Motion:
-    """Motion of the torso's origin (3,) [m]: the papers' (see ``hip_motion``), and what each curve adds."""
+    """Return the hip's motion (3,) [m]: the paper's (see ``hip_motion``), and what each curve adds."""
     return add_motions(hip_motion(at, along, across, duration, phase), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
-def grid_for(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:
-    """Samples of a phase: as many in an interval as are asked for, or for 0 as many as suit the trajectory and the loads."""
+def make_grid(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:
+    """Return the samples of a phase; 0 in an interval stands for as many as suit the trajectory and the loads."""
     if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
         samples_per_interval = SPLINE_SAMPLES if planned_loads or trajectory != "cubic" else SAMPLES
     return Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")

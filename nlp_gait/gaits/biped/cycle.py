@@ -1,4 +1,4 @@
-"""Both phases of a walking cycle as one problem: rows of each phase, torques across the switches, energy and speed."""
+"""A walking cycle as one problem: rows of both phases, changes of torques at the switches, energy and speed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from nlp_gait.formulation import (
 )
 from nlp_gait.formulation.assembly import parameters
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
-from nlp_gait.gaits.biped.curves import grid_for
+from nlp_gait.gaits.biped.curves import make_grid
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, cycle_planners, cycle_variables
 from nlp_gait.gaits.biped.double_support import Box, Point2, double_support_mean_margins, margins_in, support_box
 from nlp_gait.gaits.biped.goals import Goal
@@ -38,7 +38,7 @@ from nlp_gait.gaits.biped.limits import Limit, Margins, rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, goal_for, phase_limits, start_within_reach
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.single_support import single_support_loads, single_support_mean_margins
 from nlp_gait.robots.mirror import mirror_sign
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -50,7 +50,7 @@ CycleObjective = Literal["energy-per-metre", "power", "torque"]
 ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
-# Limits that differ between the phases, and so do their names.
+# Limits that differ between the phases; their names begin with the phase's.
 BALANCE = tuple(f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy")
 
 
@@ -82,7 +82,7 @@ class WalkingCycle:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Limits and weights of both phases; those of balance carry the phase's name."""
+        """Parameters of both phases; those of balance begin with the phase's name."""
         own = {name: phase.parameters for name, phase in self.phases.items()}
         balance = [
             replace(parameter, name=f"{name}_{parameter.name}", description=f"{parameter.description}, {name.upper()}")
@@ -108,41 +108,54 @@ class WalkingCycle:
             (f"{STEP}.upper", "m", step.upper, "upper bound of the step length", -math.inf, math.inf),
         )
 
-    def motion(self, at: Point) -> Point:
-        """The point with the step length as a variable, where it is not one yet."""
+    def add_step(self, at: Point) -> Point:
+        """Return the point with the step length as a variable, also if it follows from the speed."""
         if not self.at_given_speed:
             return at
         return at.extended(STEP, at[SPEED] * (at[TIMES["ssp"]] + at[TIMES["dsp"]]))
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Objective, rows and indexes.
+        """Return objective, rows and indexes.
 
-        Torques may change by ``torque_change_limit_Nm`` over every interval of both phases, and at a switch by a limit of its
-        own, which is off by default: the published one is for a change over an interval of time, while at a switch the
+        Torques may change by ``torque_change_limit_Nm`` over every interval of both phases, and at a switch by another limit,
+        which is off by default: the published one is for a change over an interval of time, while at a switch the
         supporting feet change at once and in this model the loads with them.
         """
-        at = self.motion(point)
-        samples = {name: phase.samples(at, ops) for name, phase in self.phases.items()}
-        parts = {name: phase.assemble(_named_for(at, name), samples[name], ops) for name, phase in self.phases.items()}
+        at = self.add_step(point)
+        samples = {name: phase.sample(at, ops) for name, phase in self.phases.items()}
+        found = {name: self._assemble_phase(name, at, samples[name], ops) for name in self.phases}
         times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
-        energy = sum(parts[name].indexes["power_W"] * times[name] for name in times)
-        goal = sum(parts[name].objective * times[name] for name in times) / period
-        own = [replace(row, name=f"{name}_{row.name}") for name, part in parts.items() for row in part.constraints]
-        indexes = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.indexes.items()}
+        energy = sum(found[name].indexes[f"{name}_power_W"] * times[name] for name in times)
+        mean = sum(found[name].objective * times[name] for name in times) / period
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
-            objective=goal if self.at_given_speed else energy / step,
-            constraints=(*own, *self._jump_rows(jumps, at), *self._step_rows(at)),
+            objective=mean if self.at_given_speed else energy / step,
+            constraints=(
+                *(row for part in found.values() for row in part.constraints),
+                *self._jump_rows(jumps, at),
+                *self._step_rows(at),
+            ),
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
                 "cost_of_transport": energy / step / self.body.weight,
                 "speed_m_s": step / period,
                 "step_length_m": step,
-                **indexes,
+                **{name: value for part in found.values() for name, value in part.indexes.items()},
                 **{f"{switch}_torque_jump_Nm": ca.mmax(ca.fabs(jump)) for switch, jump in jumps.items()},
             },
+        )
+
+    def _assemble_phase(self, name: PhaseName, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
+        """Assemble one phase, with its name before those of its rows and indexes."""
+        # A phase reads the limits of balance under their plain names.
+        own = {limit: at.positions[f"{name}_{limit}"] for limit in BALANCE}
+        part = self.phases[name].assemble(replace(at, positions={**at.positions, **own}), samples, ops)
+        return Assembly(
+            objective=part.objective,
+            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
+            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
         )
 
     def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
@@ -158,26 +171,15 @@ class WalkingCycle:
         found: list[RowsOverTime] = []
         begins: tuple[str, ...] = ()
         for name, phase in self.phases.items():
-            for one in phase.rows_over_time(name, begins):
-                found.append(
-                    replace(
-                        one,
-                        assemble=partial(self._assemble_at, name),
-                        means=tuple(f"{name}_{index}" for index in one.means),
-                    )
-                )
+            for over_time in phase.rows_over_time(name, begins):
+                means = tuple(f"{name}_{index}" for index in over_time.means)
+                found.append(replace(over_time, assemble=partial(self._assemble_at, name), means=means))
             begins = (*begins, phase.duration)
         return tuple(found)
 
     def _assemble_at(self, name: PhaseName, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-        """Rows and indexes of one phase with samples at other phases (1, k)."""
-        at, phase = self.motion(point), self.phases[name]
-        part = phase.assemble(_named_for(at, name), phase.samples_at(at, ops, phases), ops)
-        return Assembly(
-            objective=part.objective,
-            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
-            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
-        )
+        at = self.add_step(point)
+        return self._assemble_phase(name, at, self.phases[name].sample(at, ops, phases), ops)
 
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
         if not self.at_given_speed:
@@ -185,7 +187,7 @@ class WalkingCycle:
         return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),)
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
-        """Changes of torques (J, 1) at the switches [Nm]; after lift-off the mirror image of the cycle's start follows."""
+        """Compute changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start."""
         joints = self.body.joints
         images = [joints.index(name) for name in self.body.images]
         signs = DM([mirror_sign(self.body.robot, *pair) for pair in zip(joints, self.body.images, strict=True)])
@@ -193,8 +195,8 @@ class WalkingCycle:
         return {"lift_off": lift_off, "touch_down": touch_down}
 
     def signals(self, at: Point) -> dict[str, Signals]:
-        """Time histories of both phases at a point of numbers; the second one's time goes on."""
-        single, double = (phase.signals(self.motion(at)) for phase in self.phases.values())
+        """Return time histories of both phases at a point of numbers; the second one's time continues the first one's."""
+        single, double = (phase.signals(self.add_step(at)) for phase in self.phases.values())
         later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
         return {"ssp": single, "dsp": replace(double, arrays=later)}
 
@@ -250,7 +252,7 @@ def cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
     }
 
 
-def planned_cycle(
+def plan_cycle(
     body: Body,
     *,
     objective: CycleObjective,
@@ -260,17 +262,17 @@ def planned_cycle(
     load_degree: int,
 ) -> GaitProblem:
     """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
-    grid = grid_for("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     sharing, at_given_speed = share_load(body, torso_share, load_degree), objective != "energy-per-metre"
     goal = goal_for(body, "torque" if objective == "torque" else "power")
     cycle = walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(at: Point) -> MX:
-        return ca.horzcat(*(phase.samples(cycle.motion(at), Exact()).reach for phase in cycle.phases.values()))
+        return ca.horzcat(*(phase.sample(cycle.add_step(at), Exact()).reach for phase in cycle.phases.values()))
 
     def start_with_step(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        return start_at_speed(names, parameters, rng)
+        return draw_start(names, parameters, rng)
 
     start = sharing.start(names, start_with_step if at_given_speed else None)
     if not body.closed_form:
@@ -299,14 +301,14 @@ def cycle_problem(
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
         rows_over_time=cycle.rows_over_time if rows_over_time else (),
-        display=Display(motion=lambda at: joined(cycle.signals(at)), durations=tuple(TIMES.values())),
+        display=Display(motion=lambda at: join(cycle.signals(at)), durations=tuple(TIMES.values())),
         hints=SolverHints(start=start),
     )
     return add_robot(problem, cycle.body, repeats=repeats)
 
 
-def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Start point within the bounds whose times fit a step within its bounds, as far as their own bounds allow.
+def draw_start(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Draw a start point within the bounds whose times give a step within its bounds, as far as their own bounds allow.
 
     Args:
         names: of the decision variables.
@@ -320,8 +322,8 @@ def start_at_speed(names: Sequence[str], values: Mapping[str, float], rng: np.ra
     return np.asarray(x)
 
 
-def joined(phases: Mapping[str, Signals]) -> Signals:
-    """Phases one after the other. Of the two samples at a switch the earlier one stays: positions and velocities are equal."""
+def join(phases: Mapping[str, Signals]) -> Signals:
+    """Join phases; of the two samples at a switch the earlier one is kept: positions and velocities are equal."""
     first, *others = phases.values()
     return replace(
         first,
@@ -330,9 +332,3 @@ def joined(phases: Mapping[str, Signals]) -> Signals:
             for name, array in first.arrays.items()
         },
     )
-
-
-def _named_for(point: Point, phase: str) -> Point:
-    """The point as a phase reads it: under the plain names, the limits that carry the phase's name."""
-    own = {name: point.positions[f"{phase}_{name}"] for name in BALANCE}
-    return replace(point, positions={**point.positions, **own})

@@ -9,7 +9,7 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
 from nlp_gait.gaits.biped.body import TIMES, Body, State
-from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, hip_on_spline, make_grid
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
@@ -91,7 +91,7 @@ def double_support_splines(body: Body, trajectory: Trajectory) -> Splines:
     return Splines(trajectory=trajectory, units=units, length_scale=body.length_scale)
 
 
-def planned_double_support(
+def plan_double_support(
     body: Body,
     *,
     step_m: float,
@@ -105,7 +105,7 @@ def planned_double_support(
 ) -> GaitProblem:
     """Return the problem of double support; for the options see ``gaits.nao``."""
     splines, sharing = double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
-    grid = grid_for(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     phase = double_support_phase(body, step_m, splines, sharing, grid, goal_for(body, objective), derivatives)
     start = sharing.start(phase.names, splines.start_of(phase.names))
     return phase_problem("dsp", "double support: least mean power", phase, start=start)

@@ -1,13 +1,13 @@
-"""Real motors in the problems of a phase: what they can give, and what they draw.
+"""Real motors in the problems of a phase: their limits and their power.
 
-An option lists what is taken into account, in addition to the paper or in place of it:
+An option lists the features that are taken into account, in addition to the paper's model or in place of it:
 
     limits          speed, torque against speed, and continuous torque of every motor
-    ankle           roll of an ankle limited by its pitch, where that is known of the robot
-    free-braking    braking draws nothing, in place of as much as driving: the positive part of torque times rate
-    regeneration    braking gives back what it takes, in place of drawing it: torque times rate with its sign
-    heat            heat constant of each motor from its data sheet, in place of one K for all
-    rotor           inertia of every rotor at its joint: torques and what follows from them, and the engine's joints alike
+    ankle           roll of an ankle limited by its pitch, if the robot's limits are known
+    free-braking    braking needs no power, instead of as much as driving: the positive part of torque times rate
+    regeneration    braking returns power: torque times rate with its sign
+    heat            heat constant of each motor from its data sheet, instead of one K for all
+    rotor           inertia of every rotor at its joint, in torques and all that follows from them, and in the engine
 
 Two joints may share a motor, whose rotor counts half at each: NAO's hip yaw-pitch joints do. No source gives a limit of
 acceleration, so there is none here.
@@ -26,7 +26,7 @@ from casadi import DM, MX
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, Draw
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, PowerModel
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
 from nlp_gait.gaits.biped.samples import Samples, time_mean
 from nlp_gait.robots import Robot
@@ -48,13 +48,13 @@ SUPPLY = Parameter(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motors:
-    """What of the real motors a problem takes into account.
+    """Real motors as far as a problem takes them into account.
 
     Attributes:
         features: see above.
-        robot: whose motors they are, without the inertia of their rotors.
-        joints: that they turn.
-        shared: two of them that one motor turns.
+        robot: without the inertia of the rotors.
+        joints: that the motors turn.
+        shared: two joints that one motor turns.
         coupling: limit of one ankle joint by the other, if it is known.
 
     Raises:
@@ -69,7 +69,7 @@ class Motors:
     coupling: Limit | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown features, and two rules for braking."""
+        """Check the features."""
         known = [name for name in FEATURES if name != ANKLE or self.coupling is not None]
         for name in self.features:
             if name not in known:
@@ -77,7 +77,7 @@ class Motors:
         if {"free-braking", "regeneration"} <= set(self.features):
             raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
         if self.features:
-            self._ratings, self.model  # noqa: B018  a robot without data is refused now
+            self._ratings, self.model  # noqa: B018  refuse a robot without data now
 
     @classmethod
     def parse(
@@ -88,13 +88,13 @@ class Motors:
         shared: tuple[str, ...] = (),
         coupling: Limit | None = None,
     ) -> Motors:
-        """Features from an option's text, separated by commas; none if it is empty."""
+        """Read the features from an option's text, separated by commas."""
         features = tuple(part.strip() for part in text.split(",") if part.strip())
         return cls(features=features, robot=robot, joints=joints, shared=shared, coupling=coupling)
 
     @cached_property
     def model(self) -> Robot:
-        """The robot as the dynamics take it: with the inertia of its rotors, if asked for."""
+        """The robot of the dynamics, with the inertia of its rotors if that is a feature."""
         if "rotor" not in self.features:
             return self.robot
         found = {}
@@ -113,12 +113,11 @@ class Motors:
         return (*limits, *((self.coupling,) if self.coupling is not None and ANKLE in self.features else ()))
 
     @property
-    def draw(self) -> Draw | None:
-        """How the motors draw power; None for the paper's way."""
-        return self._power if {"free-braking", "regeneration", "heat"} & set(self.features) else None
+    def power(self) -> PowerModel | None:
+        """Mean power of the motors; None for the paper's model."""
+        return self._mean_power if {"free-braking", "regeneration", "heat"} & set(self.features) else None
 
-    def _power(self, at: Point, samples: Samples, ops: Nonsmooth) -> MX:
-        """Mean electrical power over the phase [W]."""
+    def _mean_power(self, at: Point, samples: Samples, ops: Nonsmooth) -> MX:
         driven = ca.vec(samples.power)
         if "regeneration" in self.features:
             mechanical = driven
@@ -135,7 +134,6 @@ class Motors:
 
     @cached_property
     def _ratings(self) -> tuple[Motor, ...]:
-        """Data of the motors, one for each joint."""
         ratings = []
         for joint in self.joints:
             motor = self.robot.joint(joint).motor
@@ -147,7 +145,7 @@ class Motors:
         return tuple(ratings)
 
     def by_motor(self, torque: MX) -> MX:
-        """Torques (J, n) with both joints' that share a motor at that motor, in the first one's row."""
+        """Return torques (J, n) with the sum of the joints that share a motor in the first one's row."""
         if not self.shared:
             return torque
         first, second = (self.joints.index(joint) for joint in self.shared)
@@ -159,10 +157,10 @@ class Motors:
 class MotorLimits(Limit):
     """Speed, torque against speed |tau| <= stall (1 - |qd| / no-load), and root mean square torque of every motor.
 
-    As two lines of each sign, tau +- qd stall / no-load within +- stall, in braking too, where a motor could give more.
+    As two lines of each sign, tau +- qd stall / no-load within +- stall, also in braking, where a motor could do more.
 
     Args:
-        motors: whose limits they are.
+        motors: with these limits.
         ratings: one for each joint.
     """
 
@@ -173,7 +171,6 @@ class MotorLimits(Limit):
         self._motors, self._ratings = motors, ratings
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        """Two-sided rows, and an upper bound on the mean squares' roots."""
         torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
         n = torque.shape[1]
         joints = self._motors.joints

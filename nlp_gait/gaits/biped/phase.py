@@ -1,4 +1,4 @@
-"""A support phase of a spatial biped sampled over time: how the robot moves and what that asks of motors and ground."""
+"""A support phase of a spatial biped sampled over time: its motion and the loads on motors and ground."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from nlp_gait.symbolic.trajectories import Motion
 
 Derivatives = Literal["analytic", "finite-difference"]
 
-# Of the ground on each sole: its force, and its moment about the point under the ankle.
+# Force of the ground on each sole, and its moment about the point under the ankle.
 WRENCHES = {
     f"{foot}_{half}": vector_columns(unit)
     for foot in BOTH_FEET.values()
@@ -81,13 +81,13 @@ class Phase:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Of the goal and of all limits; pairs of bounds are last because there are many."""
-        own = (*self.goal.parameters, *(parameter for limit in self.limits for parameter in limit.parameters))
+        own = (self.goal.heat, *(parameter for limit in self.limits for parameter in limit.parameters))
         return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
         """Return the rows of all limits, the goal, and the indexes of both."""
         added = [limit.add(at, samples, ops) for limit in self.limits]
-        value, before, after = self.goal.value(at, samples, ops)
+        value, before, after = self.goal.evaluate(at, samples, ops)
         indexes = {name: index for _, own in added for name, index in own.items()}
         return Assembly(
             objective=value,
@@ -95,28 +95,28 @@ class Phase:
             indexes={**before, **indexes, **after},
         )
 
-    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
-        """The phase at N + 1 equidistant samples, each evaluated once; mapped, never unrolled."""
-        return self.samples_at(at, ops, None)
+    def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
+        """Evaluate the phase at its N + 1 equidistant samples, or at other phases (1, k); mapped, never unrolled.
 
-    def samples_at(self, at: Point, ops: Nonsmooth, phases: MX | None) -> Samples:
-        """The phase at its samples, or at other phases (1, k).
-
-        Finite differences are of the samples themselves, so that other phases have analytic derivatives only.
+        Finite differences are of the samples themselves, so other phases need analytic derivatives.
         """
-        traces, motion, pressed = self._traces, self._reads_motion, len(BOTH_FEET) * self._reads_wrenches
+        traces = {name: trace for limit in self.limits for name, trace in limit.traces.items()}
+        reads_wrenches = any(limit.reads_wrenches for limit in self.limits)
         if self.derivatives == "analytic":
-            planned, reach, torque, power, zmp, miss, *rest = self._sampled(
-                at, ops, motion, pressed > 0, traces, phases
+            reads_motion = self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
+            inputs, outputs = self._instant_outputs(ops, reads_motion, reads_wrenches, traces)
+            planned, reach, torque, power, zmp, miss, *rest = self._map_instant(inputs, outputs, at, ops, phases)
+            wrenches, moved, seen = (
+                [rest.pop(0) for _ in range(count)]
+                for count in (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces))
             )
-            wrenches, moved, seen = rest[:pressed], rest[pressed : pressed + 3 * motion], rest[pressed + 3 * motion :]
         else:
-            q, _, _, hip, planned, reach, world, _, *seen = self._mapped(self._kinematics(ops, traces), at)
-            miss = MX(0, self.grid.parts + 1)
-            qd, qdd = self._differences(q, at)
+            q, _, _, hip, planned, reach, world, _, *seen = self._map(self._kinematics(ops, traces), at)
             n = self.grid.parts + 1
+            miss = MX(0, n)
+            qd, qdd = self._differences(q, at)
             torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
-            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if pressed else []
+            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if reads_wrenches else []
             power, moved = qd * moving, [q, qd, qdd]
         return Samples(
             joints=self.body.joints,
@@ -135,7 +135,7 @@ class Phase:
         )
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
-        """The phase as functions of time; none with finite differences, which are of its samples.
+        """Return the phase as functions of time; nothing with finite differences, which are of its samples.
 
         Args:
             name: of the phase in a longer motion.
@@ -145,7 +145,7 @@ class Phase:
             return ()
 
         def assemble(at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-            return self.assemble(at, self.samples_at(at, ops, phases), ops)
+            return self.assemble(at, self.sample(at, ops, phases), ops)
 
         def times(values: Mapping[str, float]) -> tuple[float, float]:
             start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
@@ -163,8 +163,8 @@ class Phase:
         )
 
     def signals(self, at: NumericPoint) -> Signals:
-        """Time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world, attitude = self._mapped(self._exact_kinematics, at)
+        """Return time histories at a point of numbers."""
+        q, qd, qdd, hip, _, _, world, attitude = self._map(self._exact_kinematics, at)
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
@@ -173,7 +173,6 @@ class Phase:
         rows = [self.body.joints.index(name) for name in self.moving]
 
         def full(moved: Any, others: Array) -> Array:
-            """(N + 1, J) with the joints that stand still."""
             values = np.tile(others, (n, 1))
             values[:, rows] = _numbers(moved)
             return values
@@ -207,7 +206,7 @@ class Phase:
 
     @cached_property
     def _held(self) -> Array:
-        """(J,) angles of the joints that stand still, zero for the others [rad]."""
+        """(J,) angles of the joints that do not move, zero for the others [rad]."""
         still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
         return np.array([0.0 if name in self.moving else float(still[name]) for name in self.body.joints])
 
@@ -217,56 +216,37 @@ class Phase:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the variables."""
+        """Names of the variables."""
         return tuple(variable.name for variable in self.variables)
-
-    @property
-    def _traces(self) -> dict[str, Trace]:
-        return {name: trace for limit in self.limits for name, trace in limit.traces.items()}
-
-    @property
-    def _reads_motion(self) -> bool:
-        return self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
-
-    @property
-    def _reads_wrenches(self) -> bool:
-        return any(limit.reads_wrenches for limit in self.limits)
 
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
         at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
         return [x, margin, phase], self.plan(at, phase, ops), at
 
-    def _sampled(
-        self,
-        at: Point,
-        ops: Nonsmooth,
-        motion: bool,
-        wrenches: bool,
-        traces: Mapping[str, Trace],
-        phases: MX | None,
+    def _map_instant(
+        self, inputs: list[SX], outputs: list[SX], at: Point, ops: Nonsmooth, phases: MX | None
     ) -> list[Any]:
-        """Outputs of ``_sample`` at all samples, or at other phases; equations that it leaves open are tied."""
-        inputs, outputs = self._sample(ops, motion, wrenches, traces)
+        """Evaluate one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
         roots = ops.open_roots()
         if roots is None:
-            return self._mapped(ca.Function("sample", inputs, simplify(outputs)), at, phases=phases)
-        (start,) = self._mapped(ca.Function("start", inputs, simplify([roots.start])), at, phases=phases)
+            return self._map(ca.Function("sample", inputs, simplify(outputs)), at, phases=phases)
+        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), at, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
         found: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *rest = self._mapped(tied, at, unknowns, phases=phases)
+            rows, *rest = self._map(tied, at, unknowns, phases=phases)
             found.extend(rest)
             return rows
 
         ops.tie_roots(start, residual)
         return found
 
-    def _sample(
+    def _instant_outputs(
         self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]
     ) -> tuple[list[SX], list[SX]]:
-        """One sample with analytic derivatives: x, margin and phase, and torques and what else is read."""
+        """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
         inputs, plan, at = self._symbolic_plan(ops)
         loads = self.loads(plan)
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
@@ -279,9 +259,9 @@ class Phase:
         return inputs, outputs
 
     def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
-        """One sample: angles that move with their derivatives, hip, planned angles, reach, and what follows.
+        """One sample: moving angles and both derivatives, hip, planned angles, reach, world, attitude, and traces.
 
-        That is the centre of mass with both feet and the planned wrench one below the other, the attitude, and traces.
+        ``world`` is the centre of mass, both feet and the planned wrench in one column.
         """
         inputs, plan, at = self._symbolic_plan(ops)
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
@@ -298,13 +278,12 @@ class Phase:
         return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
 
     def _motion(self, plan: Instant) -> list[SX]:
-        """Angles of the joints that move, and both derivatives."""
         return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
 
     @cached_property
     def _dynamics(self) -> ca.Function:
-        """One sample: torques, those of the moving joints, and ZMP, from the inputs of ``_loaded``."""
-        inputs, loads = self._loaded()
+        """One sample: torques, those of the moving joints, and ZMP."""
+        inputs, loads = self._loads()
         torque, moving = (
             ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.body.joints, self.moving)
         )
@@ -312,12 +291,12 @@ class Phase:
 
     @cached_property
     def _ground(self) -> ca.Function:
-        """One sample: wrenches (6,) on both soles, from the inputs of ``_loaded``."""
-        inputs, loads = self._loaded()
+        """One sample: wrenches (6,) on both soles."""
+        inputs, loads = self._loads()
         return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
 
-    def _loaded(self) -> tuple[list[SX], Instant]:
-        """Loads of one sample as functions of angles, both derivatives, hip, and what ``_kinematics`` gives of the world."""
+    def _loads(self) -> tuple[list[SX], Instant]:
+        """Return angles, both derivatives, hip and world (see ``_kinematics``), and the loads as functions of these."""
         plan = self._symbolic_plan(Exact())[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
@@ -331,20 +310,20 @@ class Phase:
         )
         return [*parts, hip, world], self.loads(now)
 
-    def _mapped(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
-        """A function of columns and (x, margin, phase) at all samples, or at other phases (1, k), one column each.
+    def _map(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
+        """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k).
 
         Columns are those of its inputs that differ from sample to sample.
         """
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
-        margin = ca.repmat(at[REACH_MARGIN], 1, n)
-        if phases is not None:
-            return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, phases]))
-        function, table = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
-        return list(function.map(n).call([*columns, ca.repmat(at.only(self.names).x, 1, n), margin, table]))
+        last: Any = phases
+        if phases is None:
+            function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
+        points = [ca.repmat(at.only(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n)]
+        return list(function.map(n).call([*columns, *points, last]))
 
     def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
-        """First and second time derivative of sampled angles (m, N + 1): central, one-sided at the ends, twice.
+        """Differentiate sampled angles (m, N + 1) twice: central differences, one-sided at the ends.
 
         Source:
             Gupta, Pratihar, Deb (2023), section 3.1: "numerical differentiation as per the given time interval"; the
@@ -361,5 +340,4 @@ class Phase:
 
 
 def _numbers(values: Any) -> Array:
-    """(N + 1, m) from columns of numbers."""
     return np.asarray(DM(values).full().T)

@@ -40,14 +40,14 @@ def goal_for(body: Body, criterion: Criterion) -> Goal:
         InputError: the motors change the power, but something else is minimised.
     """
     motors, heat = body.motors, body.heat
-    if criterion != "power" and motors.draw is not None:
+    if criterion != "power" and motors.power is not None:
         raise InputError(
             f"motors={','.join(motors.features)!r} changes the power, but the objective is "
             f"{INSTEAD[criterion].objective.name}; leave out what changes it"
         )
     if criterion != "power":
         return replace(INSTEAD[criterion], heat=heat)
-    return Goal(heat=heat) if motors.draw is None else Goal(heat=heat, draw=motors.draw)
+    return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
 
 
 def phase_limits(
@@ -86,11 +86,11 @@ def phase_problem(
     """
 
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
-        return phase.assemble(at, phase.samples(at, ops), ops)
+        return phase.assemble(at, phase.sample(at, ops), ops)
 
     body = phase.body
     if not body.closed_form:
-        start = start_within_reach(phase.names, (), lambda at: phase.samples(at, Exact()).reach, start)
+        start = start_within_reach(phase.names, (), lambda at: phase.sample(at, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",

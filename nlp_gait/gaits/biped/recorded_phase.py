@@ -56,7 +56,7 @@ class RecordedPhase(Phase):
         """Return nothing: a recording says nothing about the time between its samples."""
         return ()
 
-    def samples(self, at: Point, ops: Nonsmooth) -> Samples:
+    def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
         """Evaluate the phase at N + 1 equidistant samples.
 
         Traces: ``hip`` (3, N + 1) and ``hip_rate``, ``heights`` (4, N + 1) of the right sole's corners, ``ground`` (2, N + 1),

@@ -9,7 +9,7 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Point
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State
-from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, grid_for, hip_on_spline
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, hip_on_spline, make_grid
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
@@ -48,7 +48,7 @@ def single_support_splines(body: Body, trajectory: Trajectory) -> Splines:
     return Splines(trajectory=trajectory, units=units | {"foot_x": "m", "foot_z": "m"}, length_scale=body.length_scale)
 
 
-def planned_single_support(
+def plan_single_support(
     body: Body,
     *,
     step_m: float,
@@ -60,7 +60,7 @@ def planned_single_support(
 ) -> GaitProblem:
     """Return the problem of single support; for the options see ``gaits.nao``."""
     splines = single_support_splines(body, trajectory)
-    grid = grid_for(trajectory, intervals, samples_per_interval)
+    grid = make_grid(trajectory, intervals, samples_per_interval)
     phase = single_support_phase(body, step_m, splines, grid, goal_for(body, objective), derivatives)
     return phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
 

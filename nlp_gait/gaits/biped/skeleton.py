@@ -1,4 +1,4 @@
-"""What is drawn of any biped: legs, soles, and every other limb that is long enough to be seen."""
+"""Stick figure of any biped: legs, soles, and every other limb that is long enough to be seen."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics
 
-ON_GROUND = 1e-6  # [m]; a sole that is higher does not bear load
+ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
 SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras
 
 
 def skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-    """What draws a robot; joints that a gait does not move stand at zero."""
+    """Return the function that draws a robot; joints that a gait does not move are at zero."""
     return lambda signals, parameters: _skeleton(robot, signals)
 
 
@@ -54,19 +54,17 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
 
 
 def level_sole(robot: Robot, side: str, centre: Array) -> Sole:
-    """Sole of a foot that stays level, from the point under its ankle (T, 3) [m]; it bears load on the ground alone."""
+    """Return the sole of a foot that stays level, from the point under its ankle (T, 3) [m]."""
     foot = robot.feet[side]
     outline = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
     return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
 
 
 def _chain(robot: Robot, link: str) -> list[str]:
-    """Links from the root to one."""
     return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)))]
 
 
 def _tips(robot: Robot) -> list[str]:
-    """Links at the far ends."""
     parents = {joint.parent for joint in robot.joints.values()}
     return [link for link in robot.links if link not in parents]
 

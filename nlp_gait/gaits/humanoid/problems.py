@@ -6,12 +6,12 @@ from typing import Literal
 
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.curves import Trajectory
-from nlp_gait.gaits.biped.cycle import CycleObjective, planned_cycle
-from nlp_gait.gaits.biped.double_support import planned_double_support
+from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
+from nlp_gait.gaits.biped.double_support import plan_double_support
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE
 from nlp_gait.gaits.biped.phase_problem import Criterion
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
-from nlp_gait.gaits.biped.single_support import planned_single_support
+from nlp_gait.gaits.biped.single_support import plan_single_support
 from nlp_gait.gaits.humanoid.body import make_humanoid
 
 Share = Literal["lever", "free"]
@@ -35,7 +35,7 @@ def humanoid_ssp(
         Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
-    return planned_single_support(
+    return plan_single_support(
         body,
         step_m=body.check_step_length(step_length_m),
         intervals=intervals,
@@ -65,7 +65,7 @@ def humanoid_dsp(
         Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
-    return planned_double_support(
+    return plan_double_support(
         body,
         step_m=body.check_step_length(step_length_m),
         intervals=intervals,
@@ -98,7 +98,7 @@ def humanoid_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
     """
-    return planned_cycle(
+    return plan_cycle(
         make_humanoid(robot, drive_limits=drive_limits, motors=motors),
         objective=objective,
         intervals=intervals,

@@ -119,7 +119,7 @@ class FreePhase(Phase):
 
     free: FreeMotion
 
-    def samples_at(self, at: Point, ops: Nonsmooth, phases: MX | None) -> Samples:
+    def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
         """The phase at its samples, or at other phases (1, k); traces are ``others``, ``along``, ``heights`` and ``sides``.
 
         The joints' motion is tied, for torques are far from linear in it and it is linear in most of the many variables; and so

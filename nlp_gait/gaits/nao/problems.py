@@ -11,19 +11,19 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, maker
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory
-from nlp_gait.gaits.biped.cycle import CycleObjective, planned_cycle
+from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import (
     double_support_phase,
     double_support_splines,
     hip_ends,
-    planned_double_support,
+    plan_double_support,
     soles_of,
 )
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import Criterion, phase_problem
-from nlp_gait.gaits.biped.single_support import planned_single_support, stance_of
+from nlp_gait.gaits.biped.single_support import plan_single_support, stance_of
 from nlp_gait.gaits.nao.body import ARM_SWING, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, free_single_support_phase
 from nlp_gait.gaits.nao.leaning_torso import leaning_nao
@@ -58,7 +58,7 @@ def nao_ssp(
         power_form = power_form_maker(
             body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
         )
-    problem = planned_single_support(
+    problem = plan_single_support(
         body,
         step_m=step_length_m,
         intervals=intervals,
@@ -101,7 +101,7 @@ def nao_dsp(
         soles = soles_of(body, step_length_m)
         places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
-    problem = planned_double_support(
+    problem = plan_double_support(
         body,
         step_m=step_length_m,
         intervals=intervals,
@@ -150,7 +150,7 @@ def nao_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
-    return planned_cycle(
+    return plan_cycle(
         body,
         objective=objective,
         intervals=intervals,

@@ -72,7 +72,7 @@ def rows_of(limit: Limit) -> dict[str, Constraint]:
 @pytest.mark.parametrize("heat", ["", "heat"])
 @pytest.mark.parametrize("braking", ["", "free-braking", "regeneration"])
 def test_power(braking: str, heat: str) -> None:
-    draw = parse_nao_motors(f" {braking} ,{heat}, limits", ROBOT).draw
+    draw = parse_nao_motors(f" {braking} ,{heat}, limits", ROBOT).power
     if not braking and not heat:
         assert draw is None  # the paper's way
         return
@@ -146,9 +146,9 @@ def test_features() -> None:
     both = parse_nao_motors("ankle, limits", ROBOT)
     assert both.features == ("ankle", "limits") and len(both.limits) == 2
     none = parse_nao_motors("", ROBOT)
-    assert none.features == () and none.limits == () and none.draw is None and none.model is ROBOT
+    assert none.features == () and none.limits == () and none.power is None and none.model is ROBOT
     heavy = parse_nao_motors("rotor", ROBOT)
-    assert heavy.limits == () and heavy.draw is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
+    assert heavy.limits == () and heavy.power is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
         Motors.parse("ankle", ROBOT, JOINTS)
     with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
