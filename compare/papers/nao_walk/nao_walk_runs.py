@@ -21,7 +21,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
-from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
 from nlp_gait.gaits.nao.recorded import nao_cycles
 from nlp_gait.robots import Robot
@@ -238,7 +238,7 @@ def simulate_drives(drive: Drive, steps: int, lengths: Sequence[float], disturbe
 @cache
 def plan_own_walk(footsteps: Footsteps) -> Result:
     """Return the robot's own walk: preview control of a cart on a table over footsteps."""
-    return cart_table_walk(nao_cycles(), footsteps)
+    return plan_cart_table_walk(nao_cycles(), footsteps)
 
 
 def compute_knee_deg(result: Result) -> float:

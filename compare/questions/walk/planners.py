@@ -20,7 +20,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaits.biped.body import LIFT
-from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.humanoid.problems import humanoid_cycles
 from nlp_gait.gaits.nao.recorded import nao_cycles
@@ -137,7 +137,7 @@ def cart_table(own: Result, gait: Gait, store: Store) -> tuple[Result | None, st
             hip_height_m=height_m,
             lift_m=gait.found.x[LIFT],
         )
-        walk = cart_table_walk(body, footsteps)
+        walk = plan_cart_table_walk(body, footsteps)
         known = {parameter.name for parameter in walk.problem.parameters}
         shared = {name: value for name, value in problem.values.items() if name in known}
         return replace(walk, problem=walk.problem.with_values(**shared))

@@ -1,7 +1,7 @@
 """A walking cycle by the textbook: the ZMP is planned first, and the centre of mass follows by preview control.
 
-The robot is taken for a cart on a table: its mass moves at a constant height, and the table stands as long as the cart's ZMP lies
-under its foot. No motion is optimised; the hip's height is the walker's to choose.
+The robot is modelled as a cart on a table: its mass moves at a constant height, and the table stands as long as the cart's ZMP is
+under its foot. No motion is optimised; the hip's height is chosen by the caller.
 
 Source:
     Kajita and others (2003), see ``preview_control``; the second pass with the error of the whole body's ZMP is section 5 there.
@@ -35,7 +35,7 @@ SETTLING_S = 10.0  # after which the walk repeats
 
 @dataclass(frozen=True, kw_only=True)
 class Footsteps:
-    """What a walk is planned from.
+    """Input of the planner.
 
     Attributes:
         step_m: length from foot to foot [m].
@@ -52,20 +52,20 @@ class Footsteps:
     lift_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no walk."""
+        """Check that all are finite and positive."""
         for name, value in vars(self).items():
             if not (isinstance(value, (int, float)) and math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} must be a finite number > 0, got {value!r}")
 
     @property
     def period_s(self) -> float:
-        """Of one step [s]."""
+        """Duration of one step [s]."""
         return self.single_s + self.double_s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walker:
-    """A robot that walks by footsteps: from the hip's path over the floor to its joints.
+    """Planner of one robot's walk: from the hip's path over the floor to the joints.
 
     Attributes:
         cycles: the robot, and the limits by which its cycles are judged.
@@ -82,24 +82,24 @@ class Walker:
 
     @property
     def sample_s(self) -> float:
-        """Of the controller: about ``SAMPLE_S``, and a step is a whole number of them [s]."""
+        """Sampling time of the controller: about ``SAMPLE_S``, so that a step is a whole number of samples [s]."""
         return self.footsteps.period_s / math.ceil(self.footsteps.period_s / SAMPLE_S)
 
     @property
-    def shown(self) -> int:
-        """Step that is the cycle: the first on the left foot after settling."""
+    def cycle_step(self) -> int:
+        """Number of the step that is the cycle: the first on the left foot after settling."""
         return 2 * math.ceil(SETTLING_S / self.footsteps.period_s / 2)
 
     @property
     def times(self) -> Array:
-        """Of the cycle: about ``SAMPLE_S`` apart in each phase, with both switches among them [s]."""
+        """Instants of the cycle: about ``SAMPLE_S`` apart in each phase, with both switches among them [s]."""
         single, double = self.footsteps.single_s, self.footsteps.double_s
         first, second = (math.ceil(duration / SAMPLE_S) + 1 for duration in (single, double))
         return np.concatenate([np.linspace(0.0, single, first), np.linspace(single, single + double, second)[1:]])
 
     @property
     def planned_zmp(self) -> Callable[[Array], Array]:
-        """ZMP (2, k) in the cycle at times (k,): under the middle of the supporting sole, then straight to the next one [m]."""
+        """Planned ZMP (2, k) at times (k,) of the cycle: the middle of the supporting sole, then straight to the next [m]."""
         left, right = (np.array(self._middle(side)) for side in BOTH_FEET)
         ahead = right + (self.footsteps.step_m, 0.0)
 
@@ -112,29 +112,29 @@ class Walker:
     def follow(
         self, zmp: Callable[[Array], Array], height_m: float, *, advances: bool = True
     ) -> Callable[[Array], Array]:
-        """Path (2, k) of the cart's mass in the cycle whose ZMP follows one that repeats, mirrored from step to step [m].
+        """Return the path (2, k) of the cart's mass in the cycle whose ZMP follows a repeating, mirrored one [m].
 
         Args:
             zmp: (2, k) of a cycle at times (k,) [m].
             height_m: of the mass.
-            advances: every step leads a step further; False for a correction.
+            advances: the walk proceeds by a step each time; False for a correction.
         """
         controller = PreviewController(sample_s=self.sample_s, height_m=height_m, gravity=self.body.gravity)
-        period, begins = self.footsteps.period_s, self.shown * self.footsteps.period_s
+        period, begins = self.footsteps.period_s, self.cycle_step * self.footsteps.period_s
         t = np.arange(math.ceil((begins + period + PREVIEW_S) / self.sample_s) + 2) * self.sample_s
         step = np.floor(t / period + 1e-9)
         x, y = zmp(t - step * period)
-        way = self.footsteps.step_m * advances
-        courses = [controller.follow(x + step * way), controller.follow(np.where(step % 2 == 0, y, -y))]
+        distance = self.footsteps.step_m * advances
+        courses = [controller.follow(x + step * distance), controller.follow(np.where(step % 2 == 0, y, -y))]
 
         def path(t: Array) -> Array:
             along, across = (course.at(begins + t) for course in courses)
-            return np.stack([along - self.shown * way, across])
+            return np.stack([along - self.cycle_step * distance, across])
 
         return path
 
-    def gait(self, hip_path: Callable[[Array], Array]) -> Result:
-        """The cycle in which the hip moves along a path (2, k) over the floor, judged as a planned one.
+    def make_gait(self, hip_path: Callable[[Array], Array]) -> Result:
+        """Return the cycle in which the hip moves along a path (2, k) over the floor, judged as a planned one.
 
         Raises:
             InputError: a foot is out of reach.
@@ -144,12 +144,12 @@ class Walker:
         angles, reach, miss = (
             np.asarray(part.full().T) for part in self._legs.map(len(t))(np.minimum(t / steps.single_s, 1.0), hip)
         )
-        for excess, what, remedy in (
+        for violation, what, remedy in (
             (reach - 1.0, "ankle is too far", "lower the hip, or shorten the step"),
             (miss - CLOSURE_M, "leg misses its foot", "choose another height of the hip"),
         ):
-            if excess.size and excess.max() > 0.0:
-                worst, leg = np.unravel_index(int(np.argmax(excess)), excess.shape)
+            if violation.size and violation.max() > 0.0:
+                worst, leg = np.unravel_index(int(np.argmax(violation)), violation.shape)
                 raise InputError(
                     f"a hip {steps.hip_height_m:g} m high reaches no step of {steps.step_m:g} m: at {t[worst]:.3f} s the "
                     f"{('left', 'right')[leg]} {what}; {remedy}"
@@ -158,7 +158,7 @@ class Walker:
 
     @cached_property
     def _legs(self) -> ca.Function:
-        """From the share of single support and the hip (3,) to the legs' angles, the cosines of both knees, and their misses."""
+        """From the share of single support and the hip (3,) to all angles, the cosines of the knees, and the legs' misses."""
         share, hip, still = SX.sym("share"), SX.sym("hip", 3), SX(3, 1)
         right_y, right_z = self.body.ankle("R")
         step = SX(self.footsteps.step_m)
@@ -169,18 +169,18 @@ class Walker:
         return ca.Function("legs", [share, hip], [angles, plan.reach, plan.miss])
 
     def _middle(self, side: str) -> tuple[float, float]:
-        """Of the sole whose ankle stands at x = 0 [m]."""
+        """Middle of the sole whose ankle is at x = 0 [m]."""
         foot, (y, _) = self.body.robot.feet[BOTH_FEET[side]], self.body.ankle(side)
         return (foot.front_m - foot.back_m) / 2, y + (foot.left_m - foot.right_m) / 2
 
 
-def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int = 2) -> Result:
+def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int = 2) -> Result:
     """Plan a walking cycle from footsteps alone.
 
     Args:
         cycles: the robot, and the limits by which its cycles are judged.
         footsteps: with the hip's height.
-        passes: 1 takes the robot for a cart; every further one moves the hip by what a cart needs to undo the distance of the
+        passes: 1 models the robot as a cart; each further pass moves the hip so that a cart would remove the distance of the
             whole body's ZMP from the planned one. The source has two.
 
     Raises:
@@ -190,9 +190,9 @@ def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int
         raise InputError(f"passes must be a whole number >= 1, got {passes!r}")
     walker = Walker(cycles=cycles, footsteps=footsteps)
     planned = walker.planned_zmp
-    # The robot whose hip is the cart says where its mass is; the cart is then moved there.
+    # A first gait with the cart at the hip gives the place of the mass; the cart is then moved there.
     hip = walker.follow(planned, footsteps.hip_height_m)
-    first = sample_finely(walker.gait(hip)).arrays
+    first = sample_finely(walker.make_gait(hip)).arrays
     mass = (first["com"] - first["hip"]).mean(axis=0) - np.array(cycles.body.hip_m)
     ahead, _, height = mass + (0.0, 0.0, footsteps.hip_height_m)
     cart = walker.follow(planned, height)
@@ -201,14 +201,14 @@ def cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int
     def path(t: Array) -> Array:
         return sum((correction(t) for correction in corrections), cart(t) - np.array([[ahead], [0.0]]))
 
-    gait = walker.gait(path)
+    gait = walker.make_gait(path)
     for _ in range(passes - 1):
-        played = sample_finely(gait).arrays
+        arrays = sample_finely(gait).arrays
 
-        def missed(t: Array, played: Mapping[str, Array] = played) -> Array:
-            zmp = np.stack([np.interp(t, played["t"], played["zmp"][:, k]) for k in range(2)])
+        def zmp_error(t: Array, arrays: Mapping[str, Array] = arrays) -> Array:
+            zmp = np.stack([np.interp(t, arrays["t"], arrays["zmp"][:, k]) for k in range(2)])
             return planned(t) - zmp
 
-        corrections.append(walker.follow(missed, height, advances=False))
-        gait = walker.gait(path)
+        corrections.append(walker.follow(zmp_error, height, advances=False))
+        gait = walker.make_gait(path)
     return gait

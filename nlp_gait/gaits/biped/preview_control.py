@@ -1,4 +1,4 @@
-"""A cart on a table moves so that its ZMP follows a reference that is known ahead: preview control.
+"""Preview control: a cart on a table moves so that its ZMP follows a reference that is known in advance.
 
 Source:
     Kajita, Kanehiro, Kaneko, Fujiwara, Harada, Yokoi, Hirukawa (2003), "Biped walking pattern generation by using preview control
@@ -22,7 +22,7 @@ ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """Motion of a cart whose jerk is constant between samples.
+    """Motion of a cart with constant jerk between samples.
 
     Attributes:
         sample_s: time between samples [s].
@@ -35,7 +35,7 @@ class Course:
     jerks: Array
 
     def at(self, t: Array) -> Array:
-        """Positions (k,) [m] at times (k,) [s]; exact between samples."""
+        """Return positions (k,) [m] at times (k,) [s], exact between samples."""
         k = np.clip(np.floor(t / self.sample_s + 1e-9).astype(int), 0, len(self.jerks) - 1)
         since = t - k * self.sample_s
         position, velocity, acceleration = self.states[k].T
@@ -44,7 +44,7 @@ class Course:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreviewController:
-    """Moves a cart so that its ZMP follows a reference that is known ahead (eqs. 13 to 22).
+    """Controller of a cart whose ZMP follows a reference that is known in advance (eqs. 13 to 22).
 
     Attributes:
         sample_s: T [s].
@@ -57,7 +57,7 @@ class PreviewController:
     gravity: float
 
     def follow(self, reference: Array) -> Course:
-        """Motion of the cart from rest above the first reference.
+        """Return the motion of the cart from rest above the first reference.
 
         Args:
             reference: (T + preview,) ZMP, longer than the motion by ``self.preview`` samples [m].
@@ -66,28 +66,28 @@ class PreviewController:
         a, b, c = self._cart()
         steps = len(reference) - self.preview
         states, jerks = np.zeros((steps, 3)), np.zeros(steps)
-        state, missed = np.array([reference[0], 0.0, 0.0]), 0.0
+        state, error = np.array([reference[0], 0.0, 0.0]), 0.0
         for k in range(steps):
-            missed += c @ state - reference[k]
+            error += c @ state - reference[k]
             ahead = preview_gains @ reference[k + 1 : k + 1 + self.preview]
-            jerk = -integral_gain * missed - state_gain @ state - ahead
+            jerk = -integral_gain * error - state_gain @ state - ahead
             states[k], jerks[k] = state, jerk
             state = a @ state + b * jerk
         return Course(sample_s=self.sample_s, states=states, jerks=jerks)
 
     @property
     def preview(self) -> int:
-        """Samples that are looked ahead."""
+        """Number of previewed samples."""
         return math.ceil(PREVIEW_S / self.sample_s)
 
     def _cart(self) -> tuple[Array, Array, Array]:
-        """Its motion under a constant jerk, and its ZMP (eq. 6)."""
+        """Matrices of its motion under constant jerk, and row of its ZMP (eq. 6)."""
         t = self.sample_s
         a = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
         return a, np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -self.height_m / self.gravity])
 
     def _gains(self) -> tuple[float, Array, Array]:
-        """On the summed error, on the state (3,), and on the coming references (preview,)."""
+        """Gains on the summed error, on the state (3,), and on the next references (preview,)."""
         a, b, c = self._cart()
         whole_b = np.concatenate([[c @ b], b])[:, None]
         unit = np.array([[1.0], [0.0], [0.0], [0.0]])

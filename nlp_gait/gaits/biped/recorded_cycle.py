@@ -46,7 +46,7 @@ class RecordedGait:
     make_planned: Callable[[], GaitProblem]
 
 
-def on_grids(
+def make_refinable(
     build: Callable[[Grid], GaitProblem], intervals: int, options: Mapping[str, str | int | float | bool]
 ) -> GaitProblem:
     """Return a problem on the planned one's samples, which can be refined.
@@ -126,10 +126,10 @@ class RecordedCycles:
             InputError: a phase has too few samples.
         """
         motion = Motion(body=self.body, t=t, q=q)
-        parts = {name: motion.part(*span) for name, span in motion.phases(touch_down_s).items()}
+        parts = {name: motion.cut(*span) for name, span in motion.phases(touch_down_s).items()}
         step_m = float(motion.right_foot(t[-1:])[0, 0])
         x = np.array([*(part.duration_s for part in parts.values()), step_m])
-        problem = on_grids(lambda grid: self.problem(parts, grid, motion.repeats), self.intervals, self.options)
+        problem = make_refinable(lambda grid: self.problem(parts, grid, motion.repeats), self.intervals, self.options)
         return Result(problem=problem, x=x)
 
     def problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:

@@ -52,7 +52,7 @@ class Motion:
 
     @property
     def duration_s(self) -> float:
-        """Of the whole motion."""
+        """Duration of the whole motion."""
         return float(self.t[-1])
 
     @cached_property
@@ -60,7 +60,7 @@ class Motion:
         """Angles over time; continuous accelerations."""
         return CubicSpline(self.t, self.q)
 
-    def part(self, start_s: float, end_s: float) -> Motion:
+    def cut(self, start_s: float, end_s: float) -> Motion:
         """Return the motion between two times, from the samples in between alone: accelerations may jump at its ends.
 
         Raises:

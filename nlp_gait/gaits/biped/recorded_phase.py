@@ -124,12 +124,12 @@ class RecordedPhase(Phase):
 
 
 CORNERS = ("back right", "back left", "front right", "front left")
-# How far a recorded sole may be from where it should stand: rounding, and the spline between samples.
+# Largest distance of a recorded sole from its place: rounding, and the spline between samples.
 GROUND_TOLERANCE = Parameter(
     name="ground_tolerance_m",
     unit="m",
     default=5e-4,
-    description="a sole nearer than this to the ground, or to where it stood, stands",
+    description="a sole nearer than this to the ground and to its place stands",
     minimum=0.0,
 )
 
@@ -138,14 +138,14 @@ class HipLimits(Limit):
     """The hip at both ends within the ranges of the planned motion's variables.
 
     Args:
-        variables: by what they limit, ``z``, ``vx``, ``vy``, ``vz`` and more, at the start and at the end; None for no limit.
+        variables: at the start and at the end, by what they limit: ``x``, ``z``, ``vx``, ``vy``, ``vz``.
         labels: of both ends.
     """
 
     def __init__(self, variables: Sequence[Mapping[str, Variable]], labels: Sequence[str]) -> None:
         self._variables, self._labels = variables, labels
         unique = {v.name: v for limits in variables for v in limits.values()}
-        self.parameters = bounds_of(tuple(unique.values()))
+        self.parameters = bound_parameters(tuple(unique.values()))
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         hip, rate = samples.traces["hip"], samples.traces["hip_rate"]
@@ -178,7 +178,7 @@ class SwingLimits(Limit):
 
     def __init__(self, motion: Motion, lift: Variable) -> None:
         self._motion, self._lift = motion, lift
-        self.parameters = (GROUND_TOLERANCE, *bounds_of((lift,)))
+        self.parameters = (GROUND_TOLERANCE, *bound_parameters((lift,)))
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -213,6 +213,6 @@ class StandingLimits(Limit):
         ), {}
 
 
-def bounds_of(variables: Sequence[Variable]) -> tuple[Parameter, ...]:
+def bound_parameters(variables: Sequence[Variable]) -> tuple[Parameter, ...]:
     """Return the bounds of a planned motion's variables as parameters."""
     return tuple(bound for v in variables for bound in (v.bound("lower"), v.bound("upper")))

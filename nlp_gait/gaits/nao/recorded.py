@@ -11,7 +11,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.motion.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
-from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles, RecordedGait, on_grids, recorded_phase_problem
+from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles, RecordedGait, make_refinable, recorded_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, places
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES
@@ -110,7 +110,9 @@ def make_recorded_gait(
         problem, x = judged.problem, tuple(judged.x.tolist())
     else:
         (name,) = phases
-        problem = on_grids(lambda grid: recorded_phase_problem(body, name, motion, grid), intervals, cycles.options)
+        problem = make_refinable(
+            lambda grid: recorded_phase_problem(body, name, motion, grid), intervals, cycles.options
+        )
         x = (motion.duration_s,)
         step = float(foot[1, 0] - foot[0, 0]) / 2 if name == "ssp" else step
     cosine = float(places(body)(motion.q[0])[4])

@@ -8,7 +8,7 @@ import pytest
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, load, sample_finely
-from nlp_gait.gaits.biped.cart_table import Footsteps, cart_table_walk
+from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.humanoid.body import GRAVITY
 from nlp_gait.gaits.humanoid.problems import humanoid_cycles
@@ -36,7 +36,7 @@ def cycles(path: str) -> RecordedCycles:
 
 @pytest.fixture(scope="module")
 def walk(cycles: RecordedCycles) -> Result:
-    return cart_table_walk(cycles, STEPS)
+    return plan_cart_table_walk(cycles, STEPS)
 
 
 @pytest.fixture(scope="module")
@@ -127,4 +127,4 @@ def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, cycles: 
 )
 def test_a_hip_that_reaches_no_step_is_refused(cycles: RecordedCycles, height_m: float, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        cart_table_walk(cycles, Footsteps(**{**vars(STEPS), "hip_height_m": height_m}))
+        plan_cart_table_walk(cycles, Footsteps(**{**vars(STEPS), "hip_height_m": height_m}))

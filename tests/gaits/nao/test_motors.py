@@ -25,13 +25,6 @@ def mean(samples: np.ndarray) -> np.ndarray:
     return trapezoid(samples, axis=0) / (len(samples) - 1)
 
 
-def test_without_features_it_is_the_same_problem() -> None:
-    plain, empty = load("nao-ssp"), load("nao-ssp", motors="")
-    assert plain.options == empty.options and "motors" not in plain.options
-    one, other = evaluated(plain, X), evaluated(empty, X)
-    assert (one.cost, one.rows) == (other.cost, other.rows)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("features", ["free-braking", "regeneration", "heat", "heat,free-braking"])
 def test_power_is_that_of_the_time_histories(features: str) -> None:

@@ -157,7 +157,7 @@ def test_a_sole_bears_what_forces_at_its_corners_can_give() -> None:
         found = linprog(
             np.zeros(12), A_ub=np.kron(np.eye(4), pyramid), b_ub=np.zeros(16), A_eq=sums, b_eq=w, bounds=(None, None)
         )
-        assert found.converged == (least > 0), (w, least)
+        assert found.success == (least > 0), (w, least)
         seen[least > 0] += 1
     assert min(seen.values()) > 20
 

@@ -105,7 +105,7 @@ def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
     gait = make_recorded_gait(JointAngles(owner="waves", joints=JOINTS, t=t, q=base + waves), gait="nao-ssp")
     assert gait.lean_deg > 1.0
     signals, model = gait.problem.signals(gait.x), floating_model(ROBOT)
-    ankle = np.array(gait.motion.stance.support)
+    ankle = np.array(gait.motion.body.support)
     for sample in range(0, 11, 2):
         motion = [dict(zip(JOINTS, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")]
         oracle = stand(model, "LAnkleRoll", ankle, *motion, GRAVITY)
