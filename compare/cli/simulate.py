@@ -27,7 +27,7 @@ from compare.cli.simulation_options import ConditionOptions, DriveOptions, FilmO
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.film.recording import Player
+    from nlp_gait.simulation.film.recording import Simulator
     from nlp_gait.simulation.film.video import Frame
     from nlp_gait.simulation.measurements import Measurements, Walk
     from nlp_gait.simulation.plan import Plan
@@ -136,7 +136,7 @@ def simulate(
 
 
 def _filmed(
-    film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Player]]
+    film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Simulator]]
 ) -> list[Simulation]:
     """Play the gaits and write the film."""
     from nlp_gait.simulation.film.film import draw_pictures
@@ -153,7 +153,7 @@ def _filmed(
                 advance("")
 
     write_video(target, watched(), film.frames_per_s)
-    return [recording.trace for recording in recordings]
+    return [recording.simulation for recording in recordings]
 
 
 def _measured(plan: Plan, trace: Simulation, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:

@@ -37,7 +37,7 @@ def test_mp4_without_its_encoder_and_other_endings_are_refused(tmp_path, monkeyp
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[video\]', or write a .gif"):
         check_video_path(tmp_path / "walk.mp4")
-    with pytest.raises(InputError, match="ends in .gif or .mp4, got 'walk.avi'"):
+    with pytest.raises(InputError, match="must end in .gif or .mp4, got 'walk.avi'"):
         check_video_path(tmp_path / "walk.avi")
 
 

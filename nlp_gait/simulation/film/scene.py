@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.film.recording import Recording
 from nlp_gait.simulation.film.video import Frame
 
-# By name: azimuth and elevation of the camera [degrees], and the height that it sees in heights of the robot.
+# By name: azimuth and elevation of the camera [degrees], and its visible height in heights of the robot.
 CAMERAS = {
     "side": (90.0, -9.0, 1.4),
     "front": (180.0, -9.0, 1.4),
@@ -23,18 +22,17 @@ CAMERAS = {
     "above": (90.0, -90.0, 0.6),
 }
 NARROWEST = 0.75  # width over height of a view below which the camera steps back
-ARROW_HEIGHT = 0.45  # of the robot, for a force on the floor as large as its weight
+ARROW_HEIGHT = 0.45  # of the robot, for a force equal to its weight
 FORCE, MEASURED, PLANNED = (0.0, 0.62, 0.45, 0.9), (0.05, 0.05, 0.05, 1.0), (0.8, 0.47, 0.65, 1.0)
 DOT, ARROW_RADIUS = 0.012, 0.008  # of the robot's height
-DOTS_ABOVE = 0.05  # of the robot's height: over the soles
+DOTS_ABOVE = 0.05  # of the robot's height, above the soles
 FLAT = 0.0002  # [m]
-TRAIL = 25  # earlier centres of pressure that are shown
+TRAIL = 25  # number of earlier centres of pressure in the picture
 MOST_GEOMETRIES = 2000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class View:
-    """Part of a picture [pixels]; the origin is its upper left corner.
+class View(NamedTuple):
+    """Part of a picture [pixels]; the origin is the upper left corner.
 
     Attributes:
         name: side, front, back or above.
@@ -51,20 +49,25 @@ class View:
     height: int
 
 
-def stairs(model: Any) -> Any:
-    """Which geometries of the engine's model are boxes that stand on the floor."""
+def find_stairs(model: Any) -> Any:
+    """Return a mask of the geometries of the engine's model that are boxes on the floor."""
     return (model.geom_bodyid == 0) & (model.geom_type == load_mujoco().mjtGeom.mjGEOM_BOX)
 
 
-class Stage:
-    """Draws pictures of one recording; to be closed."""
+class Scene:
+    """Views of one recording; call ``close`` at the end.
+
+    Args:
+        recording: to draw.
+        views: from several sides.
+        width: of all views together [pixels].
+        height: of all views together [pixels].
+
+    Raises:
+        OutputError: this machine cannot draw off the screen.
+    """
 
     def __init__(self, recording: Recording, views: Sequence[View], width: int, height: int) -> None:
-        """Get a drawing surface.
-
-        Raises:
-            OutputError: this machine has no way to draw off the screen.
-        """
         self._engine = engine = load_mujoco(pictures=True)
         self._recording, self._views, self._size = recording, views, (width, height)
         model = recording.model
@@ -77,11 +80,11 @@ class Stage:
         self._surface: Any = None
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the failure itself says enough
+                warnings.simplefilter("ignore")  # the error below has the reason
                 self._surface = engine.GLContext(width, height)
                 self._surface.make_current()
                 self._context = engine.MjrContext(model, engine.mjtFontScale.mjFONTSCALE_100)
-        except Exception as error:  # whatever the graphics driver raises
+        except Exception as error:  # any error of the graphics driver
             self.close()
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise OutputError(
@@ -93,8 +96,8 @@ class Stage:
         self._whole, self._soles = engine.MjvOption(), engine.MjvOption()
         self._soles.geomgroup[1:] = 0
 
-    def picture(self, k: int) -> Frame:
-        """All views at one instant, (height, width, 3)."""
+    def draw(self, k: int) -> Frame:
+        """Return all views at one instant, (height, width, 3)."""
         engine, (width, height) = self._engine, self._size
         self._pose(k)
         self._surface.make_current()
@@ -119,7 +122,7 @@ class Stage:
         return pixels[::-1]
 
     def close(self) -> None:
-        """Give the drawing surface back."""
+        """Release the drawing surface."""
         if self._surface is not None:
             self._surface.free()
             self._surface = None
@@ -131,7 +134,7 @@ class Stage:
         self._engine.mj_camlight(self._recording.model, self._data)
 
     def _camera(self, view: View, k: int) -> Any:
-        """A camera that goes with the robot, not with its sway."""
+        """Return a camera that follows the robot without its sway."""
         camera = self._engine.MjvCamera()
         camera.azimuth, camera.elevation, seen = CAMERAS[view.name]
         path = self._recording.path
@@ -144,7 +147,7 @@ class Stage:
         return camera
 
     def _add_force(self, k: int) -> None:
-        """The floor's force as an arrow from the centre of pressure."""
+        """Add the floor's force as an arrow from the centre of pressure."""
         centre, load = self._recording.pressure[k], float(self._recording.load[k])
         if not np.isfinite(centre).all() or load <= 0.0:
             return
@@ -156,7 +159,7 @@ class Stage:
             self._engine.mjv_connector(geometry, self._engine.mjtGeom.mjGEOM_ARROW, width, foot, tip)
 
     def _add_dots(self, k: int) -> None:
-        """Centre of pressure with its path, and the planned zero-moment point."""
+        """Add the centre of pressure with its path, and the planned zero-moment point."""
         self._add_dot(self._recording.planned[k], 1.5, PLANNED, -0.001)
         begin = max(0, k - TRAIL)
         for i, centre in enumerate(self._recording.pressure[begin : k + 1], begin):
@@ -170,15 +173,15 @@ class Stage:
             self._new(self._engine.mjtGeom.mjGEOM_CYLINDER, colour, size, place)
 
     def _ground(self, x: float, y: float) -> float:
-        """Height of the floor, or of the highest box that stands on it, under a point [m]."""
+        """Return the height of the ground under a point [m]: the floor, or the highest box on it."""
         model = self._recording.model
-        boxes = stairs(model)
+        boxes = find_stairs(model)
         middles, halves = model.geom_pos[boxes], model.geom_size[boxes]
         under = (np.abs(middles[:, :2] - (x, y)) <= halves[:, :2]).all(axis=1)
         return float(max((middles[:, 2] + halves[:, 2])[under], default=0.0))
 
     def _new(self, kind: Any, colour: Sequence[float], size: Any = None, place: Any = None) -> Any:
-        """A further geometry in the scene; None if it is full."""
+        """Add a geometry to the scene; return None if it is full."""
         scene = self._scene
         if scene.ngeom >= scene.maxgeom:
             return None

@@ -1,4 +1,4 @@
-"""Pictures in a row as GIF or MP4."""
+"""Sequences of pictures as GIF or MP4 files."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Frame = np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]
 
 
 def check_video_path(path: Path) -> Path:
-    """The path, if its ending names a format that can be written here.
+    """Return the path if its suffix names a video format that can be written.
 
     Raises:
-        InputError: another ending.
+        InputError: another suffix.
         MissingExtraError: MP4 without its encoder.
     """
     if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"a video ends in {' or '.join(SUFFIXES)}, got {path.name!r}")
+        raise InputError(f"the name of a video must end in {' or '.join(SUFFIXES)}, got {path.name!r}")
     if path.suffix.lower() == ".mp4":
         try:
             import imageio_ffmpeg  # noqa: F401
@@ -37,17 +37,17 @@ def check_video_path(path: Path) -> Path:
     return path
 
 
-def check_frames(played_s: float, frames_per_s: float) -> None:
-    """Refuse a film of so many frames that nobody waits for it.
+def check_frames(duration_s: float, frames_per_s: float) -> None:
+    """Check the number of frames of a film.
 
     Raises:
-        InputError: with what makes it shorter.
+        InputError: there are too many; with a remedy.
     """
-    count = math.ceil(played_s * frames_per_s)
+    count = math.ceil(duration_s * frames_per_s)
     if count > MOST_FRAMES:
         raise InputError(
-            f"a film takes at most {MOST_FRAMES} frames, got {played_s:g} s at {frames_per_s:g} frames a second = {count}; raise "
-            "--speed or lower --fps"
+            f"a film takes at most {MOST_FRAMES} frames, got {duration_s:g} s at {frames_per_s:g} frames a second = {count}; "
+            "raise --speed or lower --fps"
         )
 
 
@@ -55,7 +55,7 @@ def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> Non
     """Write frames (height, width, 3) of equal size.
 
     Raises:
-        InputError: an ending that is no video.
+        InputError: the suffix of another format.
         MissingExtraError: MP4 without its encoder.
         OutputError: the file cannot be written.
     """
@@ -71,7 +71,7 @@ def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
         Image.fromarray(frame).quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         for frame in frames
     )
-    duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers slow down what is faster
+    duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers do not show more frames per second
     next(images).save(
         path, format="GIF", save_all=True, append_images=images, duration=duration_ms, loop=0, optimize=True
     )
