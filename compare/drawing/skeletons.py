@@ -7,7 +7,7 @@ from dataclasses import replace
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Result, sample_signals
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.motion.skeleton import Skeleton
+from nlp_gait.formulation.stick_figure import Skeleton
 
 
 @lock_casadi

@@ -11,7 +11,7 @@ import numpy as np
 from nlp_gait.columns import read_table
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.export.webots import read_motion
-from nlp_gait.formulation.motion.signals import JointAngles
+from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
 # ``q LKneePitch [rad]`` as `export --format csv` writes it, ``LKneePitch``, ``LKneePitch [deg]``, ``t``, ``time_s``.

@@ -3,6 +3,7 @@
 from nlp_gait.formulation.assembly import (
     Assembly,
     Constraint,
+    Grid,
     InstantPoint,
     NumericPoint,
     Objective,
@@ -15,11 +16,9 @@ from nlp_gait.formulation.assembly import (
 )
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
-from nlp_gait.formulation.motion.grid import Grid
-from nlp_gait.formulation.motion.signals import Array, Columns, Signals, vector_columns
 from nlp_gait.formulation.registry import load, maker, problem_names
-from nlp_gait.formulation.result import Result, load_result
-from nlp_gait.formulation.sampling import sample_finely, sample_signals
+from nlp_gait.formulation.result import Result, load_result, sample_finely, sample_signals
+from nlp_gait.formulation.signals import Array, Columns, Signals, vector_columns
 
 __all__ = [
     "Array",

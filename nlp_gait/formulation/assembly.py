@@ -1,4 +1,4 @@
-"""What a problem's mathematics is written in: variables, parameters, the symbols of both, and the rows that come out."""
+"""Parts of a problem's mathematics: variables, parameters, symbols of both, constraints, and rows as functions of time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from nlp_gait.errors import InputError, format_value, unknown
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Expression = TypeVar("Expression", MX, SX, DM)
-# Of what of a motion rows are stated: of each instant, of the change over each interval, of a time mean, of a root mean square,
-# of neighbouring samples, so that they mean nothing between them, or of no time at all.
+# What rows of a motion refer to: each instant, the change over each interval, a mean over time, a root mean square, neighbouring
+# samples (not defined between them), or no time at all.
 Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "samples", "once"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """Number that may change without rebuilding; ``minimum`` and ``maximum`` say what is allowed."""
+    """Number that may change without rebuilding, between ``minimum`` and ``maximum``."""
 
     name: str
     unit: str
@@ -31,13 +31,12 @@ class Parameter:
     maximum: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse a default that is no number."""
         _check_number(f"parameter {self.name!r}", "default", self.default)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
-    """Decision variable with its default bounds, in ``unit``; no bound may be set beyond ``minimum`` and ``maximum``."""
+    """Decision variable with its default bounds, in ``unit``; bounds must stay between ``minimum`` and ``maximum``."""
 
     name: str
     unit: str
@@ -48,17 +47,16 @@ class Variable:
     maximum: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse bounds that leave no range, which is a variable's unit of length."""
         owner = f"variable {self.name!r}"
         for end in ("lower", "upper"):
             _check_number(owner, end, getattr(self, end))
         if not self.lower < self.upper:
             raise InputError(
-                f"{owner}: lower must be below upper, got {self.lower} and {self.upper}; hold a variable at a value by fixing it"
+                f"{owner}: lower must be below upper, got {self.lower} and {self.upper}; use fix() to hold a variable at a value"
             )
 
     def bound(self, end: Literal["lower", "upper"]) -> Parameter:
-        """One of the bounds as a parameter, ``<variable>.lower`` or ``<variable>.upper``."""
+        """Return one bound as a parameter, ``<variable>.lower`` or ``<variable>.upper``."""
         return Parameter(
             name=f"{self.name}.{end}",
             unit=self.unit,
@@ -75,7 +73,7 @@ def _check_number(owner: str, field: str, value: object) -> None:
 
 
 def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
-    """Parameters from a table of name, unit, default, description, minimum and maximum."""
+    """Return parameters from a table of name, unit, default, description, minimum and maximum."""
     return tuple(
         Parameter(name=name, unit=unit, default=default, description=text, minimum=minimum, maximum=maximum)
         for name, unit, default, text, minimum, maximum in table
@@ -83,8 +81,35 @@ def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Param
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """Instants at which a problem evaluates its motion.
+
+    Attributes:
+        intervals: equal parts to which limits on changes apply.
+        samples_per_interval: above 1 for more samples than these limits need.
+        refined_by: option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid, so
+            that it cannot be refined.
+    """
+
+    intervals: int
+    samples_per_interval: int = 1
+    refined_by: Literal["intervals", "samples_per_interval"] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("intervals", "samples_per_interval"):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+                raise InputError(f"{name} must be a whole number >= 1, got {count!r}")
+
+    @property
+    def parts(self) -> int:
+        """Number of equal parts between the samples."""
+        return self.intervals * self.samples_per_interval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
-    """Name, unit and sense of what is optimised."""
+    """Name, unit and sense of the objective."""
 
     name: str
     unit: str
@@ -92,7 +117,7 @@ class Objective:
 
     @property
     def sign(self) -> float:
-        """+1 if minimised, -1 if maximised: sign * objective is what every solver minimises."""
+        """+1 if minimised, -1 if maximised: every solver minimises sign * objective."""
         return 1.0 if self.sense == "minimise" else -1.0
 
 
@@ -108,7 +133,8 @@ class Constraint:
         value: (m, 1).
         lower: (m, 1) or scalar, a function of parameters only.
         upper: likewise.
-        over: of what the rows are stated; None if nothing is known. Labels of rows at samples end with a comma and the sample.
+        over: part of the motion that the rows refer to; None if unknown. Labels of rows at samples end with a comma and the
+            sample.
     """
 
     name: str
@@ -121,21 +147,20 @@ class Constraint:
     over: Over | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what gives no rows, by the name of the row."""
         owner = f"constraint {self.name!r}"
         _check_number(owner, "scale", self.scale)
         if not self.scale > 0.0:
-            raise InputError(f"{owner}: scale must be > 0: a violation of this size counts as 1; got {self.scale}")
-        m = _rows_of(owner, "value", self.value)
+            raise InputError(f"{owner}: scale must be > 0 (a violation of this size counts as 1), got {self.scale}")
+        m = _count_rows(owner, "value", self.value)
         for end in ("lower", "upper"):
             bound = getattr(self, end)
-            if bound is not None and (count := _rows_of(owner, end, bound)) not in (1, m):
+            if bound is not None and (count := _count_rows(owner, end, bound)) not in (1, m):
                 raise InputError(f"{owner}: {end} must have one row or as many as value, {m}, got {count}")
         if self.lower is None and self.upper is None:
-            raise InputError(f"{owner}: it needs lower, upper or both")
+            raise InputError(f"{owner}: lower, upper or both are required")
         if isinstance(self.labels, str) or len(self.labels) != (len(self.labels) and m) or (m != 1 and not self.labels):
             raise InputError(
-                f"{owner}: its value has {m} rows, labels has {len(self.labels)}: give one label for each row"
+                f"{owner}: value has {m} rows and labels has {len(self.labels)}; give one label per row"
                 + (", or none" if m == 1 else "")
             )
 
@@ -157,8 +182,7 @@ class Constraint:
         return self.value, column(self.lower, -math.inf), column(self.upper, math.inf)
 
 
-def _rows_of(owner: str, field: str, value: object) -> int:
-    """Number of rows of a column of symbols."""
+def _count_rows(owner: str, field: str, value: object) -> int:
     if not isinstance(value, MX):
         remedy = f"; write MX({value})" if isinstance(value, (int, float)) else ""
         raise InputError(f"{owner}: {field} must be a CasADi MX, got {type(value).__name__} {_short(value)}{remedy}")
@@ -187,7 +211,6 @@ class Assembly:
     indexes: Mapping[str, MX]
 
     def __post_init__(self) -> None:
-        """Refuse an objective or index that is no scalar, and what is no constraint."""
         for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):
             if not isinstance(value, MX) or value.shape != (1, 1):
                 got = f"shape {value.shape}" if isinstance(value, MX) else f"{type(value).__name__} {_short(value)}"
@@ -199,7 +222,7 @@ class Assembly:
                 )
 
     def group(self, name: str) -> Constraint:
-        """Rows of a name; raises KeyError."""
+        """Return the constraint of a name; raises KeyError."""
         for constraint in self.constraints:
             if constraint.name == name:
                 return constraint
@@ -224,19 +247,19 @@ class PointOf(Generic[Expression]):
     def of(
         cls, x: Expression, p: Expression, variables: Sequence[str], parameters: Sequence[str]
     ) -> PointOf[Expression]:
-        """Point whose entries have these names, in this order."""
+        """Return a point whose entries have these names, in this order."""
         positions: dict[str, tuple[Literal["x", "p"], int]] = {name: ("p", i) for i, name in enumerate(parameters)}
         return cls(x=x, p=p, positions=positions | {name: ("x", i) for i, name in enumerate(variables)})
 
     def __getitem__(self, name: str) -> Expression:
-        """Value of a variable or a parameter; raises UnknownNameError."""
+        """Return the value of a variable or a parameter; raises UnknownNameError."""
         if name not in self.positions:
             raise unknown("variable or parameter", name, tuple(self.positions))
         kind, index = self.positions[name]
         return self.x[index] if kind == "x" else self.p[index]
 
-    def only(self, variables: Sequence[str]) -> PointOf[Expression]:
-        """The point with these variables alone in x, in this order; a name that was a parameter may be among them."""
+    def select(self, variables: Sequence[str]) -> PointOf[Expression]:
+        """Return the point with only these variables in x, in this order; parameters may become variables."""
         own = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
         if tuple(variables) == own:
             return self
@@ -244,14 +267,14 @@ class PointOf(Generic[Expression]):
         taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}
         return PointOf(x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions=parameters | taken)
 
-    def extended(self, name: str, value: Expression) -> PointOf[Expression]:
-        """The point with one more variable, the last one."""
+    def extend(self, name: str, value: Expression) -> PointOf[Expression]:
+        """Return the point with one more variable at the end."""
         return PointOf(
             x=ca.vertcat(self.x, value), p=self.p, positions={**self.positions, name: ("x", int(self.x.shape[0]))}
         )
 
 
-# What a problem is assembled from; one instant of a motion, which is mapped over the samples; numbers.
+# Input of an assembly; one instant of a motion, mapped over the samples; numbers.
 Point: TypeAlias = PointOf[MX]
 InstantPoint: TypeAlias = PointOf[SX]
 NumericPoint: TypeAlias = PointOf[Any]

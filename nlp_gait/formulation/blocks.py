@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.formulation.assembly import Point, Variable
-from nlp_gait.formulation.motion.signals import Array
+from nlp_gait.formulation.signals import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What a problem of one's own must keep, found out as it is made rather than in the first solve."""
+"""Validation of user-defined problems when they are made, rather than in the first solve."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 
 
 def check_mathematics(problem: GaitProblem) -> None:
-    """Assemble a problem once, and refuse what no backend could use.
+    """Assemble a problem once and check that backends can use it.
 
     Raises:
-        InputError: no assembly, a row twice, symbols that are neither variables nor parameters, a bound of a row that depends
-            on the variables, or a start point of another length.
+        InputError: no assembly, duplicated rows, symbols that are neither variables nor parameters, a bound of a row that
+            depends on variables, or a start point of the wrong length.
     """
     owner = f"problem {problem.name!r}"
     if not NAME.fullmatch(problem.name):  # files are named after it
-        raise InputError(f"{owner}: a name has 1 to 64 letters, digits and . _ + -, and begins with a letter or digit")
+        raise InputError(f"{owner}: a name has 1 to 64 letters, digits and . _ + -, and starts with a letter or digit")
     if not problem.variables:
         raise InputError(f"{owner} has no variables")
     point = problem.symbols()
@@ -33,9 +33,9 @@ def check_mathematics(problem: GaitProblem) -> None:
     if not isinstance(assembly, Assembly):
         raise InputError(f"{owner}: assemble must return an Assembly, it returned {type(assembly).__name__}")
     counts = Counter(name for constraint in assembly.constraints for name in constraint.row_names)
-    twice = [name for name, count in counts.items() if count > 1]
-    if twice:
-        raise InputError(f"{owner}: these rows stand twice: {', '.join(twice[:5])}")
+    duplicates = [name for name, count in counts.items() if count > 1]
+    if duplicates:
+        raise InputError(f"{owner}: duplicated rows: {', '.join(duplicates[:5])}")
     inputs = {point.x.name(): point.x, point.p.name(): point.p}
     parts = {"objective": assembly.objective, **{f"index {name!r}": value for name, value in assembly.indexes.items()}}
     for constraint in assembly.constraints:
@@ -49,15 +49,15 @@ def check_mathematics(problem: GaitProblem) -> None:
             function = Function("bound", list(inputs.values()), [bound], {"allow_free": True})
             if function.sparsity_jac(0, 0).nnz():
                 raise InputError(
-                    f"{owner}: {row}: {end} must depend on parameters only; move what depends on variables into value"
+                    f"{owner}: {row}: {end} must depend on parameters only; move terms with variables into value"
                 )
     for part, value in parts.items():
         free = Function("part", list(inputs.values()), [vertcat(value)], {"allow_free": True}).free_mx()
         if free:
             raise InputError(
-                f"{owner}: {part} holds {free[0].name()!r}, which is neither a variable nor a parameter of it"
+                f"{owner}: {part} contains {free[0].name()!r}, which is neither a variable nor a parameter"
             )
     if problem.hints.start is not None:
         start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))
         if start.shape != (len(problem.names),):
-            raise InputError(f"{owner}: start must give {len(problem.names)} values, it gave shape {start.shape}")
+            raise InputError(f"{owner}: start must return {len(problem.names)} values, it returned shape {start.shape}")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from nlp_gait.formulation.assembly import NumericPoint
-from nlp_gait.formulation.motion.signals import Columns, Signals, vector_columns
-from nlp_gait.formulation.motion.skeleton import Skeleton
+from nlp_gait.formulation.signals import Columns, Signals, vector_columns
+from nlp_gait.formulation.stick_figure import Skeleton
 
 # A ``nlp_gait.robots.Robot``. This package only passes it on, so it does not import it.
 RobotModel: TypeAlias = Any

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, Concatenate, Literal, NamedTuple, ParamSpec, TypeVar
@@ -18,23 +18,31 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError, format_value, unknown
-from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, RowsOverTime, Variable
+from nlp_gait.formulation.assembly import (
+    Assembly,
+    Grid,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    RowsOverTime,
+    Variable,
+)
 from nlp_gait.formulation.display import Display
-from nlp_gait.formulation.locking import CASADI_LOCK, lock_casadi
-from nlp_gait.formulation.motion.grid import Grid
-from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.formulation.locking import Cache, lock_casadi
 from nlp_gait.formulation.numbers import is_number, to_floats
 from nlp_gait.formulation.power_form import PowerForm
+from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 P = ParamSpec("P")
 T = TypeVar("T")
-LARGEST = 1e100  # of a parameter; the square of a larger one is no number any more
+LARGEST = 1e100  # of a parameter: squares of larger ones overflow
 # Changes what a problem assembles.
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
 # Start point (n,) from the parameters by name.
 Start = Callable[[Mapping[str, float], np.random.Generator], Array]
-# A point lies on a bound that it misses by this share of the variable's default range.
+# A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
 
 
@@ -43,22 +51,6 @@ class Origin(NamedTuple):
 
     make: Callable[..., GaitProblem]
     options: Mapping[str, Any]
-
-
-class Cache:
-    """Values that were built from a problem's mathematics, each by one thread."""
-
-    def __init__(self) -> None:
-        self._values: dict[Hashable, Any] = {}
-
-    def get(self, key: Hashable, build: Callable[[], T]) -> T:
-        """Return the value of a key, built on the first call."""
-        if key not in self._values:
-            with CASADI_LOCK:
-                if key not in self._values:  # another thread may have built it meanwhile
-                    self._values[key] = build()
-        found: T = self._values[key]
-        return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,11 +119,10 @@ class GaitProblem:
     _origin: Origin | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse names that stand twice."""
         counts = Counter([*self.names, *(parameter.name for parameter in self.parameters)])
-        twice = [name for name, count in counts.items() if count > 1]
-        if twice:
-            raise InputError(f"problem {self.name!r}: these variables or parameters stand twice: {', '.join(twice)}")
+        duplicates = [name for name, count in counts.items() if count > 1]
+        if duplicates:
+            raise InputError(f"problem {self.name!r}: variables or parameters are duplicated: {', '.join(duplicates)}")
 
     @property
     def searchable(self) -> bool:
@@ -140,7 +131,7 @@ class GaitProblem:
 
     @property
     def address(self) -> str:
-        """What ``load`` takes, and files of results name."""
+        """Argument of ``load``, written into files of results."""
         return self.loaded_as or self.name
 
     @property
@@ -171,19 +162,19 @@ class GaitProblem:
 
     @cached_property
     def scale(self) -> Array:
-        """(n,) width of each variable's default range: its unit of length for solvers."""
+        """(n,) width of each variable's default range, with which solvers scale it."""
         return _frozen([v.upper - v.lower for v in self.variables])
 
     def value(self, name: str) -> float:
-        """Current value of a parameter."""
+        """Return the current value of a parameter."""
         return self.parameter_values[self._parameter(name).name]
 
     def with_values(self, /, **values: float) -> GaitProblem:
-        """The same problem with other parameter values; nothing is rebuilt. Names with a dot go in as ``**{...}``.
+        """Return the same problem with other parameter values; nothing is rebuilt. Pass names with a dot as ``**{...}``.
 
         Raises:
             UnknownNameError: no such parameter.
-            InputError: not finite, outside what the parameter allows, or bounds inverted.
+            InputError: not finite, outside the parameter's limits, or bounds inverted.
         """
         for name, value in values.items():
             parameter = self._parameter(name)
@@ -205,7 +196,7 @@ class GaitProblem:
         return changed
 
     def fix(self, /, **values: float) -> GaitProblem:
-        """The same problem with some variables held at a value, which must lie within their bounds."""
+        """Return the same problem with some variables fixed at a value within their bounds."""
         bounds: dict[str, float] = {}
         for name, value in values.items():
             i = self.variable_index(name)
@@ -219,7 +210,7 @@ class GaitProblem:
         return self.with_values(**bounds)
 
     def dense(self, factor: int) -> GaitProblem | None:
-        """The same problem and parameter values on a grid with ``factor`` times as many intervals."""
+        """Return the same problem with ``factor`` times as many intervals; None if it cannot be refined."""
         refine = self.refine
         if refine is None:
             return None
@@ -235,23 +226,23 @@ class GaitProblem:
         parameters: Sequence[Parameter] = (),
         change: Change | None = None,
     ) -> GaitProblem:
-        """A problem with other mathematics; time histories, start points and denser grids follow along.
+        """Return a problem with other mathematics; time histories, start points and denser grids are adapted.
 
         Args:
-            name: of the new problem, if it gets one.
+            name: of the new problem; empty to keep it.
             title: likewise.
-            objective: name, unit and sense, where ``change`` replaces the objective.
-            variables: in addition, after those that are there.
-            parameters: in addition.
+            objective: name, unit and sense, if ``change`` replaces the objective.
+            variables: additional ones, after the present ones.
+            parameters: additional ones.
             change: makes the new assembly from this problem's, the point of all variables and parameters, and the
                 interpretation of non-smooth operations.
 
         Raises:
-            InputError: a name that is there already.
+            InputError: a name exists already.
         """
 
         def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-            assembly = self.assemble(point.only(self.names), ops)
+            assembly = self.assemble(point.select(self.names), ops)
             return assembly if change is None else change(assembly, point, ops)
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -264,7 +255,7 @@ class GaitProblem:
 
         def refine(factor: int) -> GaitProblem:
             finer = self.dense(factor)
-            assert finer is not None  # only where there is one; for the type checker
+            assert finer is not None  # for the type checker
             return finer.derive(
                 name=name, title=title, objective=objective, variables=variables, parameters=parameters, change=change
             )
@@ -281,14 +272,14 @@ class GaitProblem:
             refine=None if self.refine is None else refine,
             rows_over_time=self.rows_over_time if change is None and not variables else (),
             power_form=self.power_form if change is None and not variables else None,
-            display=replace(self.display, motion=None if motion is None else lambda at: motion(at.only(self.names))),
+            display=replace(self.display, motion=None if motion is None else lambda at: motion(at.select(self.names))),
             hints=replace(self.hints, start=start if self.hints.start is not None or variables else None),
             loaded_as="" if name else self.loaded_as,
         )
 
     @lock_casadi
     def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
-        """Time histories at x (n,) and the current parameter values.
+        """Return time histories at x (n,) and the current parameter values.
 
         Raises:
             InputError: x has the wrong length or is not finite, or the problem has no time histories.
@@ -299,7 +290,7 @@ class GaitProblem:
 
     @lock_casadi
     def at(self, x: Sequence[float] | Array | Mapping[str, float]) -> NumericPoint:
-        """The point x (n,) with the current parameter values, in numbers."""
+        """Return the point x (n,) with the current parameter values, in numbers."""
         return NumericPoint.of(DM(self.check_x(x)), DM(self.p), self.names, [q.name for q in self.parameters])
 
     @cached_property
@@ -309,19 +300,19 @@ class GaitProblem:
 
     @lock_casadi
     def start_point(self, rng: np.random.Generator) -> Array:
-        """(n,) start point for a gradient method, within the bounds."""
+        """Return a start point (n,) for a gradient method, within the bounds."""
         if self.hints.start is not None:
             return np.clip(self.hints.start(self.parameter_values, rng), self.lower, self.upper)
         return rng.uniform(self.lower, self.upper)
 
     def variable_index(self, name: str) -> int:
-        """Position of a variable in x; raises UnknownNameError."""
+        """Return the position of a variable in x; raises UnknownNameError."""
         if not isinstance(name, str) or name not in self.names:
             raise unknown(f"variable of {self.name}", name, self.names)
         return self.names.index(name)
 
     def check_x(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
-        """(n,) floats from values in order or by name; InputError if one lacks, is too many, or is not finite."""
+        """Return floats (n,) from values in order or by name; InputError if one is missing, unknown or not finite."""
         if isinstance(x, Mapping):
             missing = [name for name in self.names if name not in x]
             if missing or len(x) > len(self.names):
@@ -342,45 +333,43 @@ class GaitProblem:
         return array
 
     def check_within(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
-        """(n,) values of ``check_x``, put onto the bounds that they miss by rounding, and at which a variable is fixed.
+        """Return ``check_x`` clipped to the bounds that it misses by rounding, and to the value of fixed variables.
 
         Raises:
             InputError: as ``check_x``, or a value outside the bounds.
         """
         array = self.check_x(x)
-        beyond = np.maximum(self.lower - array, array - self.upper)
-        outside = np.flatnonzero((beyond > ROUNDING * self.scale) & (self.lower < self.upper))
+        violation = np.maximum(self.lower - array, array - self.upper)
+        outside = np.flatnonzero((violation > ROUNDING * self.scale) & (self.lower < self.upper))
         if outside.size:
             i = outside[0]
             raise InputError(
                 f"x0 of {self.name}: {self.names[i]} is {array[i]:g}, outside its bounds [{self.lower[i]:g}, "
-                f"{self.upper[i]:g}] {self.variables[i].unit}; begin within them, or widen them"
+                f"{self.upper[i]:g}] {self.variables[i].unit}; start within them, or widen them"
             )
         return np.clip(array, self.lower, self.upper)
 
     def by_name(self, x: Array) -> dict[str, float]:
-        """Values of x by variable name."""
+        """Return values of x by variable name."""
         return dict(zip(self.names, (float(v) for v in x), strict=True))
 
     @lock_casadi
     def symbols(self) -> Point:
-        """Fresh symbols for x and p."""
+        """Return new symbols for x and p."""
         parameters = [q.name for q in self.parameters]
         return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
 
     def with_origin(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
-        """The same problem, which ``make`` with these options makes again elsewhere: it can be pickled if ``make`` can."""
+        """Return the same problem, pickled as ``make`` with these options."""
         made = replace(self)
         object.__setattr__(made, "_cache", self._cache)
         object.__setattr__(made, "_origin", Origin(make, dict(options)))
         return made
 
-    def __copy__(self) -> GaitProblem:
-        """Itself: nothing of it can be changed."""
+    def __copy__(self) -> GaitProblem:  # it cannot be changed
         return self
 
     def __deepcopy__(self, memo: object) -> GaitProblem:
-        """Itself: nothing of it can be changed."""
         return self
 
     def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
@@ -410,8 +399,8 @@ class GaitProblem:
                     return parameter
             if name in self.options:
                 raise UnknownNameError(
-                    f"{name!r} is an option of {self.name}, no parameter: another value makes another problem; "
-                    f"build it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                    f"{name!r} is an option of {self.name}, not a parameter: another value is another problem; "
+                    f"load it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
                 )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
@@ -442,7 +431,6 @@ def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any]
 
 
 def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Random values of variables within their bounds."""
     return rng.uniform(*(np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
 
 

@@ -1,4 +1,4 @@
-"""What counts as a number where users give them."""
+"""Numbers that users pass, validated."""
 
 from __future__ import annotations
 
@@ -10,31 +10,30 @@ from typing import TypeGuard
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation.motion.signals import Array
+from nlp_gait.formulation.signals import Array
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a finite real number, NumPy's included; True and False are not."""
+    """Return whether a value is a finite real number, NumPy's included; True and False are not."""
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:  # a whole number beyond every float
+    except OverflowError:  # an integer larger than every float
         return False
 
 
 def to_floats(what: str, values: object) -> Array:
-    """Values of any shape as doubles, copied only if they are not that already; they need not be finite.
+    """Return values of any shape as doubles, copied only if necessary; they need not be finite.
 
     Args:
-        what: what they are, for messages.
-        values: an array, or what becomes one.
+        what: subject of messages.
+        values: array-like.
 
     Raises:
-        InputError: complex numbers, masked ones, texts, dates, true or false: NumPy would make doubles of them in silence.
+        InputError: complex or masked numbers, texts, dates, true or false, which NumPy would convert silently.
     """
-    if "numpy.ma" in sys.modules and np.ma.is_masked(
-        values
-    ):  # imported here it would cost every process a tenth of its start
-        raise InputError(f"{what} must be numbers, got a masked array; fill what is masked, or leave it out")
+    # Importing numpy.ma here would cost every process a tenth of its start.
+    if "numpy.ma" in sys.modules and np.ma.is_masked(values):
+        raise InputError(f"{what} must be numbers, got a masked array; fill or remove masked values")
     try:
         array = np.asarray(values)
         if array.dtype.kind == "O" and all(isinstance(v, Real) and not isinstance(v, bool) for v in array.flat):
@@ -46,6 +45,6 @@ def to_floats(what: str, values: object) -> Array:
         raise InputError(f"{what} must be numbers, got {type(values).__name__}: {error}") from error
     if array.dtype.kind not in "iuf":
         raise InputError(
-            f"{what} must be numbers, got {type(values).__name__} of {array.dtype}: give real ones, no texts, true or false"
+            f"{what} must be numbers, got {type(values).__name__} of {array.dtype}: use real numbers, not texts, true or false"
         )
     return array.astype(np.float64, copy=False)

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nlp_gait.formulation.motion.signals import Array
+from nlp_gait.formulation.signals import Array
 
 Integers = np.ndarray[Any, np.dtype[np.int32]]
 

@@ -1,33 +1,38 @@
-"""A gait that was found, read back from a file: what `solve --out` writes, a study's record, or a few lines by hand."""
+"""Results: a point of a problem, read from the file of `solve --out`, a study's record or a few lines by hand; its signals."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import read_json
 from nlp_gait.formulation.gait_problem import GaitProblem
-from nlp_gait.formulation.motion.signals import Array
 from nlp_gait.formulation.registry import load
+from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.user_code import resolve_code
 
 SCHEMA = 1  # of a result, and the default
+SHORTEST_S, LONGEST_S = 0.001, 60.0  # of a gait; a step takes a second
+FINE_INTERVALS = 1000  # of a grid that splines are fitted to: their error is below 1e-9 rad
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredProblem:
-    """A problem as a study's record holds it.
+    """A problem in a study's record.
 
     Attributes:
-        name: that ``load`` takes.
+        name: argument of ``load``.
         options: of its maker.
         parameters: that differ from the defaults.
         sha256: hash of the mathematics and the parameters.
-        source_sha256: hash of the source of a problem of one's own.
+        source_sha256: hash of the source of a user-defined problem.
     """
 
     name: str
@@ -39,7 +44,7 @@ class StoredProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class _RecordFile:
-    """What is read of a study's record."""
+    """Keys of a study's record that are read here."""
 
     schema: Literal[3]
     definition: Mapping[str, Any]
@@ -48,7 +53,7 @@ class _RecordFile:
 
 @dataclass(frozen=True, kw_only=True)
 class _ResultFile:
-    """What is read of a result; more is not needed in one that is written by hand."""
+    """Keys of a result that are read; only two are required."""
 
     schema: Literal[1] = 1
     problem: str
@@ -72,14 +77,14 @@ class Result:
 
 
 def load_result(path: Path) -> Result:
-    """Result from a JSON object with ``problem``, ``x`` by variable name and, if not the defaults, ``options``, ``parameters``.
+    """Return the result in a JSON object with ``problem``, ``x`` by variable name and optional ``options``, ``parameters``.
 
     Raises:
-        InputError: the file cannot be read, is damaged, or holds values that the problem does not allow.
+        InputError: the file cannot be read, is damaged, or contains values that the problem does not allow.
     """
     raw = read_json(path, "result")
     try:
-        return _of_record(raw) if isinstance(raw, dict) and "definition" in raw else _of_result(raw)
+        return _from_record(raw) if isinstance(raw, dict) and "definition" in raw else _from_result(raw)
     except ValueError as error:
         raise InputError(
             f"result {str(path)!r}: {error}; `nlp-gait solve ... --out FILE` writes a valid one"
@@ -88,22 +93,57 @@ def load_result(path: Path) -> Result:
         raise InputError(f"result {str(path)!r}: {error}") from error
 
 
-def _of_record(raw: Mapping[str, Any]) -> Result:
+def _from_record(raw: Mapping[str, Any]) -> Result:
     record = decode(_RecordFile, raw, ignore_unknown=True)
     problem = decode(StoredProblem, record.definition.get("problem"), "definition.problem")
-    return _result(problem.name, problem.options, problem.parameters, record.x)
+    return _make_result(problem.name, problem.options, problem.parameters, record.x)
 
 
-def _of_result(raw: Any) -> Result:
+def _from_result(raw: Any) -> Result:
     file = decode(_ResultFile, raw, ignore_unknown=True)
-    result = _result(file.problem, file.options, file.parameters, file.x)
+    result = _make_result(file.problem, file.options, file.parameters, file.x)
     if file.robot not in (None, result.problem.options.get("robot")):
         raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
     return result
 
 
-def _result(
+def _make_result(
     name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
 ) -> Result:
     problem = load(resolve_code(name, "problem", "it"), **options).with_values(**parameters)
     return Result(problem=problem, x=problem.check_x(x))
+
+
+def sample_signals(result: Result, period_s: float) -> Signals:
+    """Return signals on the problem's grid, refined until neighbouring samples are at most a period apart.
+
+    Raises:
+        InputError: the problem has no signals, the period is not positive, or time runs backwards or lasts too long: x may be
+            far outside its bounds.
+    """
+    if not period_s > 0.0:  # NaN fails too
+        raise InputError(f"the time between samples must be > 0 s, got {period_s!r}")
+    signals = result.problem.signals(result.x)
+    times = signals.arrays["t"]
+    _check_times(times)
+    longest = float((times[1:] - times[:-1]).max())
+    factor = math.ceil(longest / period_s - 1e-9)  # rounding must not halve a step that equals the period
+    dense = result.problem.dense(factor) if factor > 1 else None
+    return signals if dense is None else dense.signals(result.x)
+
+
+def sample_finely(result: Result) -> Signals:
+    """Return signals with at least ``FINE_INTERVALS`` intervals if the problem can be refined; raises as ``sample_signals``."""
+    signals = sample_signals(result, math.inf)
+    return sample_signals(result, float(signals.arrays["t"][-1]) / FINE_INTERVALS)
+
+
+def _check_times(times: Array) -> None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        duration_s = float(times[-1] - times[0])
+        forward = bool((times[1:] >= times[:-1]).all())  # NaN fails too
+    if not (forward and SHORTEST_S <= duration_s <= LONGEST_S):
+        reason = f"it lasts {duration_s:g} s" if forward or duration_s < 0.0 else "time runs backwards in one phase"
+        raise InputError(
+            f"a gait that is drawn, simulated or exported must last {SHORTEST_S:g} to {LONGEST_S:g} s, but {reason}"
+        )

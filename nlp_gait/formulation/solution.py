@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.notebook import format_html_table
 from nlp_gait.providers import FUNCTIONS, import_object
 

@@ -82,11 +82,11 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
     motion, start = problem.display.motion, problem.hints.start
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return problem.assemble(point.only(names), ops)
+        return problem.assemble(point.select(names), ops)
 
     def signals(at: NumericPoint) -> Signals:
         assert motion is not None  # for the type checker
-        return motion(at.only(names))
+        return motion(at.select(names))
 
     def start_point(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         assert start is not None

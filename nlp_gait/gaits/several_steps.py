@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.mirror import mirror_sign, partners
 

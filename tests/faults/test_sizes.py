@@ -15,8 +15,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.registry import LARGEST_COUNT
-from nlp_gait.formulation.result import load_result
-from nlp_gait.formulation.sampling import LONGEST_S, SHORTEST_S, sample_signals
+from nlp_gait.formulation.result import LONGEST_S, SHORTEST_S, load_result, sample_signals
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
@@ -48,10 +47,10 @@ def test_a_gait_without_a_duration_is_not_drawn_played_or_exported(duration_s: f
     path.write_text(json.dumps({"problem": "nao-ssp", "x": x}))
     result = load_result(path)
     expected = re.escape(f"but it lasts {duration_s:g} s")
-    with pytest.raises(InputError, match=rf"for {SHORTEST_S:g} to {LONGEST_S:g} s .* {expected}"):
+    with pytest.raises(InputError, match=rf"must last {SHORTEST_S:g} to {LONGEST_S:g} s, {expected}"):
         sample_signals(result, 0.02)
     for format_, ending in FORMATS.items():
-        with pytest.raises(InputError, match="time must run forward"):
+        with pytest.raises(InputError, match="must last 0.001 to 60 s"):
             write_as(format_, tmp_path / f"gait{ending}", result, 40)
     assert [file.name for file in tmp_path.iterdir()] == ["result.json"]
 

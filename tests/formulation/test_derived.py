@@ -160,7 +160,7 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
     ids=["a parameter", "two alike", "a bound", "a variable's name", "a variable", "a parameter's name"],
 )
 def test_names_that_stand_twice_are_refused(more: dict[str, Any], twice: str) -> None:
-    with pytest.raises(InputError, match=f"problem 'toy': these variables or parameters stand twice: {twice}$"):
+    with pytest.raises(InputError, match=f"problem 'toy': variables or parameters are duplicated: {twice}$"):
         toy(corner).derive(**more)
 
 

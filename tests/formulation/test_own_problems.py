@@ -123,13 +123,13 @@ def test_what_is_wrong_with_the_file_is_said(text: str, message: str, tmp_path: 
         ({"lower": 0.0}, "'knee': lower must be a CasADi MX, got float 0.0; write MX\\(0.0\\)"),
         ({"upper": "1"}, "'knee': upper must be a CasADi MX, got str '1'"),
         ({"value": None}, "'knee': value must be a CasADi MX, got NoneType"),
-        ({"value": THREE}, "'knee': its value has 3 rows, labels has 0: give one label for each row"),
-        ({"value": THREE, "labels": ("a", "b")}, "'knee': its value has 3 rows, labels has 2"),
+        ({"value": THREE}, "'knee': value has 3 rows and labels has 0; give one label per row"),
+        ({"value": THREE, "labels": ("a", "b")}, "'knee': value has 3 rows and labels has 2"),
         ({"value": THREE.T}, "'knee': value must be a column, got shape \\(1, 3\\)"),
         ({"lower": THREE}, "'knee': lower must have one row or as many as value, 1, got 3"),
         ({"scale": 0.0}, "'knee': scale must be > 0"),
         ({"scale": "big"}, "'knee': scale must be a finite number, got 'big'"),
-        ({"lower": None}, "'knee': it needs lower, upper or both"),
+        ({"lower": None}, "'knee': lower, upper or both are required"),
     ],
 )
 def test_a_row_is_refused_by_its_name(change: dict[str, Any], message: str) -> None:
@@ -150,7 +150,7 @@ def test_objectives_variables_and_parameters_are_refused_by_theirs() -> None:
     with pytest.raises(InputError, match="parameter 'mass': default must be a finite number, got None"):
         Parameter(name="mass", unit="kg", default=None, description="")  # type: ignore[arg-type]
     x = Variable(name="x", unit="m", lower=0.0, upper=1.0, description="")
-    with pytest.raises(InputError, match="stand twice: x"):
+    with pytest.raises(InputError, match="duplicated: x"):
         GaitProblem(**{**vars_of(toy(corner)), "variables": (x, x)})
 
 
@@ -162,9 +162,9 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
     ("mathematics", "message"),
     [
         (lambda x, y, p, ops: (x, (row(x, lower=y),)), "constraint 'knee': lower must depend on parameters only"),
-        (lambda x, y, p, ops: (x, (row(x), row(y))), "these rows stand twice: knee"),
-        (lambda x, y, p, ops: (x + MX.sym("mass"), ()), "objective holds 'mass', which is neither a variable nor"),
-        (lambda x, y, p, ops: (x, (row(MX.sym("q") * x),)), "constraint 'knee' holds 'q'"),
+        (lambda x, y, p, ops: (x, (row(x), row(y))), "duplicated rows: knee"),
+        (lambda x, y, p, ops: (x + MX.sym("mass"), ()), "objective contains 'mass', which is neither a variable nor"),
+        (lambda x, y, p, ops: (x, (row(MX.sym("q") * x),)), "constraint 'knee' contains 'q'"),
         (lambda x, y, p, ops: (ca.vertcat(x, y), ()), "must be a scalar"),
     ],
 )

@@ -112,7 +112,7 @@ class WalkingCycle:
         """Return the point with the step length as a variable, also if it follows from the speed."""
         if not self.at_given_speed:
             return at
-        return at.extended(STEP, at[SPEED] * (at[TIMES["ssp"]] + at[TIMES["dsp"]]))
+        return at.extend(STEP, at[SPEED] * (at[TIMES["ssp"]] + at[TIMES["dsp"]]))
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return objective, rows and indexes.

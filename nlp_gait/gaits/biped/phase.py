@@ -319,7 +319,7 @@ class Phase:
         last: Any = phases
         if phases is None:
             function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
-        points = [ca.repmat(at.only(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n)]
+        points = [ca.repmat(at.select(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n)]
         return list(function.map(n).call([*columns, *points, last]))
 
     def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import (
+from nlp_gait.formulation.stick_figure import (
     LEFT,
     RIGHT,
     TRUNK,

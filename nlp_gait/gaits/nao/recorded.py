@@ -9,7 +9,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.formulation.motion.signals import JointAngles
+from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles, RecordedGait, make_refinable, recorded_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, places

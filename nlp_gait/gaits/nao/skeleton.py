@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
+from nlp_gait.formulation.stick_figure import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped.skeleton import level_sole
 from nlp_gait.gaits.biped.skeleton import skeleton as any_skeleton
 from nlp_gait.robots import Robot

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.motion.skeleton import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
+from nlp_gait.formulation.stick_figure import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.gaits.walk12.robot import PointMassBiped
 
 

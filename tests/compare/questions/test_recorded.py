@@ -13,7 +13,7 @@ from nlp_gait import load
 from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
 from nlp_gait.formulation import Result
-from nlp_gait.formulation.motion.signals import JointAngles
+from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence

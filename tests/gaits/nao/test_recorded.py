@@ -14,7 +14,7 @@ from nlp_gait.errors import GaitError
 from nlp_gait.export.formats import write_as
 from nlp_gait.export.motions import read_gait
 from nlp_gait.formulation import Result
-from nlp_gait.formulation.motion.signals import JointAngles
+from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.joints import JOINTS

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlp_gait.formulation.motion.signals import Array, Signals
+from nlp_gait.formulation.signals import Array, Signals
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 

@@ -1,1 +1,0 @@
-"""Time histories of a motion on a grid, and stick figures."""
