@@ -30,14 +30,14 @@ def certainty(
     seed: Seed = 0,
     problem: AnyProblem,
     check: Annotated[
-        Path | None, typer.Option(help="Certificate to check instead: random parts of its proof are made again.")
+        Path | None, typer.Option(help="Certificate to check instead: random paths of its proof are repeated.")
     ] = None,
-    paths: Annotated[int, typer.Option(min=1, max=100_000, help="Parts of a proof to check.")] = 200,
+    paths: Annotated[int, typer.Option(min=1, max=100_000, help="Paths of a proof to check.")] = 200,
     code: Code = None,
     out: Annotated[Path, typer.Option(help="Folder; finished results are stored in it.")] = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
-    """Evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
+    """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
 
     Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000 --evaluations 0`,
     `nlp-gait certainty --check certainty/walk12-certificate.json`
@@ -48,14 +48,13 @@ def certainty(
         name_all(code)
         _check(check, paths, seed, as_json)
         return
-    from compare.questions.certainty.report import certainty_answer
-    from compare.questions.certainty.study import certainty as study_certainty
+    from compare.questions.certainty import certainty_answer, gather_evidence
     from compare.study.store import Store
 
     output = Output(out=out, as_json=as_json)
     loaded = problem.spec().load()
     with interruptible(out), progress_bar("starts, search, proof", None) as advance:
-        study = study_certainty(
+        evidence = gather_evidence(
             loaded,
             Store(out, say),
             starts=starts,
@@ -65,7 +64,7 @@ def certainty(
             seed=seed,
             progress=advance,
         )
-    output.take(certainty_answer(study))
+    output.take(certainty_answer(evidence))
 
 
 def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
@@ -79,8 +78,8 @@ def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:
         return
     stdout.print(
         f"{file.problem['name']}: bound {proof.bound:.8g}, incumbent {proof.objective:.8g}; {found.paths} random paths of up to "
-        f"{found.deepest} halvings end, {found.pieces:,} pieces on them are proven to hold nothing better; they make "
-        f"{found.boxes:,.0f} boxes likely, and the certificate names {proof.boxes:,}"
-        + ("" if found.same_code else "; it was made by other code than this"),
+        f"{found.deepest} halvings end, {found.pieces:,} boxes dropped on them are proven to contain nothing better; they "
+        f"suggest {found.boxes:,.0f} boxes in total, the certificate has {proof.boxes:,}"
+        + ("" if found.same_code else "; it was made by another version of the code"),
         soft_wrap=True,
     )

@@ -9,10 +9,8 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from compare.questions.certainty.clusters import LocalOptimum, cluster, unseen
-from compare.questions.certainty.multistart import Ends, multistart
-from compare.questions.certainty.report import certainty_answer
-from compare.questions.certainty.study import certainty
+from compare.questions.certainty import certainty_answer, gather_evidence
+from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_starts
 from compare.study.store import Store
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
@@ -57,17 +55,17 @@ def test_an_infeasible_incumbent_is_refused() -> None:
         certify(toy(two_valleys, limit=2.0), np.array([0.0, 0.0]))
 
 
-def ends(x: list[float], objective: list[float], success: list[bool]) -> Ends:
+def ends(x: list[float], objective: list[float], feasible: list[bool]) -> Ends:
     return Ends(
         x=np.array([[value, 0.0] for value in x]),
         objective=np.array(objective),
-        success=np.array(success),
+        feasible=np.array(feasible),
         status=("converged",) * len(x),
     )
 
 
 def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_none() -> None:
-    found = cluster(
+    found = cluster_ends(
         toy(two_valleys), ends([1.0, -1.0, 1.001, 0.5], [2.0, 2.0, 2.00001, 1.0], [True, True, True, False])
     )
     assert [optimum.count for optimum in found] == [2, 1]
@@ -77,38 +75,38 @@ def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_non
 
 def test_estimates_by_hand() -> None:
     counts = (6, 3, 1)
-    estimate = unseen([LocalOptimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
+    estimate = estimate_unseen([LocalOptimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
     assert estimate.good_turing == pytest.approx(0.1)
     assert estimate.expected_optima == pytest.approx(3 * 9 / 5)
     assert estimate.expected_covered == pytest.approx(6 * 13 / 90)
     assert (1 - estimate.largest_missed) ** 10 == pytest.approx(0.05)
-    assert unseen([LocalOptimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
+    assert estimate_unseen([LocalOptimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
 
 
-def test_an_interrupted_multistart_goes_on_and_ends_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.questions.certainty.multistart.BATCH", 4)
+def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compare.questions.local_optima.BATCH", 4)
     problem = toy(two_valleys)
-    whole = multistart(problem, Store(tmp_path / "whole"), starts=8)
+    whole = run_starts(problem, Store(tmp_path / "whole"), starts=8)
 
     def interrupt(note: str) -> None:
         if note == "4 starts":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        multistart(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
+        run_starts(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
     notes: list[str] = []
-    resumed = multistart(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
+    resumed = run_starts(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
     assert "starts-0: stored by an earlier run" in notes
     np.testing.assert_array_equal(whole.x, resumed.x)
 
 
-def test_a_study_says_what_is_proven_and_what_is_supported(tmp_path: Path) -> None:
+def test_evidence_is_proven_or_supported(tmp_path: Path) -> None:
     problem = toy(two_valleys, limit=-9.0)
-    study = certainty(problem, Store(tmp_path), starts=12, evaluations=2000, time_limit_s=20.0)
-    assert len(study.optima) == 2
-    assert study.optima[0].x[0] < 0.0 < study.optima[1].x[0]
-    assert study.certificate is not None and study.certificate.closed
-    assert "no feasible x falls below" in study.proven
-    assert study.search is not None and study.search.gap == pytest.approx(0.0, abs=1e-6)
-    assert all(path.stat().st_size > 0 for path in certainty_answer(study).write(tmp_path))
-    study.to_json()
+    evidence = gather_evidence(problem, Store(tmp_path), starts=12, evaluations=2000, time_limit_s=20.0)
+    assert len(evidence.optima) == 2
+    assert evidence.optima[0].x[0] < 0.0 < evidence.optima[1].x[0]
+    assert evidence.certificate is not None and evidence.certificate.closed
+    assert "no feasible x falls below" in evidence.proven
+    assert evidence.search is not None and evidence.search.gap == pytest.approx(0.0, abs=1e-6)
+    assert all(path.stat().st_size > 0 for path in certainty_answer(evidence).write(tmp_path))
+    evidence.to_json()

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions.certainty import multistart
+from compare.questions import local_optima
 from compare.questions.motors import study as motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
@@ -51,7 +51,7 @@ class Killed(BaseException):
 
 @pytest.fixture(autouse=True)
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(multistart, "BATCH", 2)
+    monkeypatch.setattr(local_optima, "BATCH", 2)
     monkeypatch.setattr(motors, "VARIANTS", dict(list(motors.VARIANTS.items())[:2]))
 
 

@@ -1,0 +1,259 @@
+"""Evidence that the best known optimum is the global one: what is proven, and what is only supported."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+import metaheuristics
+from compare.analysis.units import with_unit
+from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.labels import axis_label
+from compare.questions.answer import Answer
+from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
+from compare.report.document import Figure, text_table
+from compare.study.store import Store
+from compare.study.task import describe_problem
+from nlp_gait.backends.identity import fingerprint, hash_json
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.decoding import decode
+from nlp_gait.errors import InputError
+from nlp_gait.files import replace_nan
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.proofs.bounds import has_power_form
+from nlp_gait.proofs.branch_and_bound import Certificate, certify
+from nlp_gait.proofs.certificate import hash_code, make_certificate_file
+
+# Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
+MOST_VARIABLES = 4
+DRAWN, LISTED = 20, 10  # best distinct optima
+
+
+@dataclass(frozen=True, kw_only=True)
+class LongSearch:
+    """One long run of CMA-ES with restarts, which shares only the exact functions with IPOPT.
+
+    Attributes:
+        objective: best feasible one, in the problem's sense; None if there was none.
+        evaluations: used.
+        gap: relative distance to the best optimum; negative if it is better.
+    """
+
+    objective: float | None
+    evaluations: int
+    gap: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """Evidence that the best known optimum is the global one.
+
+    Attributes:
+        problem: with its parameter values.
+        starts: of IPOPT.
+        statuses: number of starts by their status.
+        optima: distinct local optima, best first.
+        unseen: estimates of others.
+        search: None if it was not requested.
+        certificate: None if it was not requested, or branch and bound is not possible.
+    """
+
+    problem: GaitProblem
+    starts: int
+    statuses: dict[str, int]
+    optima: tuple[LocalOptimum, ...]
+    unseen: UnseenOptima
+    search: LongSearch | None
+    certificate: Certificate | None
+
+    @property
+    def proven(self) -> str:
+        """What is proven, in one sentence."""
+        c = self.certificate
+        if c is None:
+            return f"nothing: branch and bound is for at most {MOST_VARIABLES} variables, and for NAO's phases"
+        if not math.isfinite(c.bound):
+            return f"nothing: the time limit was reached before a finite bound, after {c.boxes:,} boxes"
+        unit = self.problem.objective.unit
+        bound, best = (with_unit(value, unit, ".6g") for value in (c.bound, c.objective))
+        word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
+        return (
+            f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
+            + ("the tolerance was reached" if c.closed else "the time limit was reached before the tolerance")
+            + "; bounds are rounded outward, functions of libm are assumed to be within four units in the last place"
+        )
+
+    @property
+    def supported(self) -> str:
+        """What is only supported, in one sentence."""
+        best = self.optima[0]
+        text = (
+            f"{best.count} of {sum(o.count for o in self.optima)} converged starts reach the best of {len(self.optima)} "
+            f"distinct optima; with 95 % confidence no unseen one attracts more than "
+            f"{100 * self.unseen.largest_missed:.2g} % of starts"
+        )
+        if self.search is not None and self.search.gap is not None:
+            text += f"; CMA-ES is {100 * self.search.gap:+.2g} % from it after {self.search.evaluations:,} evaluations"
+        return text
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data, without the ends of the starts."""
+        certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
+        return {
+            **describe_problem(self.problem),
+            "starts": self.starts,
+            "statuses": self.statuses,
+            "optima": [asdict(optimum) for optimum in self.optima],
+            "unseen": asdict(self.unseen),
+            "search": None if self.search is None else asdict(self.search),
+            "certificate": certificate,
+            "proven": self.proven,
+            "supported": self.supported,
+        }
+
+
+def gather_evidence(
+    problem: GaitProblem,
+    store: Store,
+    *,
+    starts: int,
+    evaluations: int,
+    tolerance: float = 0.01,
+    time_limit_s: float = 1800.0,
+    seed: int = 0,
+    progress: Progress = ignore_progress,
+) -> Evidence:
+    """Gather evidence by many starts, a long search and, where possible, branch and bound.
+
+    Args:
+        problem: with its current parameter values.
+        store: of finished results.
+        starts: of IPOPT.
+        evaluations: of CMA-ES; 0 for none.
+        tolerance: of the proof, relative.
+        time_limit_s: of the proof [s]; 0 for none.
+        seed: of starts and search.
+        progress: receives a note at each step.
+
+    Raises:
+        InputError: no start converged, or tolerance or time limit are not allowed.
+        SearchError: CMA-ES is requested and not installed.
+        CompilerError: a search or a proof is requested and there is no compiler.
+    """
+    if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
+        raise InputError(
+            f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"
+        )
+    if evaluations:
+        metaheuristics.algorithm("cma")  # checked before the starts, which take long
+    ends = run_starts(problem, store, starts=starts, seed=seed, progress=progress)
+    optima = cluster_ends(problem, ends)
+    if not optima:
+        raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
+    best = optima[0]
+    identity = {**fingerprint(problem), "best": list(best.x)}
+
+    def prove() -> dict[str, Any]:
+        name = f"proof-{hash_json({**identity, 'tolerance': tolerance})[:12]}.npz"
+        checkpoint = None if store.folder is None else store.folder / name
+        proof = certify(problem, np.array(best.x), **limits, progress=progress, checkpoint=checkpoint)
+        return dict(replace_nan(asdict(proof)))
+
+    search = certificate = None
+    if evaluations:
+        inputs = {**identity, "evaluations": evaluations, "seed": seed}
+        found = store.compute(
+            "cma", inputs, lambda: asdict(_search(problem, best.objective, evaluations, seed)), progress=progress
+        )
+        search = decode(LongSearch, found)
+    if time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
+        limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
+        inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
+        certificate = decode(Certificate, store.compute("certificate", inputs, prove, progress=progress))
+    return Evidence(
+        problem=problem,
+        starts=starts,
+        statuses=dict(Counter(ends.status)),
+        optima=tuple(optima),
+        unseen=estimate_unseen(optima),
+        search=search,
+        certificate=certificate,
+    )
+
+
+def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:
+    objective, sign = compile_objective(problem), problem.objective.sign
+    result = metaheuristics.minimize(objective, metaheuristics.algorithm("cma"), evaluations=evaluations, seed=seed)
+    if result.violation > FEASIBILITY_TOLERANCE:
+        return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
+    value = sign * result.objective
+    return LongSearch(objective=value, evaluations=result.evaluations, gap=sign * (value - best) / abs(best))
+
+
+def certainty_answer(evidence: Evidence) -> Answer:
+    """Return the evidence as a report."""
+    problem, unit = evidence.problem, evidence.problem.objective.unit
+    stem = f"{problem.name}-certainty"
+    proof, estimate = evidence.certificate, evidence.unseen
+    optima = [
+        (with_unit(o.objective, unit), f"{o.count:,}", f"{100 * o.share:.2f} %") for o in evidence.optima[:LISTED]
+    ]
+    covered = None if estimate.expected_covered is None else 100 * estimate.expected_covered
+    estimates = [
+        ("share of starts in unseen optima (Good, Turing)", f"{100 * estimate.good_turing:.3g} %"),
+        ("expected number of all optima (Boender, Rinnooy Kan)", with_unit(estimate.expected_optima, "1", ".4g")),
+        ("expected share of starts in seen optima (the same)", with_unit(covered, "%", ".4g")),
+        ("largest share of one unseen optimum, 95 % confidence", f"{100 * estimate.largest_missed:.3g} %"),
+    ]
+    statuses = [(status, f"{count:,}") for status, count in evidence.statuses.items()]
+    listed = f"Distinct optima of {evidence.starts:,} starts, {len(optima)} shown"
+    shown = "Ends of the starts, the proven bound and the end of the long search."
+    certificates = {}
+    if proof is not None and proof.closed:
+        certificates[f"{problem.name}-certificate"] = make_certificate_file(problem, proof).to_json()
+    return Answer(
+        stem=stem,
+        title=f"{problem.name}: certainty of the optimum",
+        verdict=(f"Proven: {evidence.proven}.", f"Supported: {evidence.supported}."),
+        parts=(
+            text_table((problem.objective.name, "starts", "share"), optima, listed),
+            text_table(("status", "starts"), statuses, "Status of the starts"),
+            text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"),
+            Figure(name=stem, caption=shown, drawing=plot_evidence(evidence)),
+        ),
+        results=certificates,
+        data=evidence.to_json(),
+    )
+
+
+def plot_evidence(evidence: Evidence) -> Drawing:
+    """Plot objective and share of the best distinct optima, with the proven bound and the end of the long search as lines."""
+    objective, search, proof = evidence.problem.objective, evidence.search, evidence.certificate
+    shown = evidence.optima[:DRAWN]
+    values, shares = [o.objective for o in shown], [100 * o.share for o in shown]
+    with style():
+        figure = new_figure(5.6, 3.6)
+        axes = figure.subplots()
+        axes.vlines(values, 0.0, shares, color=COLOURS["ipopt"], linewidth=1)
+        label = f"distinct optima of {evidence.starts:,} starts of IPOPT ({len(shown)} of {len(evidence.optima)} shown)"
+        axes.plot(values, shares, "o", color=COLOURS["ipopt"], label=label)
+        if search is not None and search.objective is not None:
+            label = f"CMA-ES, {search.evaluations:,} evaluations"
+            axes.axvline(search.objective, color=COLOURS["cma"], linestyle="--", label=label)
+        if proof is not None and np.isfinite(proof.bound):
+            values.append(proof.bound)
+            axes.axvline(proof.bound, color=COLOURS["ga"], linestyle=":", label="proven bound")
+        pad = 0.05 * max(np.ptp(values), 0.01 * abs(values[0]))
+        axes.set_xlim(min(values) - pad, max(values) + pad)
+        axes.set_ylim(0.0, 105.0)
+        axes.set_xlabel(axis_label(objective.name, objective.unit))
+        axes.set_ylabel("share of converged starts [%]")
+        figure.legend(loc="outside lower center")
+    return figure
