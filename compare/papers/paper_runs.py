@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,6 +18,7 @@ from compare.study.run_task import Run, run_task
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
+from nlp_gait.backends.identity import fingerprint
 from nlp_gait.errors import InputError
 from nlp_gait.progress import Progress
 
@@ -75,6 +77,12 @@ class Runner:
         """Return results by name; they are recomputed when their inputs or the text of the code have changed."""
         store = Store(self.folder)
         return store.compute_all(computations, jobs=self.jobs, code=code, progress=self.progress)
+
+
+def make_computation(name: str, spec: ProblemSpec, function: Callable[..., Any], **arguments: Any) -> Computation:
+    """Return a function of plain arguments as a computation, which depends on these and on a problem."""
+    inputs = {**fingerprint(spec.load()), **arguments}
+    return Computation(name=name, inputs=inputs, function=partial(function, **arguments))
 
 
 def make_start_tasks(

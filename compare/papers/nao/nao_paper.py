@@ -7,8 +7,11 @@ Source:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+from compare.analysis.statistics.inference import RankSum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,16 +30,6 @@ class PrintedOptimum:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedTest:
-    """Wilcoxon's rank-sum test of PSO against GA as printed; p_less is None where the paper gives none."""
-
-    rank_sum: float
-    z: float
-    p_two_sided: float
-    p_less: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedPhase:
     """Numbers of one support phase as printed, and where they are.
 
@@ -44,7 +37,7 @@ class PrintedPhase:
         problem: name of the problem here.
         title: in words.
         optima: by search algorithm (Tables 6 and 8, 7 and 9).
-        test: section 5.3.
+        test: section 5.3; p_less is NaN where the paper gives none.
         tables: numbers of the tables of variables and of indexes.
         convergence_figure: number of the figure of best per generation.
         scatter_figures: number of each figure of the objective against variables, to the positions of these in x.
@@ -59,7 +52,7 @@ class PrintedPhase:
     problem: str
     title: str
     optima: Mapping[str, PrintedOptimum]
-    test: PrintedTest
+    test: RankSum
     tables: tuple[int, int]
     convergence_figure: int
     scatter_figures: Mapping[int, tuple[int, ...]]
@@ -91,7 +84,7 @@ SSP = PrintedPhase(
             indexes=_indexes(0.5143, 0.0308, 0.0084, 0.0591, 0.0200),
         ),
     },
-    test=PrintedTest(rank_sum=70.0, z=-3.6772, p_two_sided=0.000235, p_less=0.000117),
+    test=RankSum(rank_sum=70.0, z=-3.6772, p_two_sided=0.000235, p_less=0.000117),
     tables=(6, 7),
     convergence_figure=9,
     scatter_figures={10: (0, 1, 2), 11: (3, 4), 12: (5, 6), 13: (7,), 14: (8,)},
@@ -117,7 +110,7 @@ DSP = PrintedPhase(
             indexes=_indexes(0.6554, 0.0731, 0.0699, 0.0928, 0.0811),
         ),
     },
-    test=PrintedTest(rank_sum=90.0, z=-2.3639, p_two_sided=0.0181, p_less=None),
+    test=RankSum(rank_sum=90.0, z=-2.3639, p_two_sided=0.0181, p_less=math.nan),
     tables=(8, 9),
     convergence_figure=15,
     scatter_figures={16: (0, 1, 2), 17: (3, 4), 18: (5, 6), 19: (7,)},

@@ -11,14 +11,12 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
-from compare.papers.paper_runs import Effort
+from compare.papers.paper_runs import Effort, make_computation
 from compare.study.record import RunRecord
 from compare.study.run_task import run_task
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import solve_both_ways
-from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.nao.joints import PLANNED_JOINTS
 
@@ -29,25 +27,15 @@ SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
 
 @dataclass(frozen=True, kw_only=True)
 class NaoEffort(Effort):
-    """Effort of the reproduction of the NAO paper.
+    """Effort of the reproduction of the NAO paper."""
 
-    Attributes:
-        runs: of each search, as in the paper.
-        evaluations: of a search, as in the paper.
-        starts: of IPOPT.
-        lever_starts: of IPOPT with the lever rule for the torso's share.
-        intervals: between the samples of a phase, as in the paper.
-        sweep_starts: random starts at both ends of a sweep.
-        sweep_points: of a sweep over the range of all feasible solutions, and over that of the cheap ones.
-    """
-
-    runs: int = 11
-    evaluations: int = 10_000
-    starts: int = 20
-    lever_starts: int = 5
-    intervals: int = 10
-    sweep_starts: int = 2
-    sweep_points: tuple[int, int] = (13, 10)
+    runs: int = 11  # of each search, as in the paper
+    evaluations: int = 10_000  # of a search, as in the paper
+    starts: int = 20  # of IPOPT
+    lever_starts: int = 5  # of IPOPT with the lever rule for the torso's share
+    intervals: int = 10  # between the samples of a phase, as in the paper
+    sweep_starts: int = 2  # at both ends of a sweep
+    sweep_points: tuple[int, int] = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 
     @property
     def steps(self) -> int:
@@ -122,15 +110,9 @@ def make_special_sweeps(effort: NaoEffort) -> list[Computation]:
 
 
 def make_sweep(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
-    """Return a sweep over a variable as a step: its optima lead to each other, so they are not runs by themselves."""
-    problem = spec.load()
-    variable = problem.names[position]
-    settings = {"ipopt": repr(IpoptSettings()), "variable": variable, "values": values, "starts": starts}
-    return Computation(
-        name=name,
-        inputs={**fingerprint(problem), **settings},
-        function=partial(solve_sweep, spec, variable, values, starts),
-    )
+    """Return a sweep over a variable: its optima lead to each other, so they are not runs by themselves."""
+    variable = spec.load().names[position]
+    return make_computation(name, spec, partial(solve_sweep, spec), variable=variable, values=values, starts=starts)
 
 
 def solve_sweep(

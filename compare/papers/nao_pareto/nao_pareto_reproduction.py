@@ -6,11 +6,19 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from compare.analysis.units import join_words
 from compare.papers.nao_pareto import nao_pareto_runs
 from compare.papers.nao_pareto.nao_pareto_claims import NEAR, check_claims
 from compare.papers.nao_pareto.nao_pareto_figures import draw_figures
-from compare.papers.nao_pareto.nao_pareto_findings import EVEN_POINTS, ParetoFindings, PhaseFindings, collect_points
+from compare.papers.nao_pareto.nao_pareto_findings import (
+    EVEN_POINTS,
+    NAMES,
+    ParetoFindings,
+    PhaseFindings,
+    collect_points,
+)
 from compare.papers.nao_pareto.nao_pareto_runs import (
     CRITERION,
     PHASES,
@@ -19,14 +27,15 @@ from compare.papers.nao_pareto.nao_pareto_runs import (
     make_searches,
     make_spec,
 )
-from compare.papers.nao_pareto.nao_pareto_tables import make_tables
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction, Verdict
 from compare.questions.pareto.compare import Challenge, challenge
 from compare.questions.pareto.search import REFERENCE
 from compare.questions.pareto.study import pareto_study
+from compare.report.document import Rows, Value
 from compare.study.store import Computation, Store
 from compare.study.stored_solver import store_runs
+from metaheuristics.multi_objective import constrained_moead, dynamic_nsga3, pymoo
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
 
@@ -49,7 +58,9 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
         store=store,
         progress=runner.progress,
     )
-    results = runner.compute(make_searches(phase, study.front, effort), code=(nao_pareto_runs,))
+    results = runner.compute(
+        make_searches(phase, study.front, effort), code=(nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
+    )
     runs = tuple(make_run(result) for result in results.values())
     points = collect_points(study.front, runs)
     solve = partial(challenge, study.problem, study.criterion, study.front, points, store_runs(store), runner.progress)
@@ -94,6 +105,49 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
         "ssp": {"variables": len(ssp.problem.names)},
         "dsp": {"variables": len(dsp.problem.names)},
     }
+
+
+def make_tables(findings: ParetoFindings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
+    tables: dict[str, Rows] = {"fronts": [_make_front_row(phase) for phase in findings.phases]}
+    for phase in findings.phases:
+        tables[f"ends-{phase.problem.name}"] = _make_ends(phase)
+        tables[f"constraints-{phase.problem.name}"] = _make_constraints(phase)
+        tables[f"running-{phase.problem.name}"] = _make_running(phase)
+    return tables
+
+
+def _make_front_row(phase: PhaseFindings) -> list[Value]:
+    low, high, answer = phase.front[0], phase.front[-1], phase.answer
+    ends = [low.value, low.power_W, high.value, high.power_W]
+    solved = [answer.points, answer.solved, 100 * answer.least_excess, answer.moved]
+    return [phase.problem.name, len(phase.front), *ends, len(phase.bends.knees), *solved]
+
+
+def _make_ends(phase: PhaseFindings) -> Rows:
+    rows: list[list[Value]] = []
+    for (name, budget), m in phase.measures.items():
+        ends = (100 * m.hypervolume[:, -1], m.igd[:, -1])
+        spread = [float(value) for end in ends for value in (np.median(end), end.min(), end.max())]
+        rows.append([NAMES[name], budget, len(m.time_s), *spread])
+    return rows
+
+
+def _make_constraints(phase: PhaseFindings) -> Rows:
+    rows: list[list[Value]] = []
+    for (name, budget), m in phase.measures.items():
+        columns = (100 * m.feasible, m.first_feasible, m.until(NEAR), m.time_s, m.objective_time_s)
+        medians = [float(np.median(column)) for column in columns]
+        rows.append([NAMES[name], budget, int(np.sum(m.hypervolume[:, -1] > 0.0)), *medians])
+    return rows
+
+
+def _make_running(phase: PhaseFindings) -> Rows:
+    """Medians at each look of the runs with the largest budget."""
+    chosen = [m for (_, budget), m in phase.measures.items() if budget == phase.budgets[-1]]
+    columns = [chosen[0].evaluations]
+    columns += [100 * np.median(m.hypervolume, axis=0) for m in chosen] + [np.median(m.igd, axis=0) for m in chosen]
+    return np.column_stack(columns).tolist()
 
 
 REPRODUCTION = Reproduction(

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from compare.papers.paper_runs import Effort
+from compare.papers.paper_runs import Effort, make_computation
 from compare.questions.pareto.competing import MARGINS, competing_objective
 from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.search import PowerAndCompeting, Scale
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.kernel.compiled import compile_objective
 
 ALGORITHMS = tuple(FRONT_ALGORITHMS)
@@ -28,22 +27,15 @@ FIRST_LOOK = 100  # evaluations, one generation
 
 @dataclass(frozen=True, kw_only=True)
 class ParetoEffort(Effort):
-    """Effort of the reproduction of power against stability.
+    """Effort of the reproduction of power against stability."""
 
-    Attributes:
-        runs: of each search, as in the paper.
-        budgets: evaluations, rising; each has separate runs, since DCNSGA-III plans for its budget. The first is that of the
-            same authors' paper of 2023; the abstract gives none.
-        points: of the true front.
-        starts: random starts at some of its points.
-        intervals: between the samples of a phase, as in the paper of 2023.
-    """
-
-    runs: int = 11
+    runs: int = 11  # of each search, as in the paper
+    # Evaluations, rising; each has separate runs, since DCNSGA-III plans for its budget. The first is that of the same authors'
+    # paper of 2023; the abstract gives none.
     budgets: tuple[int, ...] = (10_000,)
-    points: int = 40
-    starts: int = 5
-    intervals: int = 10
+    points: int = 40  # of the true front
+    starts: int = 5  # random starts at some of its points
+    intervals: int = 10  # between the samples of a phase, as in the paper of 2023
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,21 +69,16 @@ def choose_looks(budget: int) -> list[int]:
 
 def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> list[Computation]:
     """Return every run of a phase as a computation; ``make_run`` takes its result."""
-    spec, ends = make_spec(phase, effort), (front[0], front[-1])
-    problem = spec.load()
-    free = competing_objective(CRITERION, problem).freed(problem)
+    spec, ends = make_spec(phase, effort), [[end.value, end.power_W] for end in (front[0], front[-1])]
     return [
-        Computation(
-            name=f"{phase}-{name.lower()}-{budget}-{run:02d}",
-            inputs={
-                **fingerprint(free),
-                "criterion": CRITERION,
-                "front": [[end.value, end.power_W] for end in ends],
-                "algorithm": repr(front_algorithm(name)),
-                "looks": choose_looks(budget),
-                "seed": run,
-            },
-            function=partial(run_search, spec, ends, name, budget, run),
+        make_computation(
+            f"{phase}-{name.lower()}-{budget}-{run:02d}",
+            spec,
+            partial(run_search, spec),
+            ends=ends,
+            algorithm=name,
+            budget=budget,
+            run=run,
         )
         for budget in effort.budgets
         for name in ALGORITHMS
@@ -99,19 +86,22 @@ def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort)
     ]
 
 
-def run_search(spec: ProblemSpec, ends: Sequence[FrontPoint], name: str, budget: int, run: int) -> dict[str, Any]:
-    """Return a run as plain data; ``ends`` are those of the front, whose ranges count as 1."""
+def run_search(
+    spec: ProblemSpec, ends: Sequence[Sequence[float]], algorithm: str, budget: int, run: int
+) -> dict[str, Any]:
+    """Return a run as plain data; ``ends`` are criterion and power at those of the front, whose ranges count as 1."""
     problem = spec.load()
     criterion = competing_objective(CRITERION, problem)
-    objectives = PowerAndCompeting(
-        compile_objective(criterion.freed(problem), threads=1), criterion, Scale([ends[0], ends[-1]])
+    scale = Scale(
+        [FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=()) for value, power in ends]
     )
-    snapshots = minimize_many(objectives, front_algorithm(name), evaluations=choose_looks(budget), seed=run)
+    objectives = PowerAndCompeting(compile_objective(criterion.freed(problem), threads=1), criterion, scale)
+    snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=run)
     points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
     looks = [
         {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()} for snapshot, X in zip(snapshots, points, strict=True)
     ]
-    return {"algorithm": name, "run": run, "budget": budget, "looks": looks}
+    return {"algorithm": algorithm, "run": run, "budget": budget, "looks": looks}
 
 
 def make_run(result: Mapping[str, Any]) -> FrontRun:

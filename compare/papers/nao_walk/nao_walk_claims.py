@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from scipy.stats import fisher_exact
 
 from compare.papers.nao_walk.nao_walk_findings import KNEE, SAGITTAL, NaoWalkFindings
-from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT
+from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS
 from compare.papers.nao_walk.nao_walk_sources import (
     ACTIVE_MIN,
     BATTERY_WH,
@@ -21,7 +21,7 @@ from compare.papers.nao_walk.nao_walk_sources import (
 )
 from compare.papers.reproduction import SIGNIFICANT, Claim, Verdict, check_claim
 
-HEATS = (("sheet", "data sheet"), ("paper", "paper"))
+HEATS = {"sheet": "data sheet", "paper": "paper"}
 
 
 def check_claims(findings: NaoWalkFindings) -> list[Claim]:
@@ -45,14 +45,14 @@ def _judge(holds: Iterable[bool], in_part: Iterable[bool]) -> Verdict:
 
 
 def _check_knees(findings: NaoWalkFindings) -> Claim:
-    places = [(where, heat) for heat, _ in HEATS for where in ("model", "engine")]
+    places = [(where, heat) for heat in HEATS for where in ("model", "engine")]
     shares = {place: findings.share("own", *place) for place in places}
     most = {place: findings.largest("own", *place) for place in places}
     forward = {place: findings.largest("own", *place, SAGITTAL) for place in places}
     found = [
         f"with K of the {name} {shares['model', heat]:.0%} in the model and {shares['engine', heat]:.0%} in the engine, where "
         f"{KINDS[most['engine', heat]]} draws most, and of the joints that turn forward {KINDS[forward['engine', heat]]}"
-        for heat, name in HEATS
+        for heat, name in HEATS.items()
     ]
     optimum = [findings.share("optimum-sheet", where, "sheet") for where in ("model", "engine")]
     return Claim(
@@ -70,9 +70,9 @@ def _check_knees(findings: NaoWalkFindings) -> Claim:
 def _check_straight(findings: NaoWalkFindings) -> Claim:
     heights = findings.torsos
     own, tallest = next(point for point in heights if point["torso_m"] == TORSO_M), heights[-1]
-    best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat, _ in HEATS}
+    best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat in HEATS}
     found = []
-    for heat, name in HEATS:
+    for heat, name in HEATS.items():
         at_best, at_tallest = (
             100 * (point[f"{heat}_J_per_m"] / own[f"{heat}_J_per_m"] - 1) for point in (best[heat], tallest)
         )
@@ -168,13 +168,13 @@ def _check_fast(findings: NaoWalkFindings) -> Claim:
 def _check_speed(findings: NaoWalkFindings) -> Claim:
     above: list[float] = []
     found: list[str] = []
-    for heat in (PAPER_HEAT, SHEET_HEAT):
+    for heat in SPECS:
         cheapest, default = findings.cheapest(heat), findings.at_default(heat)
         above.append(100.0 * (default["cost_of_transport"] / cheapest["cost_of_transport"] - 1.0))
         edge = ", the fastest computed" if cheapest is findings.curve(heat)[-1] else ""
         found.append(
-            f"with {heat} {default['cost_of_transport']:.3f} there against {cheapest['cost_of_transport']:.3f} at "
-            f"{100 * cheapest['speed_m_s']:.1f} cm/s{edge}"
+            f"with K of the {HEATS[heat]} {default['cost_of_transport']:.3f} there against "
+            f"{cheapest['cost_of_transport']:.3f} at {100 * cheapest['speed_m_s']:.1f} cm/s{edge}"
         )
     return Claim(
         where=str(DEFAULT_SPEED),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from compare.drawing.figures import COLOURS, new_figure
 from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
-from compare.papers.nao_walk.nao_walk_runs import KINDS, PAPER_HEAT, SHEET_HEAT
+from compare.papers.nao_walk.nao_walk_runs import KINDS
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S
 
 if TYPE_CHECKING:
@@ -50,10 +50,16 @@ def _draw_speeds(findings: NaoWalkFindings) -> Figure:
     """Cost of transport over speed, and the default speed."""
     figure = new_figure(4.6, 3.0)
     axes = figure.subplots()
-    for heat, colour in ((PAPER_HEAT, COLOURS["pso"]), (SHEET_HEAT, COLOURS["ga"])):
+    for heat, name, colour in (("paper", "paper", COLOURS["pso"]), ("sheet", "data sheet", COLOURS["ga"])):
         curve = findings.curve(heat)
         speeds = [100.0 * point["speed_m_s"] for point in curve]
-        axes.plot(speeds, [point["cost_of_transport"] for point in curve], "o-", color=colour, label=f"optimum, {heat}")
+        axes.plot(
+            speeds,
+            [point["cost_of_transport"] for point in curve],
+            "o-",
+            color=colour,
+            label=f"optimum, K of the {name}",
+        )
     axes.axvline(100.0 * SPEED_M_S, color="#808080", ls="--", label="default speed")
     axes.set(xlabel="speed [cm/s]", ylabel="cost of transport P / (m g v)")
     axes.set_ylim(bottom=0.0)

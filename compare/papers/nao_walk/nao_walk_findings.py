@@ -20,7 +20,7 @@ class NaoWalkFindings:
 
     Attributes:
         effort: what was computed.
-        speeds: by heat constant, the cheapest gaits in the order of their speeds.
+        speeds: by source of the heat constant, the cheapest gaits in the order of their speeds.
         torsos: the robot's own walk in the order of its heights.
         straighter: by heat constant, cheapest gaits at the default speed.
         joints: by gait, energy of its joints.

@@ -6,11 +6,13 @@ from typing import Any
 
 from compare.analysis.units import join_words
 from compare.papers.nao_walk import nao_walk_runs, nao_walk_sources
-from compare.papers.nao_walk.nao_walk_claims import check_claims
+from compare.papers.nao_walk.nao_walk_claims import HEATS, check_claims
 from compare.papers.nao_walk.nao_walk_figures import draw_figures
 from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_runs import (
+    FEED_FORWARD,
     FRICTIONS,
+    KINDS,
     MASS_FACTORS,
     PUSHES_NS,
     SLOPES_DEG,
@@ -18,14 +20,15 @@ from compare.papers.nao_walk.nao_walk_runs import (
     NaoWalkEffort,
     make_gait_computations,
     make_walk_computations,
+    sum_energy,
 )
 from compare.papers.nao_walk.nao_walk_sources import LIFT_M, SPEED_M_S, STEP_M, STRETCHED_M, TORSO_M, make_footsteps
-from compare.papers.nao_walk.nao_walk_tables import make_tables
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
+from compare.report.document import Rows
 from nlp_gait.errors import InputError
 from nlp_gait.gaits.biped import cart_table, recorded_cycle
-from nlp_gait.simulation import simulate
+from nlp_gait.simulation import drive, simulate
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
 
@@ -38,23 +41,23 @@ def run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
         InputError: no optimal gait was found at the default speed.
     """
     load_mujoco()  # fail before the work if it is missing
-    code = (nao_walk_runs, nao_walk_sources, cart_table, recorded_cycle, simulate)
+    code = (nao_walk_runs, nao_walk_sources, cart_table, recorded_cycle, drive, simulate)
     gaits = runner.compute(make_gait_computations(effort), code)
-    speeds = {heat: gaits[f"speeds-{heat.split()[-1]}"] for heat in SPECS}
+    speeds = {heat: gaits[f"speeds-{heat}"] for heat in SPECS}
     optima = {}
     for heat, points in speeds.items():
         at = next(point for point in points if point["speed_m_s"] == SPEED_M_S)
         if not at["feasible"]:
-            raise InputError(f"no optimal gait was found at {SPEED_M_S:g} m/s with {heat}; use more starts")
+            raise InputError(f"no optimal gait was found at {SPEED_M_S:g} m/s with K of the {heat}; use more starts")
         optima[heat] = at["x"]
     walks = runner.compute(make_walk_computations(effort, optima), code)
     return NaoWalkFindings(
         effort=effort,
         speeds=speeds,
-        torsos=gaits["torso-heights"],
+        torsos=gaits["torsos"],
         straighter=_select(gaits, "straighter-"),
         joints=_select(walks, "joints-"),
-        drives={name: list(_select(walks, f"drives-{name}-").values()) for name in ("none", "torque")},
+        drives={name: list(_select(walks, f"drives-{name}-").values()) for name in FEED_FORWARD},
     )
 
 
@@ -80,6 +83,68 @@ def compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
         **{name: join_words(f"{value:g}" for value in values) for name, values in disturbances.items()},
         "lengths": join_words(f"{1000 * length:.0f}" for length in effort.steps_m),
     }
+
+
+NAMES = {
+    "own": "own walk",
+    "own-plain": "own walk, plain drives",
+    "optimum-paper": "optimum for K of the paper",
+    "optimum-sheet": "optimum for K of the data sheet",
+}
+
+
+def make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
+    straighter = [
+        [
+            HEATS.get(heat, heat),
+            *(
+                value
+                for bound in ("free", "paper")
+                for value in (1000 * at[bound]["hip_m"], at[bound]["knee_deg"], at[bound]["power_W"])
+            ),
+        ]
+        for heat, at in findings.straighter.items()
+    ]
+    drives = [
+        [name, share, point["walked_share"], point["sheet_J_per_m"], point["paper_J_per_m"], point["tracking_rad"]]
+        + [point["falls"], point["disturbances"], 100 * point["fastest_m_s"]]
+        for name, points in findings.drives.items()
+        for share, point in zip(findings.effort.stiffnesses, points, strict=True)
+    ]
+    speeds = [
+        [HEATS[heat], 100 * point["speed_m_s"], "yes" if point["feasible"] else "no"]
+        + [point["cost_of_transport"], point["energy_J_per_m"]]
+        for heat, points in findings.speeds.items()
+        for point in points
+    ]
+    torsos = [
+        [1000 * at["torso_m"], at["knee_deg"], at["paper_J_per_m"], at["sheet_J_per_m"]] for at in findings.torsos
+    ]
+    return {
+        "joints": _make_joints(findings),
+        "torsos": torsos,
+        "straighter": straighter,
+        "drives": drives,
+        "speeds": speeds,
+    }
+
+
+def _make_joints(findings: NaoWalkFindings) -> Rows:
+    """Shares of each kind of joint; the engine has no numbers of a walk that fell."""
+    return [
+        [
+            NAMES[gait],
+            where,
+            HEATS[heat],
+            *(100 * findings.share(gait, where, heat, kind) for kind in KINDS),
+            sum_energy(found[where].values(), heat),
+        ]
+        for gait, found in findings.joints.items()
+        for where in ("model", "engine")
+        if where == "model" or found["fell_at_s"] is None
+        for heat in HEATS
+    ]
 
 
 REPRODUCTION = Reproduction(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -12,28 +12,25 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, STRETCHED_M, make_footsteps
-from compare.papers.paper_runs import Effort
+from compare.papers.paper_runs import Effort, make_computation
 from compare.questions.sweep.study import Axis
 from compare.questions.walk.study import CYCLE, optimal_gaits
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
 from nlp_gait.gaits.nao.recorded import nao_cycles
-from nlp_gait.robots import Robot
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
-PAPER_HEAT, SHEET_HEAT = "K of the paper", "K of the data sheet"
-SPECS = {
-    PAPER_HEAT: ProblemSpec(name=CYCLE, options={"objective": "power"}),
-    SHEET_HEAT: ProblemSpec(name=CYCLE, options={"objective": "power", "motors": "heat"}),
+SPECS = {  # by source of the heat constant K
+    "paper": ProblemSpec(name=CYCLE, options={"objective": "power"}),
+    "sheet": ProblemSpec(name=CYCLE, options={"objective": "power", "motors": "heat"}),
 }
 HEIGHTS = ("hip_z_lift_off_m", "hip_z_touch_down_m")  # variables
 ARMS = "arms"
@@ -43,31 +40,21 @@ KINDS = {  # of joints, in words
 }
 DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 PUSHES_NS, SLOPES_DEG, FRICTIONS, MASS_FACTORS = (0.5, 1.0), (6.0,), (0.3,), (0.9, 1.1)
+FEED_FORWARD = ("none", "torque")
 
 
 @dataclass(frozen=True, kw_only=True)
 class NaoWalkEffort(Effort):
-    """Effort of checking the claims about NAO's walk.
+    """Effort of checking the claims about NAO's walk."""
 
-    Attributes:
-        starts: random starts of IPOPT.
-        speeds_m_s: of the curve, including the default speed.
-        torsos_m: heights of the torso in the robot's own walk.
-        heats: values of K for the claim about straighter knees [W/(Nm)^2].
-        stiffnesses: of the drives, as shares of the full one, which comes first.
-        steps_m: lengths of a step to find the fastest walk, ascending.
-        walked: simulated steps.
-        disturbed: whether disturbed walks are simulated too.
-    """
-
-    starts: int = 2
-    speeds_m_s: tuple[float, ...] = (0.03, 0.06, 0.08, SPEED_M_S, 0.12, 0.15)
-    torsos_m: tuple[float, ...] = (0.28, 0.30, 0.31, 0.315, 0.32, 0.325, 0.33)
-    heats: tuple[float, ...] = (0.025, 0.1, 0.5)
-    stiffnesses: tuple[float, ...] = (1.0, 0.7, 0.5)
-    steps_m: tuple[float, ...] = (0.04, 0.06, 0.08)
-    walked: int = 6
-    disturbed: bool = True
+    starts: int = 2  # of IPOPT
+    speeds_m_s: tuple[float, ...] = (0.03, 0.06, 0.08, SPEED_M_S, 0.12, 0.15)  # of the curve, the default one included
+    torsos_m: tuple[float, ...] = (0.28, 0.30, 0.31, 0.315, 0.32, 0.325, 0.33)  # heights in the robot's own walk
+    heats: tuple[float, ...] = (0.025, 0.1, 0.5)  # K for the claim about straighter knees [W/(Nm)^2]
+    stiffnesses: tuple[float, ...] = (1.0, 0.7, 0.5)  # of the drives; the first one is full
+    steps_m: tuple[float, ...] = (0.04, 0.06, 0.08)  # lengths of a step to find the fastest walk, ascending
+    walked: int = 6  # simulated steps
+    disturbed: bool = True  # whether disturbed walks are simulated too
 
     @property
     def steps(self) -> int:
@@ -77,60 +64,50 @@ class NaoWalkEffort(Effort):
 
 def make_gait_computations(effort: NaoWalkEffort) -> list[Computation]:
     """Return optimal gaits over speed, the robot's own walk at other heights, and optima whose legs may stretch."""
-    found = [
-        Computation(
-            name=f"speeds-{_word(name)}",
-            inputs={**fingerprint(spec.load()), "speeds": effort.speeds_m_s, "starts": effort.starts},
-            function=partial(solve_over_speed, spec, effort.speeds_m_s, effort.starts),
+    heats = {f"{heat:g}": replace(SPECS["paper"], values={"heat_loss_W_per_Nm2": heat}) for heat in effort.heats}
+    curves = [
+        make_computation(
+            f"speeds-{name}", spec, partial(solve_over_speed, spec), speeds=effort.speeds_m_s, starts=effort.starts
         )
         for name, spec in SPECS.items()
     ]
-    inputs = {**_get_own_inputs(), "heights": effort.torsos_m}
-    found.append(Computation(name="torso-heights", inputs=inputs, function=partial(compute_heights, effort.torsos_m)))
-    for name, spec in (*((f"{heat:g}", _make_heat_spec(heat)) for heat in effort.heats), ("sheet", SPECS[SHEET_HEAT])):
-        found.append(
-            Computation(
-                name=f"straighter-{name}",
-                inputs={**fingerprint(spec.load()), "starts": effort.starts},
-                function=partial(solve_free_height, spec, effort.starts),
-            )
-        )
-    return found
+    straighter = [
+        make_computation(f"straighter-{name}", spec, partial(solve_free_height, spec), starts=effort.starts)
+        for name, spec in {**heats, "sheet": SPECS["sheet"]}.items()
+    ]
+    return [*curves, make_computation("torsos", SPECS["paper"], compute_heights, heights=effort.torsos_m), *straighter]
 
 
 def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[str, float]]) -> list[Computation]:
     """Return the energy of the joints in the robot's own walk and in optima, and that walk on softer drives."""
-    plain, fed = Drive(feed_forward="none"), Drive()
-    gaits: dict[str, tuple[Drive, Mapping[str, float], str]] = {
-        "own": (fed, {}, ""),
-        "own-plain": (plain, {}, ""),
-        **{f"optimum-{_word(name)}": (fed, x, name) for name, x in optima.items()},
+    gaits: dict[str, tuple[str, str, Mapping[str, float]]] = {
+        "own": ("torque", "", {}),
+        "own-plain": ("none", "", {}),
+        **{f"optimum-{heat}": ("torque", heat, x) for heat, x in optima.items()},
     }
-    found = [
-        Computation(
-            name=f"joints-{title}",
-            inputs={**_get_own_inputs(), "x": dict(x), "drive": repr(drive), "steps": effort.walked, "K": name},
-            function=partial(simulate_joints, drive, x, name, effort.walked),
+    spec, walked = SPECS["paper"], effort.walked
+    joints = [
+        make_computation(
+            f"joints-{name}", spec, simulate_joints, feed_forward=feed_forward, heat=heat, x=dict(x), steps=walked
         )
-        for title, (drive, x, name) in gaits.items()
+        for name, (feed_forward, heat, x) in gaits.items()
     ]
-    for feed_forward in ("none", "torque"):
-        for share in effort.stiffnesses:
-            drive = Drive(full_error_rad=fed.full_error_rad / share, feed_forward=feed_forward)
-            found.append(
-                Computation(
-                    name=f"drives-{feed_forward}-{share:g}",
-                    inputs={
-                        **_get_own_inputs(),
-                        "drive": repr(drive),
-                        "steps": effort.walked,
-                        "lengths": effort.steps_m,
-                        "disturbed": effort.disturbed,
-                    },
-                    function=partial(simulate_drives, drive, effort.walked, effort.steps_m, effort.disturbed),
-                )
-            )
-    return found
+    lengths = effort.steps_m
+    drives = [
+        make_computation(
+            f"drives-{feed_forward}-{stiffness:g}",
+            spec,
+            simulate_drives,
+            feed_forward=feed_forward,
+            stiffness=stiffness,
+            steps=walked,
+            lengths=lengths,
+            disturbed=effort.disturbed,
+        )
+        for feed_forward in FEED_FORWARD
+        for stiffness in effort.stiffnesses
+    ]
+    return joints + drives
 
 
 def solve_over_speed(spec: ProblemSpec, speeds: Sequence[float], starts: int) -> list[dict[str, Any]]:
@@ -176,22 +153,22 @@ def solve_free_height(spec: ProblemSpec, starts: int) -> dict[str, Any]:
     return found
 
 
-def simulate_joints(drive: Drive, x: Mapping[str, float], heat: str, steps: int) -> dict[str, Any]:
+def simulate_joints(feed_forward: str, heat: str, x: Mapping[str, float], steps: int) -> dict[str, Any]:
     """Return the energy per metre of each kind of joint, in the model and in the engine, with both heat constants [J/m].
 
     Args:
-        drive: of the joints.
-        x: of an optimum; empty for the robot's own walk.
-        heat: key of ``SPECS`` of the optimum.
+        feed_forward: of the drives.
+        heat: key of ``SPECS`` of an optimum; empty for the robot's own walk.
+        x: of the optimum.
         steps: number of simulated steps.
     """
-    if x:
+    if heat:
         problem = SPECS[heat].load().with_values(speed_m_s=SPEED_M_S)
         result = Result(problem=problem, x=problem.check_x(x))
     else:
         result = plan_own_walk(make_footsteps())
     plan = make_plan(result, steps)
-    trace = simulate_plan(plan, drive=drive)
+    trace = simulate_plan(plan, drive=Drive(feed_forward=feed_forward))
     during = trace.t <= plan.duration_s
     arrays = plan.signals.arrays
     planned, (walked, _) = planned_distance(plan), walked_distance(trace)
@@ -206,9 +183,12 @@ def simulate_joints(drive: Drive, x: Mapping[str, float], heat: str, steps: int)
     }
 
 
-def simulate_drives(drive: Drive, steps: int, lengths: Sequence[float], disturbed: bool) -> dict[str, Any]:
+def simulate_drives(
+    feed_forward: str, stiffness: float, steps: int, lengths: Sequence[float], disturbed: bool
+) -> dict[str, Any]:
     """Simulate the robot's own walk on some drives: energy, distance, falls when disturbed, fastest walk without a fall."""
     plan = make_plan(plan_own_walk(make_footsteps()), steps)
+    drive = Drive(full_error_rad=Drive().full_error_rad / stiffness, feed_forward=feed_forward)
     trace = simulate_plan(plan, drive=drive)
     during = trace.t <= plan.duration_s
     walked, _ = walked_distance(trace)
@@ -249,12 +229,6 @@ def compute_knee_deg(result: Result) -> float:
     return math.degrees(float(trapezoid(q[:, knees].mean(axis=1), t) / (t[-1] - t[0])))
 
 
-def get_heat_constants(robot: Robot, joints: Sequence[str]) -> Array:
-    """Return K of each joint's motor from the data sheet [W/(Nm)^2]."""
-    motors = [robot.joint(joint).motor for joint in joints]
-    return np.array([motor.heat_W_per_Nm2 for motor in motors if motor is not None])
-
-
 def _sum_by_kind(plan: Plan, torque: Array, rate: Array, t: Array, distance_m: float) -> dict[str, dict[str, float]]:
     """By kind of joint: mechanical energy, and heat with the paper's constant and those of the data sheet [J/m]."""
     mechanical = trapezoid(np.abs(torque * rate), t, axis=0)
@@ -262,7 +236,9 @@ def _sum_by_kind(plan: Plan, torque: Array, rate: Array, t: Array, distance_m: f
     by_motor = torque.copy()
     first, second = (plan.joints.index(joint) for joint in YAW_PITCHES)  # one motor turns both
     by_motor[:, first], by_motor[:, second] = torque[:, first] + torque[:, second], 0.0
-    sheet = get_heat_constants(plan.robot, plan.joints) * trapezoid(by_motor**2, t, axis=0)
+    motors = (plan.robot.joint(joint).motor for joint in plan.joints)
+    K = np.array([motor.heat_W_per_Nm2 for motor in motors if motor is not None])
+    sheet = K * trapezoid(by_motor**2, t, axis=0)
     found = {kind: dict.fromkeys(("mechanical", "paper", "sheet"), 0.0) for kind in KINDS}
     for column, joint in enumerate(plan.joints):
         parts = found[joint[1:] if joint[1:] in KINDS else ARMS]
@@ -292,16 +268,3 @@ def _make_disturbances() -> list[Conditions]:
         *(Conditions(friction=friction) for friction in FRICTIONS),
         *(Conditions(mass_factor=factor) for factor in MASS_FACTORS),
     ]
-
-
-def _get_own_inputs() -> dict[str, Any]:
-    """Everything that the robot's own walk depends on; the cycle's fingerprint contains the robot's data."""
-    return {**fingerprint(SPECS[PAPER_HEAT].load()), "footsteps": repr(make_footsteps())}
-
-
-def _make_heat_spec(heat: float) -> ProblemSpec:
-    return ProblemSpec(name=CYCLE, options={"objective": "power"}, values={"heat_loss_W_per_Nm2": heat})
-
-
-def _word(heat: str) -> str:
-    return heat.split()[-1]

@@ -11,8 +11,7 @@ from compare.drawing.figures import add_legend_below, new_figure
 from compare.papers.paper_runs import get_point
 from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
 from compare.papers.stairs.stairs_paper import TABLE_4
-from compare.papers.stairs.stairs_runs import complete_plan, make_plan_spec, roll_out
-from compare.papers.stairs.stairs_tables import StairsFindings
+from compare.papers.stairs.stairs_runs import StairsFindings, make_plan_spec, roll_out
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -29,11 +28,10 @@ TRACKED_LINKS = LINKS[:7]  # q1 to q7
 
 def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
     """Return the figures by name."""
-    plans = {case: complete_plan(findings.effort, case, findings.plan(case)) for case in findings.cases}
+    plans = {case: findings.plan(case) for case in findings.cases}
     followed = {case: roll_out(case, plans[case], get_point(findings.best_track(case))) for case in findings.cases}
     plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
-    size = TABLE_4[DRAWN_CASE].stair_length_m / 2
-    step = size, size * TABLE_4[DRAWN_CASE].rise_run_ratio
+    step = TABLE_4[DRAWN_CASE].step_m
     first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
     following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
     return {
@@ -42,7 +40,7 @@ def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
         "fig08-09": _draw_sticks(following, step, "next steps", from_ground=False),
         "fig10-11": _draw_ankle(arrays),
         "fig12": _draw_stairs_compared(plans),
-        "fig13": _draw_pose_times(findings.steps["network"], findings.cases[0]),
+        "fig13": _draw_pose_times(findings.others["network"], findings.cases[0]),
         "fig14-20": _draw_tracking(followed, "q", "angle [rad]"),
         "fig21-27": _draw_tracking(followed, "qd", "rate [rad/s]"),
         "fig28": _draw_zmp(followed, plans),
@@ -54,7 +52,7 @@ def _planned(findings: StairsFindings, case: int) -> Mapping[str, Array]:
     problem = make_plan_spec(findings.effort, case).load().dense(DENSITY)
     if problem is None:
         raise TypeError("the planner has samples and signals")
-    return problem.signals(findings.plan(case)).arrays
+    return problem.signals(findings.best("plan", case).x).arrays
 
 
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
@@ -134,13 +132,12 @@ def _draw_stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
     for axes, (case, plan) in zip(
         figure.subplots(1, len(plans), sharey=True, squeeze=False)[0], plans.items(), strict=True
     ):
-        tread = TABLE_4[case].stair_length_m / 2
-        step = tread, tread * TABLE_4[case].rise_run_ratio
+        step = TABLE_4[case].step_m
         swing, _ = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"], 201))
         _draw_stair(axes, step, 3)
         for name in ("ankle", "sole", "toe"):
             axes.plot(*getattr(swing, name).T, label=name)
-        axes.set_title(f"case {case}: {step[1] * 100:.1f} cm on {tread * 100:.1f} cm")
+        axes.set_title(f"case {case}: {step[1] * 100:.1f} cm on {step[0] * 100:.1f} cm")
     figure.axes[0].set_ylabel("z [m]")
     add_legend_below(figure)
     return figure
@@ -183,9 +180,7 @@ def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, M
     for case, arrays in followed.items():
         (line,) = axes.plot(arrays["t"], arrays["zmp"], label=f"case {case}")
         lift = plans[case]["t2_s"]
-        axes.plot(
-            [0.0, lift], [foot - TABLE_4[case].stair_length_m / 2] * 2, "--", color=line.get_color(), linewidth=0.8
-        )
+        axes.plot([0.0, lift], [foot - TABLE_4[case].step_m[0]] * 2, "--", color=line.get_color(), linewidth=0.8)
         axes.axvline(lift, color=line.get_color(), linewidth=0.6, linestyle=":")
     axes.set(xlabel="time [s]", ylabel="ZMP ahead of the stance ankle [m]", title="Fig. 28: ZMP of the rollout")
     add_legend_below(figure)

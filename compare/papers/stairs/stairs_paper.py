@@ -1,4 +1,4 @@
-"""What Bhardwaj, Mishra, Sukavanam and Balasubramanian print: Tables III and IV."""
+"""Tables III and IV of Bhardwaj, Mishra, Sukavanam and Balasubramanian, as printed."""
 
 from __future__ import annotations
 
@@ -31,6 +31,11 @@ class Case(NamedTuple):
     cost: float
     energy: float
     peak_torque_Nm: float
+
+    @property
+    def step_m(self) -> tuple[float, float]:
+        """Tread and rise of one step."""
+        return self.stair_length_m / 2, self.stair_length_m / 2 * self.rise_run_ratio
 
 
 TABLE_4 = {

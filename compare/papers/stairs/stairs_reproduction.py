@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from compare.papers.paper_runs import Runner
+import numpy as np
+
+from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_replay, stairs_runs
+from compare.papers.stairs import stairs_motion, stairs_runs
 from compare.papers.stairs.stairs_figures import draw_figures
-from compare.papers.stairs.stairs_paper import TABLE_3
-from compare.papers.stairs.stairs_replay import FEEDBACK, STEP_S
+from compare.papers.stairs.stairs_motion import FEEDBACK, STEP_S
+from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import (
     ALGORITHMS,
     LOST_RAD,
     RULES,
     StairsEffort,
+    StairsFindings,
     make_computations,
     make_first_tasks,
+    make_other_spec,
     make_track_spec,
     make_track_tasks,
 )
-from compare.papers.stairs.stairs_tables import StairsFindings, make_tables
+from compare.report.document import Rows, Value
+from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
@@ -31,10 +38,9 @@ NEAR_BOUND = 0.01  # of a gain's range
 
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
-    runs = runner.run_tasks(make_first_tasks(effort))
-    runs |= runner.run_tasks(make_track_tasks(effort, runs))
-    steps = runner.compute(make_computations(effort, runs), code=(stairs_runs, stairs_replay))
-    return StairsFindings(effort=effort, runs=runs, steps=steps)
+    findings = StairsFindings(effort=effort, runs=runner.run_tasks(make_first_tasks(effort)))
+    findings.runs.update(runner.run_tasks(make_track_tasks(findings)))
+    return replace(findings, others=runner.compute([*make_computations(findings)], (stairs_runs, stairs_motion)))
 
 
 def compute_values(findings: StairsFindings) -> dict[str, Any]:
@@ -79,7 +85,7 @@ def _count_gains_at_bounds(findings: StairsFindings) -> dict[str, Any]:
 
 def _compute_growth(findings: StairsFindings) -> dict[str, Any]:
     """How fast the open-loop error grows in the replay, and when the pose is lost."""
-    replays = [findings.steps[f"replay-{case}"] for case in findings.cases]
+    replays = [findings.others[f"replay-{case}"] for case in findings.cases]
     tenths = 10 * (PAPER_TIMES[1] - PAPER_TIMES[0])
     factors = [(replay["open_loop_t2_rad"] / replay["open_loop_t1_rad"]) ** (1 / tenths) for replay in replays]
     lost = [replay["open_loop_lost_s"] - PAPER_TIMES[1] for replay in replays if replay["open_loop_lost_s"] is not None]
@@ -88,6 +94,173 @@ def _compute_growth(findings: StairsFindings) -> dict[str, Any]:
         "growth": f"{min(factors):.1f} to {max(factors):.1f}",
         "lost": f"{when} ({len(lost)} of {len(replays)} cases)",
     }
+
+
+MATCH = 1e-3  # relative: a start that ends this close to the best has found it
+# Tables of a result in each case, by name: the result, and its keys.
+PICKED = {
+    "printed-scheme": (
+        "printed",
+        ("explicit_quanta", "implicit_largest_error_rad", "compensated_largest_error_rad"),
+    ),
+    "replay": (
+        "replay",
+        ("feedback_end_rad", "open_loop_t1_rad", "open_loop_t2_rad", "open_loop_lost_s", "open_loop_end_rad"),
+    ),
+    "learned": (
+        "learned",
+        ("closed-form cost", "network cost", "largest_angle_error_rad", "mean_angle_error_rad"),
+    ),
+}
+# Rows of Table IV: words, name in the paper's table and in our result, and where in our results.
+QUANTITIES = (
+    ("largest joint acceleration [rad/s^2]", "acceleration", "differences"),
+    ("largest joint jerk [rad/s^3]", "jerk", "differences"),
+    ("torso pitch [rad]", "torso_pitch_rad", "x"),
+    ("K_p", "kp", "x"),
+    ("K_d", "kd", "x"),
+    ("cost", "cost", "verdict"),
+    ("energy (paper: no unit; ours: J)", "energy_J", "verdict"),
+    ("peak torque [N m]", "peak_torque_Nm", "verdict"),
+)
+
+
+def make_tables(findings: StairsFindings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
+    return {
+        "table3": _list_table_3(findings),
+        "plans": [row for case in findings.cases for row in _list_plans(findings, case)],
+        "table4": _list_table_4(findings),
+        "tracks": [row for case in findings.cases for row in _list_tracks(findings, case)],
+        "fixed-hip": [_list_fixed_hip(findings, case) for case in findings.cases],
+        "ideal": [_list_ideal(findings, case) for case in findings.cases],
+        "jerk": [_list_jerk(findings, case) for case in findings.cases],
+        "other-stairs": _list_other_stairs(findings),
+        "network": _list_network(findings.others["network"]),
+        "differences": [_list_differences(findings, case) for case in findings.cases],
+        **{name: _list_results(findings, *picked) for name, picked in PICKED.items()},
+    }
+
+
+def _list_results(findings: StairsFindings, step: str, keys: Sequence[str]) -> Rows:
+    """Values of a result in each case."""
+    return [[case, *(findings.others[f"{step}-{case}"][key] for key in keys)] for case in findings.cases]
+
+
+def _list_table_3(findings: StairsFindings) -> Rows:
+    plans = [findings.plan(case) for case in findings.cases]
+    rows = []
+    for name in [variable.name for variable in GOVERNING_VARIABLES]:
+        printed = f"{TABLE_3[name]:g}" if name in TABLE_3 else None
+        rows.append([name, printed, *(plan[name] for plan in plans)])
+    return rows
+
+
+def _list_plans(findings: StairsFindings, case: int) -> Rows:
+    """Best plan of each solver, with the ends of all its runs."""
+    rows: list[Sequence[Value]] = []
+    for solver in (IPOPT, *ALGORITHMS):
+        runs, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
+        every = ", ".join(f"{value:.2f}" for value in list_objectives(runs))
+        if solver == IPOPT:
+            ends = list_objectives(run for run in runs if run.claimed)
+            hits = sum(value <= verdict.objective * (1 + MATCH) for value in ends)
+            every = f"{hits} of {len(runs)} starts, {len(ends)} converged"
+        between = "feasible" if verdict.dense_feasible else verdict.violated[0]
+        rows.append([case, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(runs)])
+    return rows
+
+
+def _compute_time_s(runs: Sequence[RunRecord]) -> float:
+    return float(np.mean([run.time_s.solve for run in runs]))
+
+
+def _list_table_4(findings: StairsFindings) -> Rows:
+    """The paper's quantities in each case, then ours: of the desired angles, and of the best tracked step."""
+    rows = []
+    for words, name, where in QUANTITIES:
+        ours = []
+        for case in findings.cases:
+            track = findings.best_track(case)
+            places = {
+                "differences": findings.others[f"differences-plan-{case}"],
+                "x": track.x,
+                "verdict": {"cost": track.verdict.objective, **track.verdict.indexes},
+            }
+            ours.append(places[where][name])
+        printed = [float(getattr(TABLE_4[case], name.removesuffix("_J"))) for case in findings.cases]
+        rows.append([words, *printed, *ours])
+    return rows
+
+
+def _list_tracks(findings: StairsFindings, case: int) -> Rows:
+    """Best run of each solver beside the ideal."""
+    ideal = findings.best("ideal", case).verdict.indexes["energy_J"]
+    rows: list[Sequence[Value]] = []
+    for solver in (*ALGORITHMS, IPOPT):
+        run = findings.best("track", case, solver)
+        verdict, own = run.verdict, run.verdict.indexes
+        energies = [own["energy_J"], ideal, own["energy_J"] - ideal]
+        others = [own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]
+        rows.append([case, solver, verdict.objective, verdict.feasible, *energies, *others])
+    return rows
+
+
+def _list_ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
+    """Full trajectory optimisation."""
+    runs, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
+    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in runs)
+    energies = [verdict.indexes["energy_J"], findings.best("plan", case).verdict.objective]
+    others = [verdict.indexes["peak_torque_Nm"], verdict.indexes["torso_pitch_rad"]]
+    return [case, verdict.objective, every, *energies, *others, _compute_time_s(runs)]
+
+
+def _list_jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
+    """Plan of least peak jerk."""
+    verdict = findings.best("jerk", case).verdict
+    return [case, TABLE_4[case].jerk, verdict.objective, verdict.indexes["energy_J"]]
+
+
+def _list_fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
+    """Plans with the paper's hip height."""
+    runs, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
+    feasible = sum(run.verdict.feasible for run in runs)
+    return [case, f"{feasible} of {len(runs)}", "; ".join(verdict.violated[:3]) or "nothing"]
+
+
+def _list_differences(findings: StairsFindings, case: int) -> Sequence[Value]:
+    """Largest acceleration and jerk by differences over 0.01 s: the paper's, and those of both plans."""
+    plans = [findings.others[f"differences-{least}-{case}"] for least in ("plan", "jerk")]
+    of_kind = [(getattr(TABLE_4[case], kind), *(plan[kind] for plan in plans)) for kind in ("acceleration", "jerk")]
+    return [case, *of_kind[0], *of_kind[1]]
+
+
+def _list_other_stairs(findings: StairsFindings) -> Rows:
+    """Stairs that the paper did not try."""
+    rows = []
+    for tread, rise in findings.effort.other_stairs:
+        cells: list[Value] = [tread, rise]
+        for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
+            run = choose_best(findings.runs[make_other_spec(findings.effort, name, tread, rise).title, IPOPT])
+            worst = ", ".join(run.verdict.violated[:3])
+            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; violated: {worst}")
+        rows.append(cells)
+    return rows
+
+
+def _list_network(network: Mapping[str, Any]) -> Rows:
+    return [
+        [
+            rule,
+            f"{found['converged']} of {found['poses']}",
+            float(np.mean(found["iterations"])),
+            1e3 * found["time_s"][0],
+            1e3 * float(np.mean(found["time_s"][1:])),
+            found["largest_angle_error_rad"],
+            found["mean_angle_error_rad"],
+        ]
+        for rule, found in network.items()
+    ]
 
 
 REPRODUCTION = Reproduction(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, get_args
@@ -10,16 +10,22 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.paper_runs import Effort, Runs, choose_best, get_point, make_search_tasks, make_start_tasks
-from compare.papers.stairs.stairs_motion import swing_leg
+from compare.papers.paper_runs import (
+    Effort,
+    Runs,
+    choose_best,
+    get_point,
+    make_computation,
+    make_search_tasks,
+    make_start_tasks,
+)
+from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay, swing_leg
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_replay import FEEDBACK, OPEN_LOOP, replay
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.closed_loop import InverseKinematics
 from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, network_angles
@@ -43,39 +49,24 @@ RULES = {
     "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
     "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
 }
-PER_CASE = 5  # steps beside the runs: see ``_make_case_computations``
+PER_CASE = 5  # see ``make_computations``
 
 
 @dataclass(frozen=True, kw_only=True)
 class StairsEffort(Effort):
-    """Effort of the stairs reproduction.
-
-    Attributes:
-        cases: of Table IV.
-        plan_starts: of IPOPT on the plan of least energy.
-        jerk_starts: on that of least peak jerk.
-        hip_starts: on the plan of least energy with the paper's hip height.
-        ideal_starts: on the ideal.
-        runs: of each search.
-        plan_evaluations: of a search for a plan.
-        track_evaluations: of a search for gains, as in the paper.
-        track_settings: of IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
-        other_stairs: tread and rise of one step that the paper did not try [m]; a rise of ``IMPOSSIBLE_RISE_M`` is impossible.
-        other_starts: of IPOPT on the plan there.
-        poses: of the swing leg for which the network is trained.
-        plan_intervals: between the samples of a plan.
-        ideal_intervals: between those of the ideal.
-    """
+    """Effort of the stairs reproduction."""
 
     cases: tuple[int, ...] = tuple(TABLE_4)
-    plan_starts: int = 20
-    jerk_starts: int = 5
-    hip_starts: int = 6
+    plan_starts: int = 20  # of IPOPT on the plan of least energy
+    jerk_starts: int = 5  # on that of least peak jerk
+    hip_starts: int = 6  # on the plan of least energy with the paper's hip height
     ideal_starts: int = 3
-    runs: int = 3
+    runs: int = 3  # of each search
     plan_evaluations: int = 10_000
-    track_evaluations: int = ANTS * ITERATIONS
+    track_evaluations: int = ANTS * ITERATIONS  # as in the paper
+    # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
     track_settings: Mapping[str, float | str] = field(default_factory=lambda: {"time_limit_s": 1200.0})
+    # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
     other_stairs: tuple[tuple[float, float], ...] = (
         (0.30, 0.10),
         (0.30, 0.13),
@@ -83,17 +74,21 @@ class StairsEffort(Effort):
         (0.26, 0.20),
         (0.254, 0.50),
     )
-    other_starts: int = 8
-    poses: int = 351
+    other_starts: int = 8  # of IPOPT on the plan there
+    poses: int = 351  # of the swing leg for which the network is trained
     plan_intervals: int = 40
     ideal_intervals: int = 70
+
+    def count_other_starts(self, rise: float) -> int:
+        """Return the number of starts on a stair that the paper did not try."""
+        return min(3, self.other_starts) if rise >= IMPOSSIBLE_RISE_M else self.other_starts
 
     @property
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
         case = gradient + 2 * len(ALGORITHMS) * self.runs + PER_CASE
-        others = sum(1 + _count_other_starts(self, rise) for _, rise in self.other_stairs)
+        others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2
 
 
@@ -102,13 +97,6 @@ def make_plan_spec(effort: StairsEffort, case: int, minimise: str = "energy") ->
     label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
     options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
     return ProblemSpec(name="stairs-plan", options=options, values=get_stair(case), label=label)
-
-
-def make_hip_spec(effort: StairsEffort, case: int) -> ProblemSpec:
-    """Return the planner of a case with the paper's hip height."""
-    fixed = {f"hip_height_m.{end}": TABLE_3["hip_height_m"] for end in ("lower", "upper")}
-    spec = make_plan_spec(effort, case)
-    return replace(spec, values={**spec.values, **fixed}, label=f"hip-{case}")
 
 
 def make_ideal_spec(effort: StairsEffort, case: int) -> ProblemSpec:
@@ -136,93 +124,85 @@ def get_stair(case: int) -> dict[str, float]:
     return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}
 
 
+@dataclass(frozen=True, kw_only=True)
+class StairsFindings:
+    """All results of the reproduction: runs by title of the problem and solver, other results by name."""
+
+    effort: StairsEffort
+    runs: Runs
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> Sequence[int]:
+        """Cases of Table IV."""
+        return self.effort.cases
+
+    def best(self, what: str, case: int, solver: str = IPOPT) -> RunRecord:
+        """Return the best run of a solver on the ``plan``, ``jerk``, ``ideal`` or ``track`` of a case."""
+        return choose_best(self.runs[f"{what}-{case}", solver])
+
+    def plan(self, case: int, what: str = "plan") -> dict[str, float]:
+        """Return the best plan of a case, with the parameters that are not its variables."""
+        problem = make_plan_spec(self.effort, case).load()
+        names = ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
+        return {**self.best(what, case).x, **{name: problem.value(name) for name in names}}
+
+    def best_track(self, case: int) -> RunRecord:
+        """Return the best run of any solver on the track of a case, a feasible one if there is one."""
+        records = [record for name in (*ALGORITHMS, IPOPT) for record in self.runs[f"track-{case}", name]]
+        return min(records, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
+
+
 def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
     """Yield ideals and plans, on the paper's stairs and on others."""
+    height = TABLE_3["hip_height_m"]
     for case in effort.cases:
+        plan = make_plan_spec(effort, case)
+        fixed = {**plan.values, "hip_height_m.lower": height, "hip_height_m.upper": height}
         yield from make_start_tasks(make_ideal_spec(effort, case), effort.ideal_starts, seed=case)
-        yield from make_start_tasks(make_plan_spec(effort, case), effort.plan_starts)
+        yield from make_start_tasks(plan, effort.plan_starts)
         yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts)
-        yield from make_start_tasks(make_hip_spec(effort, case), effort.hip_starts)
+        yield from make_start_tasks(replace(plan, values=fixed, label=f"hip-{case}"), effort.hip_starts)
         for name, algorithm in ALGORITHMS.items():
-            yield from make_search_tasks(
-                make_plan_spec(effort, case), name, algorithm, effort.runs, effort.plan_evaluations
-            )
+            yield from make_search_tasks(plan, name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
         settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
-        for name, count in (("stairs-plan", _count_other_starts(effort, rise)), ("stairs-ideal", 1)):
+        for name, count in (("stairs-plan", effort.count_other_starts(rise)), ("stairs-ideal", 1)):
             yield from make_start_tasks(make_other_spec(effort, name, tread, rise), count, settings=settings)
 
 
-def _count_other_starts(effort: StairsEffort, rise: float) -> int:
-    return min(3, effort.other_starts) if rise >= IMPOSSIBLE_RISE_M else effort.other_starts
-
-
-def make_track_tasks(effort: StairsEffort, runs: Runs) -> Iterator[Task]:
+def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield searches and IPOPT for the gains and torso pitch that track the plans of least energy."""
+    effort = findings.effort
     for case in effort.cases:
-        spec = make_track_spec(case, choose_plan(runs, case))
+        spec = make_track_spec(case, findings.plan(case))
         for name, algorithm in ALGORITHMS.items():
             yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.track_evaluations)
         yield Task(problem=spec, solver=IPOPT, settings=effort.track_settings, start=TRACK_START)
 
 
-def choose_plan(runs: Runs, case: int, minimise: str = "energy") -> dict[str, float]:
-    """Return the best plan that IPOPT found in a case."""
-    return dict(choose_best(runs[f"{'plan' if minimise == 'energy' else minimise}-{case}", IPOPT]).x)
-
-
-def choose_best_track(runs: Runs, case: int) -> RunRecord:
-    """Best run of any solver on the track of a case, a feasible one if there is one."""
-    found = [record for name in (*ALGORITHMS, IPOPT) for record in runs[f"track-{case}", name]]
-    return min(found, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
-
-
-def complete_plan(effort: StairsEffort, case: int, plan: Mapping[str, float]) -> dict[str, float]:
-    """Return a plan with the parameters that are not its variables."""
-    problem = make_plan_spec(effort, case).load()
-    given = {name: problem.value(name) for name in ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")}
-    return {**plan, **given}
-
-
-def make_computations(effort: StairsEffort, runs: Runs) -> list[Computation]:
-    """Return what is computed from the runs without being a run of a solver."""
-    first = effort.cases[0]
-    plan = complete_plan(effort, first, choose_plan(runs, first))
-    trained = Computation(
-        name="network",
-        inputs={**fingerprint(make_plan_spec(effort, first).load()), "plan": plan, "poses": effort.poses},
-        function=partial(train_network, first, plan, effort.poses),
-    )
-    return [trained, *(step for case in effort.cases for step in _make_case_computations(effort, case, runs))]
-
-
-def _make_case_computations(effort: StairsEffort, case: int, runs: Runs) -> Iterator[Computation]:
-    """Replay of the ideal, the printed scheme, differences of both plans, and the network in the loop."""
-    ideal, plan = get_point(choose_best(runs[f"ideal-{case}", IPOPT])), choose_plan(runs, case)
-    spec = make_ideal_spec(effort, case)
-    yield _make_computation("replay", case, spec, partial(replay_ideal, spec), x=ideal)
-    yield _make_computation("printed", case, make_track_spec(case, plan), partial(run_printed_scheme, case), plan=plan)
-    for name in ("energy", "jerk"):
-        used = choose_plan(runs, case, name)
-        yield _make_computation(
-            f"differences-{name}", case, make_track_spec(case, used), partial(difference_angles, case), plan=used
-        )
-    x = get_point(choose_best_track(runs, case))
-    yield _make_computation(
-        "learned", case, make_track_spec(case, plan), partial(track_with_network, case), plan=plan, x=x
-    )
-
-
-def _make_computation(name: str, case: int, spec: ProblemSpec, compute: Any, **arguments: Any) -> Computation:
-    inputs = {**fingerprint(spec.load()), **arguments}
-    return Computation(name=f"{name}-{case}", inputs=inputs, function=partial(compute, **arguments))
+def make_computations(findings: StairsFindings) -> Iterator[Computation]:
+    """Yield the network, and in each case the replay, the printed scheme, differences of both plans, the network in the loop."""
+    effort, first = findings.effort, findings.cases[0]
+    plan_spec, plan = make_plan_spec(effort, first), findings.plan(first)
+    yield make_computation("network", plan_spec, train_network, case=first, plan=plan, poses=effort.poses)
+    for case in effort.cases:
+        ideal, plan = make_ideal_spec(effort, case), findings.plan(case)
+        track, x = make_track_spec(case, plan), get_point(findings.best_track(case))
+        ideal_x = get_point(findings.best("ideal", case))
+        yield make_computation(f"replay-{case}", ideal, partial(replay_ideal, ideal), x=ideal_x)
+        yield make_computation(f"printed-{case}", track, run_printed_scheme, case=case, plan=plan)
+        for what in ("plan", "jerk"):
+            used = findings.plan(case, what)
+            spec = make_track_spec(case, used)
+            yield make_computation(f"differences-{what}-{case}", spec, difference_angles, case=case, plan=used)
+        yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
 
 
 def train_network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
     """Train the network on poses of a plan's swing leg: convergence, time and error against the closed form."""
-    tread = TABLE_4[case].stair_length_m / 2
     times = np.linspace(0.0, plan["t3_s"], poses)
-    q, hip_to_ankle = swing_leg(plan, tread, tread * TABLE_4[case].rise_run_ratio, times)
+    q, hip_to_ankle = swing_leg(plan, *TABLE_4[case].step_m, times)
     robot = toe_foot_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
     found = {}

@@ -10,9 +10,9 @@ import numpy as np
 
 from compare.drawing.figures import COLOURS, new_figure
 from compare.papers.paper_runs import get_point
+from compare.papers.walk12.walk12_findings import Walk12Findings
 from compare.papers.walk12.walk12_paper import find_row
 from compare.papers.walk12.walk12_runs import GA, PAPER, PathPoint
-from compare.papers.walk12.walk12_tables import Walk12Findings
 from compare.study.record import RunRecord
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped

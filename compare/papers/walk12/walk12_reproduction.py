@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
@@ -12,8 +12,12 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.walk12 import walk12_runs
-from compare.papers.walk12.walk12_errata import compute_corner_slopes, compute_hip_miss
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
+from compare.papers.walk12.walk12_findings import (
+    Walk12Findings,
+    compute_corner_slopes,
+    compute_hip_miss,
+)
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
 from compare.papers.walk12.walk12_runs import (
     CORNER_M,
@@ -25,12 +29,13 @@ from compare.papers.walk12.walk12_runs import (
     PathPoint,
     Walk12Effort,
     compute_f1,
+    find_f1max,
     make_first_tasks,
     make_paths,
     make_second_tasks,
+    title_table_4,
 )
-from compare.papers.walk12.walk12_tables import SAME_OPTIMUM, Walk12Findings, get_dense, list_f, make_tables
-from compare.report.document import Table
+from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
@@ -65,12 +70,17 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
 
 def compute_values(findings: Walk12Findings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
-    return {**_settings(findings), **_normalisation(findings), **_tradeoff(findings), **_errata(findings)}
+    return {
+        **_compute_settings(findings),
+        **_compute_normalisation(findings),
+        **_compute_tradeoff(findings),
+        **_compute_errata(findings),
+    }
 
 
-def _settings(findings: Walk12Findings) -> dict[str, Any]:
+def _compute_settings(findings: Walk12Findings) -> dict[str, Any]:
     problem, robot, effort = load("walk12"), point_mass_biped(), findings.effort
-    lengths = _step_lengths()
+    lengths = _get_step_lengths()
     return {
         "ga_evaluations": GA_EVALUATIONS,
         "pso_evaluations": effort.pso_evaluations,
@@ -95,20 +105,20 @@ def _settings(findings: Walk12Findings) -> dict[str, Any]:
     }
 
 
-def _step_lengths() -> tuple[float, float]:
+def _get_step_lengths() -> tuple[float, float]:
     """Bounds of the step length [m]."""
     problem = load("walk12")
     return problem.value("step_length_m.lower"), problem.value("step_length_m.upper")
 
 
-def _normalisation(findings: Walk12Findings) -> dict[str, Any]:
+def _compute_normalisation(findings: Walk12Findings) -> dict[str, Any]:
     ga = list_f(findings.records(PAPER, 1.0, "ga"))
-    optima = zip(TABLE_3, list_objectives(_optima(findings, MODEL)), strict=True)
+    optima = zip(TABLE_3, list_objectives(_list_optima(findings, MODEL)), strict=True)
     gaps = {row.weight: row.f - f for row, f in optima}
     leads = {
         f"lead_{label}": compute_range(
             get_dense(optimum)["f"] - f
-            for optimum, f in zip(_optima(findings, label), findings.f_of_printed_gaits(label), strict=True)
+            for optimum, f in zip(_list_optima(findings, label), findings.f_of_printed_gaits(label), strict=True)
         )
         for label in (PAPER, MODEL)
     }
@@ -121,12 +131,12 @@ def _normalisation(findings: Walk12Findings) -> dict[str, Any]:
     }
 
 
-def _optima(findings: Walk12Findings, label: str) -> list[RunRecord]:
+def _list_optima(findings: Walk12Findings, label: str) -> list[RunRecord]:
     return [findings.optimum(label, row.weight) for row in TABLE_3]
 
 
-def _tradeoff(findings: Walk12Findings) -> dict[str, Any]:
-    weighted, (shortest, longest) = findings.weighted, _step_lengths()
+def _compute_tradeoff(findings: Walk12Findings) -> dict[str, Any]:
+    weighted, (shortest, longest) = findings.weighted, _get_step_lengths()
     s, Q = np.array([(point.step_length_m, point.Q_m2s) for point in findings.front]).T
     rise = (1 / Q[:-1] - 1 / Q[-1]) / (s[-1] - s[:-1])  # of f1, from the longest step to each shorter one
     return {
@@ -139,7 +149,7 @@ def _tradeoff(findings: Walk12Findings) -> dict[str, Any]:
     }
 
 
-def _errata(findings: Walk12Findings) -> dict[str, Any]:
+def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
     exact = np.array(findings.f1_of_table_3)
     changes = {
         zmp: compute_range(100 * (np.array([compute_f1(row, zmp=zmp) for row in TABLE_3]) / exact - 1))
@@ -157,17 +167,88 @@ def _errata(findings: Walk12Findings) -> dict[str, Any]:
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "stable": findings.stable[-1],
-        "trend": {"implied": _trend(implied), **{horizon: _trend(values) for horizon, values in f1.items()}},
+        "trend": {
+            "implied": _describe_trend(implied),
+            **{horizon: _describe_trend(values) for horizon, values in f1.items()},
+        },
         "horizon_gap": compute_range(100 * abs(f / wanted - 1) for f, wanted in zip(f1["1s"], implied, strict=True)),
     }
 
 
-def _trend(values: Iterable[float]) -> str:
+def _describe_trend(values: Iterable[float]) -> str:
     """How f1 changes along the rows of Table IV, whose steps get shorter."""
     changes = np.diff(list(values))
     if (changes > 0).all():
         return "rises throughout"
     return "falls throughout" if (changes < 0).all() else "rises and falls"
+
+
+SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
+SEARCHES = ("ga", "pso")
+
+
+def get_dense(record: RunRecord) -> Mapping[str, float]:
+    """Return the judge's indexes on the dense grid, which this problem has."""
+    return record.verdict.dense or {}
+
+
+def list_f(records: Sequence[RunRecord]) -> list[float]:
+    """Return f at the end of each run; minus infinity without a feasible gait."""
+    return [r.verdict.objective if r.verdict.feasible else -math.inf for r in records]
+
+
+def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
+    """Return rows by name; headings and formats are in the report's template."""
+    return {
+        "table3-paper": _list_table_3(findings, PAPER),
+        "table3-model": _list_table_3(findings, MODEL),
+        "gaits": _list_gaits(findings),
+        "table4": _list_table_4(findings),
+    }
+
+
+def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
+    """f of the paper's gait and of every solver under one normalisation."""
+    rows = []
+    for row, of_printed_gait in zip(TABLE_3, findings.f_of_printed_gaits(label), strict=True):
+        cells: list[Value] = [row.weight, row.f, of_printed_gait]
+        for name in SEARCHES:
+            f = list_f(findings.records(label, row.weight, name))
+            cells += [max(f), float(np.median(f)), min(f)]
+        begun, optimum = findings.records(label, row.weight, IPOPT), findings.optimum(label, row.weight)
+        f_best = optimum.verdict.objective
+        agreeing = sum(r.claimed and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
+        time_s = float(np.median([r.time_s.solve for r in begun]))
+        rows.append([*cells, f_best, get_dense(optimum)["f"], agreeing, time_s])
+    return rows
+
+
+def _list_gaits(findings: Walk12Findings) -> Rows:
+    """Gaits behind Table III under the paper's normalisation, and how long each is statically stable."""
+    rows: list[Sequence[Value]] = []
+    for row, f1, stable in zip(TABLE_3, findings.f1_of_table_3, findings.stable, strict=True):
+        rows.append([row.weight, "paper", *row.x, f1, stable.share])
+        for solver in (*SEARCHES, IPOPT):
+            found = choose_best(findings.records(PAPER, row.weight, solver))
+            figures = get_dense(found)
+            rows.append([row.weight, solver.upper(), *get_point(found), figures["f1_per_m2s"], figures["stable_share"]])
+    return rows
+
+
+def _list_table_4(findings: Walk12Findings) -> Rows:
+    """The paper's step times under both horizons of Q."""
+    rows: list[Sequence[Value]] = []
+    for row in TABLE_4:
+        for horizon in HORIZONS:
+            optimum = choose_best(findings.runs[title_table_4(row, horizon), IPOPT])
+            words = {"step": "0 to T", "1s": "1 s"}[horizon]
+            ours = [
+                compute_f1(row, horizon=horizon),
+                find_f1max(findings.runs, title_table_4(row, horizon, most_stable=True)),
+            ]
+            ours += [optimum.verdict.objective, *get_point(optimum)]
+            rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
+    return rows
 
 
 REPRODUCTION = Reproduction(

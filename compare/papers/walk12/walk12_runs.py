@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from itertools import product
 from typing import Any, get_args
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.paper_runs import Effort, Runs, choose_best, make_search_tasks, make_start_tasks
+from compare.papers.paper_runs import Effort, Runs, choose_best, make_computation, make_search_tasks, make_start_tasks
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.continuation import Continuation
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.walk12.problem import Horizon
@@ -30,23 +29,16 @@ MOMENT_FREE_WEIGHTS = (0.15, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Walk12Effort(Effort):
-    """Effort of the reproduction of the 12-joint walk.
+    """Effort of the reproduction of the 12-joint walk."""
 
-    Attributes:
-        starts: of IPOPT on each problem.
-        runs: of each search.
-        pso_evaluations: of a run of PSO; the GA has the paper's.
-        weights: of the trade-off curve, dense where the optimum moves from one plateau to the other.
-        lengths_m: step lengths of the Pareto front.
-    """
-
-    starts: int = 20
-    runs: int = 10
-    pso_evaluations: int = 10_000
+    starts: int = 20  # of IPOPT on each problem
+    runs: int = 10  # of each search
+    pso_evaluations: int = 10_000  # the GA has the paper's
+    # Of the trade-off curve, dense where the optimum moves from one plateau to the other.
     weights: tuple[float, ...] = tuple(
         np.unique(np.round([*np.linspace(0, 1, 21), *np.linspace(0.66, 0.78, 49)], 4)).tolist()
     )
-    lengths_m: tuple[float, ...] = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())
+    lengths_m: tuple[float, ...] = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())  # steps of the Pareto front
 
     @property
     def steps(self) -> int:
@@ -82,35 +74,47 @@ def load_walk12(**options: str) -> GaitProblem:
 
 def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
     """Yield Table III under the paper's f1max, the most stable gaits of Table IV, and the runs for the errata."""
-    yield from _table_3(effort, PAPER, F1MAX)
-    for row in TABLE_4:
-        for horizon in HORIZONS:
-            yield from make_start_tasks(_row_of_table_4(row, horizon), effort.starts)
+    yield from _make_table_3(effort, PAPER, F1MAX)
+    for row, horizon in product(TABLE_4, HORIZONS):
+        title = title_table_4(row, horizon, most_stable=True)
+        most_stable = _make_spec(title, 1.0, F1MAX, {"horizon": horizon}, step_time_s=row.step_time_s)
+        yield from make_start_tasks(most_stable, effort.starts)
     for weight in MOMENT_FREE_WEIGHTS:
-        free = _spec(f"moment-free-{weight:g}", {"zmp": "moment-free"}, {"lambda": weight, "f1max": F1MAX})
+        free = _make_spec(f"moment-free-{weight:g}", weight, F1MAX, {"zmp": "moment-free"})
         yield from make_start_tasks(free, effort.starts)
-    corner = _spec("corner", {}, {"lambda": 0.15, "f1max": F1MAX})
+    corner = _make_spec("corner", 0.15, F1MAX)
     yield Task(problem=corner, solver=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
 
 
 def make_second_tasks(effort: Walk12Effort, runs: Runs) -> Iterator[Task]:
     """Yield the tasks that need the model's own f1max: Table III under it, and Table IV."""
-    yield from _table_3(effort, MODEL, find_own_f1max(runs))
-    for row in TABLE_4:
-        for horizon in HORIZONS:
-            yield from make_start_tasks(
-                _row_of_table_4(row, horizon, find_f1max_of_row(runs, row, horizon)), effort.starts
-            )
+    yield from _make_table_3(effort, MODEL, find_f1max(runs, title_table_3(PAPER, 1.0)))
+    for row, horizon in product(TABLE_4, HORIZONS):
+        f1max = find_f1max(runs, title_table_4(row, horizon, most_stable=True))
+        options, title = {"horizon": horizon}, title_table_4(row, horizon)
+        spec = _make_spec(title, row.weight, f1max, options, step_time_s=row.step_time_s)
+        yield from make_start_tasks(spec, effort.starts)
 
 
-def find_own_f1max(runs: Runs) -> float:
-    """Return the largest f1 of the model [1/(m^2 s)]: with ``--set f1max=...`` f of the most stable gait is 1."""
-    return choose_best(runs[title_table_3(PAPER, 1.0), IPOPT]).verdict.objective * F1MAX
+def _make_table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:
+    for row in TABLE_3:
+        spec = _make_spec(title_table_3(label, row.weight), row.weight, f1max)
+        yield from make_start_tasks(spec, effort.starts)
+        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from make_search_tasks(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
 
 
-def find_f1max_of_row(runs: Runs, row: PaperRow, horizon: Horizon) -> float:
-    """Return the largest f1 of the model at a step time and a horizon of Q [1/(m^2 s)]."""
-    return choose_best(runs[title_table_4(row, horizon, most_stable=True), IPOPT]).verdict.objective * F1MAX
+def _make_spec(
+    label: str, weight: float, f1max: float, options: Mapping[str, str] | None = None, **values: float
+) -> ProblemSpec:
+    return ProblemSpec(
+        name="walk12", options=options or {}, values={**values, "lambda": weight, "f1max": f1max}, label=label
+    )
+
+
+def find_f1max(runs: Runs, title: str) -> float:
+    """Return the model's f1 of a most stable gait [1/(m^2 s)]: with ``--set f1max=...`` its f is 1."""
+    return choose_best(runs[title, IPOPT]).verdict.objective * F1MAX
 
 
 def compute_f1(row: PaperRow, **options: str) -> float:
@@ -119,50 +123,28 @@ def compute_f1(row: PaperRow, **options: str) -> float:
     return (verdict.dense or {})["f1_per_m2s"]
 
 
-def _table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:
-    for row in TABLE_3:
-        spec = _spec(title_table_3(label, row.weight), {}, {"lambda": row.weight, "f1max": f1max})
-        yield from make_start_tasks(spec, effort.starts)
-        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
-        yield from make_search_tasks(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
-
-
-def _row_of_table_4(row: PaperRow, horizon: Horizon, f1max: float | None = None) -> ProblemSpec:
-    weight, normalisation = (1.0, F1MAX) if f1max is None else (row.weight, f1max)
-    values = {"step_time_s": row.step_time_s, "lambda": weight, "f1max": normalisation}
-    return _spec(title_table_4(row, horizon, most_stable=f1max is None), {"horizon": horizon}, values)
-
-
-def _spec(label: str, options: dict[str, str], values: dict[str, float]) -> ProblemSpec:
-    return ProblemSpec(name="walk12", options=options, values=values, label=label)
-
-
 def make_paths(effort: Walk12Effort) -> list[Computation]:
     """Return the weighted sum and the front: each optimum starts at the last one, so it is not a run by itself."""
-    computed = {"weighted-sum": (solve_weighted_sum, effort.weights), "front": (solve_front, effort.lengths_m)}
+    spec = ProblemSpec(name="walk12")
     return [
-        Computation(
-            name=name,
-            inputs={**fingerprint(load_walk12()), "starts": effort.starts, "at": list(at)},
-            function=partial(compute, at, effort.starts),
-        )
-        for name, (compute, at) in computed.items()
+        make_computation("weighted-sum", spec, solve_weighted_sum, weights=effort.weights, starts=effort.starts),
+        make_computation("front", spec, solve_front, lengths_m=effort.lengths_m, starts=effort.starts),
     ]
 
 
-def solve_weighted_sum(weights: Sequence[float], count: int) -> list[dict[str, Any]]:
+def solve_weighted_sum(weights: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the fields of ``PathPoint`` at each weight."""
-    return _follow([(w, load_walk12().with_values(**{"lambda": w, "f1max": F1MAX})) for w in weights], count)
+    return _follow([(w, load_walk12().with_values(**{"lambda": w, "f1max": F1MAX})) for w in weights], starts)
 
 
-def solve_front(lengths_m: Sequence[float], count: int) -> list[dict[str, Any]]:
+def solve_front(lengths_m: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the fields of ``PathPoint`` at each step length, of the largest f1 there: the Pareto front of Q and s."""
     most_stable = load_walk12().with_values(**{"lambda": 1.0})
-    return _follow([(s, most_stable.fix(step_length_m=s)) for s in lengths_m], count)
+    return _follow([(s, most_stable.fix(step_length_m=s)) for s in lengths_m], starts)
 
 
-def _follow(problems: Sequence[tuple[float, GaitProblem]], count: int) -> list[dict[str, Any]]:
-    path, found = Continuation(starts=count), []
+def _follow(problems: Sequence[tuple[float, GaitProblem]], starts: int) -> list[dict[str, Any]]:
+    path, found = Continuation(starts=starts), []
     for at, problem in problems:
         solution = path.solve(problem)
         Q = evaluate(problem, list(solution.x.values())).indexes["Q_m2s"]

@@ -13,9 +13,8 @@ from compare.judge import evaluate
 from compare.papers.nao.nao_claims import check_claims
 from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PHASES, SSP
-from compare.papers.nao.nao_reproduction import REPRODUCTION
+from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice
-from compare.papers.nao.nao_tables import compute_implied_a12
 from compare.study.record import RunRecord, read_record
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 

@@ -13,8 +13,6 @@ from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_reproduction import REPRODUCTION
 from compare.papers.nao_walk.nao_walk_runs import (
     KINDS,
-    PAPER_HEAT,
-    SHEET_HEAT,
     plan_own_walk,
     simulate_joints,
     sum_energy,
@@ -22,7 +20,6 @@ from compare.papers.nao_walk.nao_walk_runs import (
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, make_footsteps
 from compare.papers.reproduction import Verdict
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import predict_power
 from nlp_gait.simulation.plan import make_plan
 from tests.compare.papers.finished import check_report, recompute, reproduce
@@ -58,7 +55,7 @@ def make_findings(**changes: Any) -> NaoWalkFindings:
         for torso, knee, energy in ((0.315, 49.0, 70.0), (0.32, 41.0, 60.0))
     ]
     holding: dict[str, Any] = {
-        "speeds": {PAPER_HEAT: speeds, SHEET_HEAT: speeds},
+        "speeds": {"paper": speeds, "sheet": speeds},
         "torsos": torsos,
         "straighter": {"0.025": optimum(40.0), "0.5": optimum(30.0), "sheet": optimum(25.0)},
         "joints": {name: drawn(5.0) for name in ("own", "own-plain", "optimum-paper", "optimum-sheet")},
@@ -93,7 +90,7 @@ def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_j
     walk = plan_own_walk(make_footsteps())
     indexes = build_exact_model(walk.problem).at(walk.x, walk.problem.p).indexes
     assert indexes["speed_m_s"] == pytest.approx(SPEED_M_S, rel=1e-12)
-    found = simulate_joints(Drive(), {}, "", 2)
+    found = simulate_joints("torque", "", {}, 2)
     assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(found["planned_m"], rel=0.02)
     plan = make_plan(walk, 2)
     whole = predict_power(plan).total_W * plan.duration_s / found["planned_m"]
@@ -116,7 +113,7 @@ def test_the_report_from_end_to_end_and_again(tmp_path: Path, monkeypatch: pytes
 
         monkeypatch.setattr(nao_walk_runs, name, compute)
 
-    replace_run("solve_over_speed", findings.speeds[PAPER_HEAT])
+    replace_run("solve_over_speed", findings.speeds["paper"])
     replace_run("compute_heights", findings.torsos)
     replace_run("solve_free_height", optimum(30.0))
     replace_run("simulate_joints", drawn(5.0))

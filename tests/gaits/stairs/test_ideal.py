@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.papers.stairs.stairs_replay import FEEDBACK, OPEN_LOOP, replay
+from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 

@@ -1,19 +1,75 @@
-"""Errata of the paper on the 12-joint walk: the effect of each misprint or simplification, as a number."""
+"""Findings of the reproduced 12-joint walk, and errata: the effect of each misprint or simplification, as a number."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from compare.papers.walk12.walk12_paper import F1MAX
-from compare.papers.walk12.walk12_runs import CORNER_M, load_walk12
+from compare.papers.paper_runs import Runs, choose_best
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3
+from compare.papers.walk12.walk12_runs import (
+    CORNER_M,
+    PAPER,
+    PathPoint,
+    Walk12Effort,
+    compute_f1,
+    find_f1max,
+    load_walk12,
+    title_table_3,
+)
+from compare.study.record import RunRecord
+from compare.study.task import IPOPT
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.gaits.walk12.locomotion import locomotion
 from nlp_gait.gaits.walk12.robot import point_mass_biped
 
-STEP_M = 1e-4
+STEP_M = 1e-4  # of a difference quotient
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walk12Findings:
+    """All results of the reproduction.
+
+    Attributes:
+        effort: what was computed.
+        runs: by title of the problem and solver.
+        weighted: optima of the weighted sum over lambda.
+        front: largest f1 for each step length.
+    """
+
+    effort: Walk12Effort
+    runs: Runs
+    weighted: Sequence[PathPoint]
+    front: Sequence[PathPoint]
+    f1_of_table_3: Sequence[float] = field(default_factory=lambda: [compute_f1(row) for row in TABLE_3])
+
+    def records(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:
+        """Return the runs of a solver at a lambda under a normalisation."""
+        return self.runs[title_table_3(label, weight), solver]
+
+    def optimum(self, label: str, weight: float) -> RunRecord:
+        """Return IPOPT's best start at a lambda under a normalisation."""
+        return choose_best(self.records(label, weight, IPOPT))
+
+    @cached_property
+    def own_f1max(self) -> float:
+        """The model's largest f1 [1/(m^2 s)]."""
+        return find_f1max(self.runs, title_table_3(PAPER, 1.0))
+
+    @cached_property
+    def stable(self) -> Sequence[StableShare]:
+        """When each gait of Table III satisfies (8)."""
+        return [compute_stable_share(row.x) for row in TABLE_3]
+
+    def f_of_printed_gaits(self, label: str) -> list[float]:
+        """Return f of the printed gaits in the model under a normalisation, on the dense grid."""
+        f1max = F1MAX if label == PAPER else self.own_f1max
+        known = zip(TABLE_3, self.f1_of_table_3, strict=True)
+        return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
 
 
 @dataclass(frozen=True, kw_only=True)
