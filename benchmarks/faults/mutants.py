@@ -74,7 +74,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/processes.py": ("tests/compare/study/test_run_isolated.py", "tests/backends/test_starts.py"),
     "compare/study/import_runs.py": ("tests/compare/study/test_import_runs.py",),
     "compare/study/store.py": ("tests/compare/study/test_store.py",),
-    "compare/logs": ("tests/compare/logs/test_logs.py",),
+    "compare/logs.py": ("tests/compare/test_logs.py",),
     "compare/study/stored_solver.py": ("tests/compare/questions/test_resuming.py",),
 }
 OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {

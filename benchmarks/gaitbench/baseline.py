@@ -11,8 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from compare.bench.baseline import pack
-from compare.bench.tasks import BASELINE, RUNS, bench_tasks
+from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks, pack_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.task import Task
@@ -39,7 +38,9 @@ def main() -> None:
         for solver in solvers:
             started = time.perf_counter()
             study = Study(
-                tasks=tuple(limited(t) for t in bench_tasks([id], solver)), folder=arguments.work, jobs=arguments.jobs
+                tasks=tuple(limited(t) for t in make_bench_tasks([id], solver)),
+                folder=arguments.work,
+                jobs=arguments.jobs,
             )
             done = run_study(study)
             records += done
@@ -47,7 +48,7 @@ def main() -> None:
             took = time.perf_counter() - started
             print(f"{id}, {solver}: {feasible} of {RUNS} feasible ({took:.1f} s)", flush=True)
         if set(solvers) == set(BASELINE):
-            path = pack(id, records)
+            path = pack_records(id, records)
             print(f"{id}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 

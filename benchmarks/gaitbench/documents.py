@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from compare.bench.baseline import shipped
+from compare.bench.baseline import list_instances
 from nlp_gait import gaitbench
 from nlp_gait.files import write_json, write_text
 
@@ -47,7 +47,7 @@ def format_instances() -> str:
 
 def describe_shipped() -> str:
     """Return a sentence on the instances whose records are shipped."""
-    there, everything = shipped(), gaitbench.names()
+    there, everything = list_instances(), gaitbench.names()
     if set(there) >= set(everything):
         return "Records of all instances are shipped."
     return (

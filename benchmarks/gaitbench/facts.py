@@ -21,7 +21,7 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.bench.baseline import baseline_records, shipped
+from compare.bench.baseline import list_instances, load_baseline
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
@@ -173,10 +173,10 @@ def near(instance: Instance, point: Array) -> Iterator[Array]:
 
 def best_baseline_points(id: str) -> list[tuple[float, Array]]:
     """Return objective and point of the baseline's best feasible runs, the best first; empty without shipped records."""
-    if id not in shipped():
+    if id not in list_instances():
         return []
     runs = sorted(
-        (record for record in baseline_records(id) if record.verdict.feasible), key=lambda r: r.verdict.objective
+        (record for record in load_baseline(id) if record.verdict.feasible), key=lambda r: r.verdict.objective
     )
     return [(record.verdict.objective, np.array(list(record.x.values()))) for record in runs[:BASELINE_POINTS]]
 

@@ -1,1 +1,1 @@
-"""GaitBench's leaderboard: an algorithm's runs on the suite beside shipped records of others."""
+"""GaitBench's leaderboard: runs of a solver on the suite against shipped records of others."""

@@ -1,7 +1,7 @@
-"""Shipped records of the baseline: one compressed file an instance, with what the leaderboard needs of each run.
+"""The rules of GaitBench 1, and the shipped records of its baseline: one compressed file for each instance.
 
-What is left out of a record: time histories, the dense grid, prices and indexes; everything that an expected running time, a
-distribution or a test is made from stays.
+A packed record lacks time histories, the dense grid, prices and indexes; everything that an expected running time, a distribution
+or a test needs is kept.
 """
 
 from __future__ import annotations
@@ -9,23 +9,54 @@ from __future__ import annotations
 import gzip
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.task import ProblemSpec, Stop, Task
+from metaheuristics.interface import Algorithm
 from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file, replace_nan
 
+# Rules: the same runs, budget and seeds for all solvers.
+RUNS = 15
+EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
+SEED = 0
+BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
 FOLDER = Path(__file__).with_name("records")
 DIGITS = 12  # of numbers in the histories
 
 
-def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:
-    """Write the records of one instance, by solver; returns the file. Equal records give an equal file."""
+def make_bench_tasks(
+    instances: Sequence[str],
+    solver: str | Algorithm,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    label: str = "",
+    runs: int = RUNS,
+    evaluations: int = EVALUATIONS,
+    time_limit_s: float | None = None,
+) -> tuple[Task, ...]:
+    """Return every run of a solver on some instances."""
+    task = Task(
+        problem=ProblemSpec(name="gaitbench"),
+        solver=solver,
+        settings=settings or {},
+        label=label,
+        stop=Stop(evaluations=evaluations, time_limit_s=time_limit_s),
+        seed=SEED,
+    )
+    specs = [ProblemSpec(name="gaitbench", options={"instance": id}, label=id) for id in instances]
+    return tuple(replace(task, problem=spec, run=run) for spec in specs for run in range(runs))
+
+
+def pack_records(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:
+    """Write the records of one instance, and return the file. Equal records give an equal file."""
     solvers: dict[str, dict[str, Any]] = {}
     for record in records:
         if record.problem != instance:
@@ -36,7 +67,7 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
         entry = solvers.setdefault(record.solver, {"definition": shared, "settings": record.settings, "runs": []})
         if entry["definition"] != shared:
             raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
-        entry["runs"].append(_packed(record))
+        entry["runs"].append(_pack(record))
     text = json.dumps(replace_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
     path = folder / f"{instance}.json.gz"
     make_folder(folder)
@@ -45,14 +76,14 @@ def pack(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> 
     return path
 
 
-def shipped(folder: Path = FOLDER) -> tuple[str, ...]:
-    """Ids of the instances that have baseline records."""
+def list_instances(folder: Path = FOLDER) -> tuple[str, ...]:
+    """Return the ids of the instances with baseline records."""
     return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
 
 
 @cache
-def baseline_records(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]:
-    """Records of all solvers of the baseline on an instance.
+def load_baseline(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]:
+    """Return the records of all solvers of the baseline on an instance.
 
     Raises:
         InputError: none are shipped.
@@ -60,14 +91,14 @@ def baseline_records(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, .
     path = folder / f"{instance}.json.gz"
     if not path.is_file():
         raise InputError(
-            f"no baseline records of {instance!r} are shipped; those that are: {', '.join(shipped(folder))}"
+            f"no baseline records of {instance!r} are shipped; available: {', '.join(list_instances(folder))}"
         )
     solvers = json.loads(gzip.decompress(path.read_bytes()))["solvers"]
-    return tuple(_unpacked(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"])
+    return tuple(_unpack(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"])
 
 
-def _packed(record: RunRecord) -> dict[str, Any]:
-    """A run, its history thinned to the entries at which the best changed, and the last one."""
+def _pack(record: RunRecord) -> dict[str, Any]:
+    """Return a run with the entries of its history at which the best changed, and the last one."""
     evaluations, objective = [], []
     last = len(record.history.objective) - 1
     before: float | None = None
@@ -92,7 +123,7 @@ def _packed(record: RunRecord) -> dict[str, Any]:
     }
 
 
-def _unpacked(instance: str, solver: str, entry: dict[str, Any], run: dict[str, Any]) -> RunRecord:
+def _unpack(instance: str, solver: str, entry: dict[str, Any], run: dict[str, Any]) -> RunRecord:
     objective, violation, feasible = run["judged"]
     evaluations, values = run["history"]
     return RunRecord(

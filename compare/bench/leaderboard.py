@@ -1,4 +1,4 @@
-"""Who is where on the suite: places by expected running time and by solved targets, and tests against every other solver."""
+"""Ranking of the solvers on the suite: by expected running time and by solved targets, with tests against every other solver."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from compare.analysis.comparison import Comparison, SolverRuns, compare_problems
 from compare.analysis.statistics.distribution import ECDF_TARGETS
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
 from compare.analysis.statistics.run_length import TARGETS
-from compare.bench.baseline import baseline_records
+from compare.bench.baseline import load_baseline
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 
 ALPHA = 0.05
-# Relative gap below which two ends are the same: COCO's precision, too.
+# Relative gap below which two results are equal; also COCO's precision.
 SAME = 1e-8
 
 
@@ -27,12 +27,12 @@ class Standing:
 
     Attributes:
         solver: its name.
-        mean_rank: over all instances and ``TARGETS``, of its expected running time; equals share a rank, and pairs of instance
-            and target that nobody reached are left out.
+        mean_rank: of its expected running time, over all pairs of instance and target (``TARGETS``) that a solver reached; equals
+            share a rank.
         solved: share of all triples of instance, run and target (31, from 100 % to 1e-4 % above the best known) that it solved.
         solved_rank: place by that share.
         feasible: share of its runs that end feasible.
-        reached: by target, number of instances of which it reached the target at least once.
+        reached: number of instances on which it reached a target at least once, by target.
     """
 
     solver: str
@@ -45,13 +45,13 @@ class Standing:
 
 @dataclass(frozen=True, kw_only=True)
 class Duel:
-    """A solver against another one, Holm-corrected.
+    """Comparison of a solver with another one, Holm-corrected.
 
     Attributes:
         other: name of the other solver.
-        better: instances on which the rank-sum test finds the solver better, corrected over all duels and instances.
+        better: number of instances on which the rank-sum test finds the solver better, corrected over all duels and instances.
         worse: likewise.
-        undecided: the other instances.
+        undecided: number of the other instances.
         mean_a12: probability that a run of the solver is better, mean over instances.
         signed_rank: p-value over the median gaps of all instances, corrected over all duels.
     """
@@ -69,7 +69,7 @@ class Leaderboard:
     """All solvers on some instances.
 
     Attributes:
-        comparisons: one an instance, gaps measured from the best known objective.
+        comparisons: one for each instance, with gaps from the best known objective.
         standings: best mean rank first.
     """
 
@@ -77,11 +77,11 @@ class Leaderboard:
     standings: tuple[Standing, ...]
 
     def place(self, solver: str) -> int:
-        """Place of a solver, from 1."""
+        """Return the place of a solver, from 1."""
         return [standing.solver for standing in self.standings].index(solver) + 1
 
     def duels(self, solver: str) -> list[Duel]:
-        """A solver against every other one, in the order of the standings."""
+        """Compare a solver with every other one, in the order of the standings."""
         others = [standing.solver for standing in self.standings if standing.solver != solver]
         found = [_by_name(comparison) for comparison in self.comparisons]
         if not others:
@@ -105,29 +105,29 @@ class Leaderboard:
         ]
 
     def _gaps(self, runs: SolverRuns, number: int) -> list[float]:
-        """Final gap of each run on an instance; what is closer than ``SAME`` is the optimum, and no better than that."""
+        """Final gap of each run on an instance, at least ``SAME``."""
         return [
             max(self.comparisons[number].gap(cost), SAME) if math.isfinite(cost) else math.inf for cost in runs.costs
         ]
 
 
-def leaderboard(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
-    """Standings of the baseline and of further records.
+def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
+    """Rank the solvers of the baseline and of further records.
 
     Args:
         instances: ids.
-        records: of other solvers on the same instances, under names that the baseline does not have.
+        records: of other solvers on the same instances, under other names than the baseline's.
 
     Raises:
         InputError: no baseline records of an instance are shipped.
     """
-    everything = [record for id in instances for record in (*baseline_records(id), *records) if record.problem == id]
-    comparisons = tuple(compare_problems(everything, references=references(instances)))
+    everything = [record for id in instances for record in (*load_baseline(id), *records) if record.problem == id]
+    comparisons = tuple(compare_problems(everything, references=load_references(instances)))
     return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))
 
 
-def references(instances: Sequence[str]) -> Mapping[str, float]:
-    """Best known objective of each instance, in its problem's own sense."""
+def load_references(instances: Sequence[str]) -> Mapping[str, float]:
+    """Return the best known objective of each instance, in its problem's sense."""
     loaded = {id: gaitbench.load(id) for id in instances}
     return {id: instance.gait_problem.objective.sign * instance.best_known for id, instance in loaded.items()}
 

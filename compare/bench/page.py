@@ -7,8 +7,8 @@ import math
 from compare.analysis.comparison import Comparison
 from compare.analysis.solver_table import count, percent
 from compare.analysis.statistics.run_length import TARGETS
+from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard, Standing
-from compare.bench.tasks import EVALUATIONS, RUNS
 from compare.drawing.distributions import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, text_table
 from nlp_gait import gaitbench
@@ -16,8 +16,8 @@ from nlp_gait import gaitbench
 PER_INSTANCE_TARGET = 1e-3
 
 
-def leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Document:
-    """Page of a leaderboard.
+def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Document:
+    """Return the page of a leaderboard.
 
     Args:
         board: to show.
@@ -28,17 +28,17 @@ def leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Docu
     title = f"GaitBench 1, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
-        verdict=() if solver is None else verdict(board, solver),
+        verdict=() if solver is None else make_verdict(board, solver),
         parts=(
-            standings_table(board),
+            _make_standings_table(board),
             Figure(
                 name="gaitbench-runtime",
                 caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
-            *(() if solver is None else (_duels(board, solver),)),
-            Section(title="Instance by instance", parts=(instances_table(board, solver),)),
+            *(() if solver is None else (_make_duels(board, solver),)),
+            Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",
                 parts=(
@@ -55,7 +55,7 @@ def leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Docu
     )
 
 
-def verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
+def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
     """Where a solver stands, in sentences."""
     place, standing = board.place(solver), _standing(board, solver)
     duels = board.duels(solver)
@@ -70,7 +70,7 @@ def verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
     )
 
 
-def standings_table(board: Leaderboard) -> Table:
+def _make_standings_table(board: Leaderboard) -> Table:
     """Every solver, best mean rank first."""
     rows = [
         (
@@ -98,7 +98,7 @@ def standings_table(board: Leaderboard) -> Table:
     )
 
 
-def instances_table(board: Leaderboard, solver: str | None) -> Table:
+def _make_instances_table(board: Leaderboard, solver: str | None) -> Table:
     """Every instance: the best solver there, and how far the chosen one comes."""
     header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
     if solver is not None:
@@ -132,7 +132,7 @@ def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]
     )
 
 
-def _duels(board: Leaderboard, solver: str) -> Section:
+def _make_duels(board: Leaderboard, solver: str) -> Section:
     rows = [
         (
             duel.other,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from compare.bench.tasks import BASELINE, RUNS, bench_tasks
+from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stderr, stdout
 from compare.cli.interrupts import until_interrupted
@@ -43,9 +43,9 @@ def bench(
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm pso --label pso-again`
     """
-    from compare.bench.baseline import shipped
-    from compare.bench.leaderboard import leaderboard
-    from compare.bench.page import leaderboard_page, verdict
+    from compare.bench.baseline import list_instances
+    from compare.bench.leaderboard import rank_solvers
+    from compare.bench.page import make_leaderboard_page, make_verdict
     from compare.report.writing import write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
@@ -55,7 +55,7 @@ def bench(
     chosen = gaitbench.names(suite) if instances is None else tuple(parse_names(instances))
     for id in chosen:
         gaitbench.load(id)  # says what is unknown
-    known = shipped()
+    known = list_instances()
     missing = [id for id in chosen if id not in known]
     if missing and (instances is not None or len(missing) == len(chosen)):
         raise InputError(
@@ -71,7 +71,9 @@ def bench(
     if algorithm is not None:
         label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
         study = Study(
-            tasks=bench_tasks(chosen, algorithm, label=label, runs=runs), folder=out, jobs=jobs or available_cores()
+            tasks=make_bench_tasks(chosen, algorithm, label=label, runs=runs),
+            folder=out,
+            jobs=jobs or available_cores(),
         )
         name = study.tasks[0].title
         if name in BASELINE:
@@ -83,11 +85,11 @@ def bench(
             )
         if stopped:
             end_interrupted(f"{stopped}; finished runs are kept in {out}: the same command continues")
-    board = leaderboard(chosen, records)
+    board = rank_solvers(chosen, records)
     suite_name = (
         f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
     )
-    written = write_document(out, leaderboard_page(board, name, suite_name), "leaderboard")
+    written = write_document(out, make_leaderboard_page(board, name, suite_name), "leaderboard")
 
     def tables() -> None:
         print_table(
@@ -98,7 +100,7 @@ def bench(
                 for k, s in enumerate(board.standings, start=1)
             ],
         )
-        for sentence in () if name is None else verdict(board, name):
+        for sentence in () if name is None else make_verdict(board, name):
             stdout.print(sentence)
 
     data = {

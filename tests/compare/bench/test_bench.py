@@ -12,10 +12,9 @@ import pytest
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.statistics.run_length import TARGETS
-from compare.bench.baseline import FOLDER, baseline_records, pack, shipped
-from compare.bench.leaderboard import leaderboard, references
-from compare.bench.page import leaderboard_page
-from compare.bench.tasks import BASELINE, RUNS, bench_tasks
+from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_tasks, pack_records
+from compare.bench.leaderboard import load_references, rank_solvers
+from compare.bench.page import make_leaderboard_page
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
@@ -31,18 +30,18 @@ def runs() -> list[RunRecord]:
     return [
         record
         for solver in ("pso", "ipopt")
-        for record in run_study(Study(tasks=bench_tasks([ID], solver, runs=3, evaluations=1000)))
+        for record in run_study(Study(tasks=make_bench_tasks([ID], solver, runs=3, evaluations=1000)))
     ]
 
 
 def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_path: Path) -> None:
     """Expected running times and final objectives to twelve digits; equal records give an equal file."""
-    path = pack(ID, runs, tmp_path)
+    path = pack_records(ID, runs, tmp_path)
     first = path.read_bytes()
-    assert pack(ID, runs, tmp_path).read_bytes() == first
-    again = baseline_records(ID, tmp_path)
+    assert pack_records(ID, runs, tmp_path).read_bytes() == first
+    again = load_baseline(ID, tmp_path)
     assert [(r.solver, r.run, r.seed, r.status) for r in again] == [(r.solver, r.run, r.seed, r.status) for r in runs]
-    known = references([ID])
+    known = load_references([ID])
     (before,), (after,) = (compare_problems(records, references=known) for records in (runs, again))
     for old, new in zip(before.solvers, after.solvers, strict=True):
         np.testing.assert_allclose(new.costs, old.costs, rtol=1e-12)
@@ -50,29 +49,29 @@ def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_pat
             assert new.expected_cost(target) == old.expected_cost(target)
         assert [c.total_cost() for c in new.curves] == [c.total_cost() for c in old.curves]
     with pytest.raises(InputError, match="does not belong"):
-        pack("ssp-v5", runs, tmp_path)
+        pack_records("ssp-v5", runs, tmp_path)
     with pytest.raises(InputError, match="differ in their settings"):
-        pack(
+        pack_records(
             ID, [runs[0], replace(runs[1], definition={**runs[1].definition, "settings": {"population": 7}})], tmp_path
         )
     with pytest.raises(InputError, match="no baseline records of 'ssp-v4'"):
-        baseline_records("ssp-v4", tmp_path)
+        load_baseline("ssp-v4", tmp_path)
 
 
 @pytest.mark.slow
 def test_everything_of_the_small_suite_is_shipped() -> None:
     """Twelve solvers, fifteen runs each with the seeds of the rules, the same budget; all of it below 20 MB."""
-    assert set(gaitbench.names("small")) <= set(shipped())
+    assert set(gaitbench.names("small")) <= set(list_instances())
     assert sum(path.stat().st_size for path in FOLDER.glob("*.json.gz")) <= 20e6
-    for id in shipped():
-        records = baseline_records(id)
+    for id in list_instances():
+        records = load_baseline(id)
         assert sorted((r.solver, r.run) for r in records) == sorted(product(BASELINE, range(RUNS)))
         assert all(r.seed == r.run and r.problem == id for r in records)
         assert {r.definition["stop"]["evaluations"] for r in records if "handling" in r.definition} == {10_000}
 
 
 def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
-    board = leaderboard(["walk12-w015", "ssp-v5"])
+    board = rank_solvers(["walk12-w015", "ssp-v5"])
     duels = {s.solver: {duel.other: duel for duel in board.duels(s.solver)} for s in board.standings}
     for solver, own in duels.items():
         for other, duel in own.items():
@@ -84,8 +83,8 @@ def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
 
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
     """By more than a judge's tolerance of 1e-6 can buy."""
-    for id in shipped():
-        instance, records = gaitbench.load(id), baseline_records(id)
+    for id in list_instances():
+        instance, records = gaitbench.load(id), load_baseline(id)
         sign = instance.gait_problem.objective.sign
         best = min((sign * r.verdict.objective for r in records if r.verdict.feasible), default=math.inf)
         assert best >= instance.best_known - 1e-5 * abs(instance.best_known), id
@@ -94,12 +93,12 @@ def test_no_shipped_run_is_better_than_the_best_known() -> None:
 def test_places_follow_from_expected_running_times() -> None:
     """A solver that has the best one's runs at half of the cost takes the first place; its twin shares all ranks."""
     ids = ("walk12-w015", "ssp-v5")
-    board = leaderboard(ids)
+    board = rank_solvers(ids)
     assert {standing.solver for standing in board.standings} == set(BASELINE)
     ranks = [standing.mean_rank for standing in board.standings]
     assert ranks == sorted(ranks) and sum(ranks) == pytest.approx(len(ranks) * (len(ranks) + 1) / 2)
     first = board.standings[0].solver
-    records = [record for id in ids for record in baseline_records(id) if record.solver == first]
+    records = [record for id in ids for record in load_baseline(id) if record.solver == first]
     faster = [
         replace(
             record,
@@ -110,11 +109,11 @@ def test_places_follow_from_expected_running_times() -> None:
         for record in records
     ]
     twin = [replace(record, solver="twin") for record in records]
-    assert leaderboard(ids, faster).place("faster") == 1
-    with_twin = {s.solver: s for s in leaderboard(ids, twin).standings}
+    assert rank_solvers(ids, faster).place("faster") == 1
+    with_twin = {s.solver: s for s in rank_solvers(ids, twin).standings}
     assert with_twin["twin"].mean_rank == with_twin[first].mean_rank
     assert with_twin["twin"].solved == with_twin[first].solved
-    duel = next(d for d in leaderboard(ids, twin).duels("twin") if d.other == first)
+    duel = next(d for d in rank_solvers(ids, twin).duels("twin") if d.other == first)
     assert (duel.better, duel.worse, duel.undecided, duel.mean_a12, duel.signed_rank) == (0, 0, len(ids), 0.5, 1.0)
 
 
@@ -128,10 +127,10 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
             verdict=replace(record.verdict, objective=math.nan, violation=1.0, feasible=False),
         )
         for id in ids
-        for record in baseline_records(id)
+        for record in load_baseline(id)
         if record.solver == "random"
     ]
-    board = leaderboard(ids, failed)
+    board = rank_solvers(ids, failed)
     last = board.standings[-1]
     assert (last.solver, last.solved, last.feasible, set(last.reached)) == ("nothing", 0.0, 0.0, {0})
     assert all(duel.worse == len(ids) and duel.mean_a12 == 0.0 for duel in board.duels("nothing"))
@@ -140,9 +139,9 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
 @pytest.mark.slow
 def test_the_page_says_it(tmp_path: Path) -> None:
     ids = ("walk12-w015", "ssp-v5")
-    twin = [replace(r, solver="twin") for id in ids for r in baseline_records(id) if r.solver == "pso"]
-    board = leaderboard(ids, twin)
-    written = write_document(tmp_path, leaderboard_page(board, "twin", "two instances"), "leaderboard")
+    twin = [replace(r, solver="twin") for id in ids for r in load_baseline(id) if r.solver == "pso"]
+    board = rank_solvers(ids, twin)
+    written = write_document(tmp_path, make_leaderboard_page(board, "twin", "two instances"), "leaderboard")
     assert {path.name for path in written} >= {"leaderboard.html", "leaderboard.md", "gaitbench-runtime.png"}
     text = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
     assert f"twin takes place {board.place('twin')} of 13" in text

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.bench.baseline import shipped
-from compare.bench.tasks import BASELINE
+from compare.bench.baseline import BASELINE, list_instances
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 ID = "walk12-w015"
@@ -109,11 +108,11 @@ def test_bench_refuses_in_one_sentence(tmp_path: Path, arguments: tuple[str, ...
 
 
 def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.bench.baseline.shipped", lambda: ("walk12-w100",))
+    monkeypatch.setattr("compare.bench.baseline.list_instances", lambda: ("walk12-w100",))
     assert "no baseline records of walk12-w015 are shipped" in one_sentence(
         "bench", "--instances", ID, "--out", tmp_path
     )
-    assert shipped()
+    assert list_instances()
     done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
     assert "left out, for no baseline records of them are shipped yet: walk12-w015, ssp-v5," in done.stderr
     found = json.loads(done.stdout)

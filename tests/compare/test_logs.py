@@ -12,9 +12,8 @@ import pytest
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.statistics.distribution import ecdf
-from compare.bench.leaderboard import leaderboard
-from compare.logs import NOTHING_FEASIBLE, traces, write_coco, write_ioh
-from compare.logs.trace import SMALLEST
+from compare.bench.leaderboard import rank_solvers
+from compare.logs import NOTHING_FEASIBLE, SMALLEST, make_traces, write_coco, write_ioh
 
 BUDGET = 10_000
 TARGETS = 2_001  # of our distribution; iohinspector's has no end of them
@@ -24,7 +23,7 @@ WRITERS = {"ioh": write_ioh, "coco": write_coco}
 
 @pytest.fixture(scope="module")
 def comparisons() -> list[Comparison]:
-    return list(leaderboard(["walk12-w015", "ssp-v5"]).comparisons)
+    return list(rank_solvers(["walk12-w015", "ssp-v5"]).comparisons)
 
 
 def loaded(folder: Path) -> Any:
@@ -71,7 +70,7 @@ def test_iohinspector_finds_our_numbers(comparisons: list[Comparison], form: str
 
 def test_a_trace_begins_at_one_evaluation_and_improves(comparisons: list[Comparison]) -> None:
     for solver in comparisons[-1].solvers:
-        for trace in traces(solver):
+        for trace in make_traces(solver):
             assert trace.lines[0] == (1, NOTHING_FEASIBLE) or trace.lines[0][0] == 1
             evaluations, gaps = zip(*trace.lines, strict=True)
             assert list(evaluations) == sorted(set(evaluations)) and list(gaps) == sorted(set(gaps), reverse=True)
