@@ -132,7 +132,7 @@ def _raise_errors(result: Any) -> Any:
     return result
 
 
-def run_isolated(call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int) -> bytes:
+def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int) -> bytes:
     """Return what a call returns in a forked process with its own session, without input and output.
 
     The process and everything that it has started are killed at the end.

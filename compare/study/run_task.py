@@ -20,7 +20,7 @@ from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import LARGEST_FILE, replace_nan
 from nlp_gait.formulation.solution import Best
-from nlp_gait.processes import run_isolated
+from nlp_gait.processes import run_in_isolation
 
 Run = Callable[[Task, RunRecord | None], RunRecord]
 """Performs one run of a task, from the run that it polishes if it does; it is sent to worker processes."""
@@ -79,7 +79,9 @@ def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
 
     limit = task.stop.time_limit_s
     try:
-        record = parse_record(json.loads(run_isolated(call, None if limit is None else limit + GRACE_S, LARGEST_FILE)))
+        record = parse_record(
+            json.loads(run_in_isolation(call, None if limit is None else limit + GRACE_S, LARGEST_FILE))
+        )
     except TimeoutError:
         return RunRecord.make_failed(
             task, f"it did not return within {GRACE_S:g} s after the time limit of {limit:g} s"

@@ -11,7 +11,7 @@ import numpy as np
 
 from compare.study.store import Store
 from nlp_gait.backends.identity import fingerprint, hash_json
-from nlp_gait.backends.solvers import ipopt, stages
+from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.formulation import Array, GaitProblem
@@ -87,7 +87,7 @@ class _StoredSolver(Solver):
             return None if outcome is None else plain_outcome(outcome)
 
         try:
-            stored = self._store.compute("solve-{key}", inputs, compute, code=[ipopt, stages])
+            stored = self._store.compute("solve-{key}", inputs, compute, code=[ipopt])
         except _Interrupted as interrupted:
             return interrupted.outcome
         return None if stored is None else parse_outcome(stored)

@@ -17,6 +17,7 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
+from nlp_gait.symbolic.kinematics import rotation_matrix
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -257,19 +258,13 @@ def _rotate(axis: SX, cos: SX, sin: SX, vector: SX) -> SX:
     return cos * vector + sin * ca.cross(axis, vector) + ((1 - cos) * ca.dot(axis, vector)) * axis
 
 
-def _rotation(axis: Array, cos: SX, sin: SX) -> SX:
-    k = DM(axis)
-    along = k @ k.T
-    return SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)
-
-
 def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
     points, n = leg.meeting_points, LEG_JOINT_COUNT
     rotations, axes, segments = [SX.eye(3)] * n, [SX(3, 1)] * n, [SX(3, 1)] * n
     rotation = SX.eye(3)
     for i in reversed(range(n)):
         axes[i] = rotation @ DM(leg.axes[i])
-        rotation = rotation @ _rotation(leg.axes[i], cosines[i], -sines[i])
+        rotation = rotation @ rotation_matrix(DM(leg.axes[i]), cosines[i], -sines[i])
         rotations[i] = rotation
         before = points[i - 1] if i else leg.hip_m
         step = before - points[i]

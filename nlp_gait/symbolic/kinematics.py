@@ -26,10 +26,14 @@ class Pose(NamedTuple):
 
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
+    """Return the rotation (3, 3) about a fixed unit axis by an angle [rad]."""
+    return rotation_matrix(DM(axis), ca.cos(angle), ca.sin(angle))
+
+
+def rotation_matrix(k: DM, cos: SX, sin: SX) -> SX:
     """Return the rotation (3, 3) about a fixed unit axis (Rodrigues); coordinate axes need no superfluous terms."""
-    k = DM(axis)
     along = k @ k.T
-    return SX(along) + ca.cos(angle) * (DM.eye(3) - along) + ca.sin(angle) * ca.skew(k)
+    return SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)
 
 
 def relative_rotation(body: Body, q: Mapping[str, SX]) -> SX:

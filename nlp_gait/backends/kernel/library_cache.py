@@ -57,7 +57,7 @@ def load_library(
     # The private folder counts if this process has needed one.
     folders = [find_cache_folder(), *([private_folder()] if private_folder.cache_info().currsize else [])]
     for library in (file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))):
-        loaded = load_checked(library, symbols)
+        loaded = load_if_valid(library, symbols)
         if loaded is not None:
             return loaded, library
     with make_temporary_folder("nlp-gait-build-", CompilerError) as workshop:
@@ -68,7 +68,7 @@ def load_library(
             raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
         compiler.build(file, built, flags)
         library = store_library(built, key)
-    loaded = load_checked(library, symbols)
+    loaded = load_if_valid(library, symbols)
     if loaded is None:
         raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
     return loaded, library
@@ -146,7 +146,7 @@ def _remove_folder(folder: Path, owner: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def load_checked(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
+def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
     """Load a library if it matches its checksum and has the functions; else remove it and return None."""
     try:
         if _find_danger(library, stat.S_ISREG) is None and library.stem.endswith(_hash_file(library)):

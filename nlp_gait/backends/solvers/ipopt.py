@@ -6,6 +6,7 @@ import logging
 import re
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar
@@ -14,18 +15,22 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
-from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.backends.nlp import WIDTHS, build_nlp
 from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
-from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.backends.solvers.stages import StagedSolver
+from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.solution import Outcome
+from nlp_gait.formulation.locking import lock_casadi
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 from nlp_gait.interrupts import defer_interrupts, never
 
 LOG = logging.getLogger("nlp_gait")
+
+CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+# Sigmoid widths of further stages, used only if the exact functions find the point infeasible.
+NARROWER_WIDTHS = (1e-4, 2e-5)
 
 # Options of every IPOPT here: it prints nothing, and ignores an ``ipopt.opt`` in the working folder.
 QUIET: Mapping[str, Any] = {
@@ -133,12 +138,13 @@ class IpoptSettings(Solver):
         return self.prepare(problem).run_from(problem, near, stop)
 
 
-class Ipopt(StagedSolver):
-    """IPOPT for one problem's mathematics, cold and warm, shared by all copies that differ in parameter values only."""
+class Ipopt(Solver):
+    """IPOPT for one problem's mathematics, shared by all copies that differ in parameter values only.
+
+    It runs in stages of narrowing sigmoid width: ``cold`` for the first one, ``warm`` for the others and for neighbours.
+    """
 
     name: ClassVar[str] = IpoptSettings.name
-    words = STATUS_WORDS
-    _native: CompiledNlp | None
 
     def __init__(self, problem: GaitProblem, settings: IpoptSettings) -> None:
         self.model = model = build_nlp(problem)
@@ -159,19 +165,17 @@ class Ipopt(StagedSolver):
         }
         options = {**general, "iteration_callback": self.watch}
         self.compiled = bool(settings.compiled)
-        nlp, self._native = model.nlp, None
+        nlp = model.nlp
         if self.compiled:
-            at = np.append(problem.p, model.widths[0])
-            self._native = CompiledNlp(model.nlp, at, second=settings.hessian == "exact")
-            nlp, options = self._native.nlp, options | self._native.options
-        self._all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
+            native = CompiledNlp(nlp, np.append(problem.p, model.widths[0]), second=settings.hessian == "exact")
+            nlp, options = native.nlp, options | native.options
+        all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
+        names = (*VALUES, *DERIVATIVES.values())
+        functions = {name: all_rows.get_function(name) for name in names if all_rows.has_function(name)}
+        functions = native.functions if self.compiled else functions
         warm_options: dict[str, Any] = {
             **options,
-            **{
-                option: self._all_rows.get_function(name)
-                for option, name in DERIVATIVES.items()
-                if self._all_rows.has_function(name)
-            },
+            **{option: functions[name] for option, name in DERIVATIVES.items() if name in functions},
             "ipopt.mu_strategy": "monotone",
             "ipopt.mu_init": WARM_BARRIER,
             "ipopt.warm_start_init_point": "yes",
@@ -180,11 +184,18 @@ class Ipopt(StagedSolver):
             "ipopt.warm_start_mult_bound_push": 1e-6,
         }
         self.warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
-        few = settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS
-        self.cold = self._make_working_set(problem, general) if few else self._all_rows
+        self.cold: ca.Function | WorkingSet = all_rows
+        if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
+            self.cold = self._make_working_set(problem, functions, general, all_rows)
         self.create_s = time.perf_counter() - started
 
-    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:
+    def _make_working_set(
+        self,
+        problem: GaitProblem,
+        functions: Mapping[str, ca.Function],
+        options: Mapping[str, Any],
+        all_rows: ca.Function,
+    ) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows that one run needs.
 
         That run uses the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
@@ -194,7 +205,7 @@ class Ipopt(StagedSolver):
         bounds, width = model.bounds(usual), model.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
-        cold = WorkingSet(model.nlp, self.functions(), options, self._all_rows, self.watch, always)
+        cold = WorkingSet(model.nlp, functions, options, all_rows, self.watch, always)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
         with defer_interrupts() as pressed:
             self.watch.begin(pressed, time.perf_counter() + self.time_limit_s)
@@ -203,12 +214,73 @@ class Ipopt(StagedSolver):
             raise KeyboardInterrupt
         return cold
 
-    def functions(self) -> dict[str, ca.Function]:
-        """Return the functions of the NLP and their derivatives that IPOPT calls, by CasADi's names."""
-        if self._native is not None:
-            return dict(self._native.functions)
-        names = (*VALUES, *DERIVATIVES.values())
-        return {name: self._all_rows.get_function(name) for name in names if self._all_rows.has_function(name)}
+    @lock_casadi
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        """Run all stages from a start point (n,), each of which starts from the last one; see ``Solver``."""
+        start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
+        return self._run_stages(problem, x0, start, self.model.widths, stop, cold=True)
+
+    def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
+        """Run the last stage alone from the outcome of a neighbouring problem; None if that has no multipliers."""
+        guess = near.guess
+        if guess is None:
+            return None
+        x0 = np.clip(near.x, problem.lower, problem.upper)
+        start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
+        return self._run_stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
+
+    @lock_casadi
+    def _run_stages(
+        self,
+        problem: GaitProblem,
+        x0: Array,
+        start: dict[str, Array],
+        widths: tuple[float, ...],
+        stop: Callable[[], bool],
+        cold: bool,
+    ) -> Outcome:
+        """Run the stages. If the caller gives no ``stop``, Ctrl-C ends the iterations and is raised after them."""
+        model, p = self.model, problem.p
+        bounds = model.bounds(problem)
+        iterations, evaluations = 0, Evaluations()
+        started = time.perf_counter()
+        with defer_interrupts() if stop is never else nullcontext(stop) as pressed:
+            self.watch.begin(pressed, started + self.time_limit_s)
+            for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
+                method = self.cold if cold and stage == 0 else self.warm
+                result = method(p=np.append(p, width), **start, **bounds)
+                stats = method.stats()
+                iterations += int(stats["iter_count"])
+                evaluations += count_evaluations(stats)
+                z, rows, multipliers = (np.array(result[key]).ravel() for key in ("x", "lam_g", "lam_x"))
+                start = {"x0": z, "lam_x0": multipliers, "lam_g0": rows}
+                status = self.watch.reason or str(stats["return_status"])
+                if stage + 1 < len(widths) and status not in REASONS:
+                    continue
+                outcome = judge_point(
+                    self.name,
+                    problem,
+                    x0,
+                    model.point(z),
+                    claimed=status in CONVERGED,
+                    status=STATUS_WORDS.get(status, status.replace("_", " ").lower()),
+                    iterations=iterations,
+                    evaluations=evaluations,
+                    build_s=model.build_s,
+                    compile_s=self.create_s,
+                    time_s=time.perf_counter() - started,
+                    functions="compiled" if self.compiled else "interpreted",
+                    linear_solver=self.linear_solver,
+                    guess=Guess(primal=z, bounds=multipliers, rows=rows, width=width),
+                )
+                if not outcome.claimed or outcome.violation <= FEASIBILITY_TOLERANCE:
+                    break
+        if stop is never and pressed():
+            raise KeyboardInterrupt
+        if outcome.claimed and not outcome.feasible:
+            refused = f"{outcome.status}, but the exact functions find it infeasible"
+            return replace(outcome, claimed=False, status=refused)
+        return outcome
 
 
 @cache

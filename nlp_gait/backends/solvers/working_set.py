@@ -29,7 +29,7 @@ LEAST_ROWS = 100  # of an NLP for which this pays
 
 
 class WorkingSet:
-    """A ``Method`` for the first stage of ``StagedSolver``."""
+    """IPOPT on few rows for the first stage of ``Ipopt``, with the interface of an ``nlpsol``."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class WorkingSet:
             self._begin = rows
 
     def __call__(self, **arguments: Any) -> Mapping[str, Any]:
-        """See ``Method``; multipliers of the start are ignored."""
+        """Solve the NLP; multipliers of the start are ignored."""
         self._stats = {}
         result, _ = self._solve_on_few_rows(arguments)
         if result is None:
@@ -73,7 +73,7 @@ class WorkingSet:
         return result
 
     def stats(self) -> Mapping[str, Any]:
-        """See ``Method``; sums over all runs of the last call."""
+        """Return the statistics of the last call: sums over its runs."""
         return self._stats
 
     def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any] | None, Rows]:

@@ -12,8 +12,7 @@ from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import STATUS_WORDS, IpoptSettings, find_linear_solver
-from nlp_gait.backends.solvers.stages import CONVERGED
+from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings, find_linear_solver
 from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
