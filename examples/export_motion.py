@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 
 import nlp_gait
 from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.export.setpoints import set_points
+from nlp_gait.export.set_points import make_set_points
 from nlp_gait.formulation import Result
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
@@ -26,7 +26,7 @@ for name in ("webots", "csv", "naoqi"):
     print(f"{path.name}: {len(path.read_text().splitlines())} lines")
 print((folder / "gait.motion").read_text()[:180], "...")
 
-points = set_points(gait, period_ms=40)
+points = make_set_points(gait, period_ms=40)
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for joint in ("RHipPitch", "RKneePitch", "RAnklePitch"):
     axes.plot([t / 1000 for t in points.times_ms], points.angles[:, points.joints.index(joint)], label=joint)

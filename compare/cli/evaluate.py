@@ -85,7 +85,7 @@ def evaluate(
     if signals is not None:
         if loaded.display.motion is None:
             fail(f"problem {problem.name!r} has no signals")
-        from nlp_gait.export.tables import write_npz
+        from nlp_gait.export.formats import write_npz
 
         target = output_file(signals)
         write_npz(target, loaded.signals(point))
@@ -101,7 +101,7 @@ def evaluate(
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
     """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
-    from nlp_gait.export.motions import read_gait
+    from nlp_gait.export.joint_angles import read_joint_angles
     from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
     from nlp_gait.robots import load_robot
 
@@ -111,7 +111,7 @@ def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) 
             raise InputError(f"{flag} has no effect on a given motion; leave it out")
     robot = problem.robot or "nao-v5"
     gait: RecordedGait = resolve(RECORDED_GAITS, problem.name or next(iter(RECORDED_GAITS)))(
-        read_gait(motion, load_robot(robot)),
+        read_joint_angles(motion, load_robot(robot)),
         robot=robot,
         gait=problem.name,
         touch_down_s=touch_down_s,
@@ -122,7 +122,7 @@ def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) 
 
 def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_json: bool) -> None:
     from compare.questions.recorded import judge_gait
-    from nlp_gait.export.tables import write_npz
+    from nlp_gait.export.formats import write_npz
 
     target = None if signals is None else output_file(signals)
     judged = judge_gait(gait, in_engine=engine)

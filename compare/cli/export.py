@@ -10,7 +10,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import output_file, print_written
 from compare.cli.options import StoredGait
-from nlp_gait.export.setpoints import PERIOD_MS
+from nlp_gait.export.set_points import PERIOD_MS
 
 
 @command

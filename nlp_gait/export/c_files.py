@@ -1,4 +1,4 @@
-"""Files of C and C++ that are made from templates, for objectives and solvers that are taken elsewhere."""
+"""C and C++ files from templates, for exported objectives and solvers."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from nlp_gait.files import make_writable_folder, write_text
 def write_c_files(
     folder: Path, package: str, templates: Mapping[str, str], words: Mapping[str, str], source: str
 ) -> list[Path]:
-    """Write a C++ source and the files around it; returns their paths, the source's first.
+    """Write a C++ source and the files from templates; return their paths, the source's first.
 
     Args:
-        folder: made if it is missing.
-        package: whose folder ``native`` holds the templates.
-        templates: by the name of the file, in which ``{prefix}`` stands for the word PREFIX.
-        words: what stands for each ``@WORD@`` in the templates.
+        folder: created if missing.
+        package: with the templates in its folder ``native``.
+        templates: by the name of the file, in which ``{prefix}`` is replaced by the word PREFIX.
+        words: replacement of each ``@WORD@`` in the templates.
         source: of ``{prefix}.cpp``.
 
     Raises:
@@ -38,6 +38,6 @@ def write_c_files(
     return written
 
 
-def comment(lines: Iterable[str]) -> str:
-    """Lines inside a comment of C that is open."""
+def format_comment(lines: Iterable[str]) -> str:
+    """Return lines for an open comment of C."""
     return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)

@@ -1,21 +1,23 @@
-"""Export formats by name."""
+"""Gaits in formats of other programs."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
+
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.naoqi import COUPLED, write_naoqi
-from nlp_gait.export.setpoints import SetPoints, set_points
-from nlp_gait.export.tables import write_csv, write_json
+from nlp_gait.export.set_points import COUPLED, SetPoints, make_set_points, to_naoqi
 from nlp_gait.export.webots import write_motion
-from nlp_gait.files import write_text
-from nlp_gait.formulation import Result, sample_signals
+from nlp_gait.files import format_csv, replace_file, write_json, write_text
+from nlp_gait.formulation import Result, Signals, sample_signals
+from nlp_gait.formulation.result import SCHEMA
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 
-# Usual ending of a file by format.
+# Usual suffix of a file by format.
 FORMATS = {"webots": ".motion", "csv": ".csv", "json": ".signals.json", "mjcf": ".xml", "naoqi": ".naoqi.json"}
 
 
@@ -24,46 +26,69 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
 
     Args:
         name: one of FORMATS.
-        path: file to be written.
+        path: file to write.
         result: the gait.
-        period_ms: between rows of ``webots`` and ``naoqi``; the longest between those of ``csv`` and ``json``, which keep the
+        period_ms: between rows of ``webots`` and ``naoqi``; the longest between those of ``csv`` and ``json``, which have the
             problem's own samples and refine them.
 
     Raises:
         UnknownNameError: no such format.
-        InputError: the gait cannot be expressed in it.
+        InputError: the format cannot express the gait.
         OutputError: the file cannot be written.
     """
     if name not in FORMATS:
         raise unknown("format", name, FORMATS)
     if name == "webots":
-        write_motion(path, _motor_set_points(result, period_ms))
+        write_motion(path, _make_motor_set_points(result, period_ms))
     elif name == "naoqi":
-        points = _motor_set_points(result, period_ms)
+        points = _make_motor_set_points(result, period_ms)
         if not set(COUPLED) <= set(points.joints):
-            owner = (
-                "the robot" if result.problem.display.robot is None else f"robot {result.problem.display.robot.name!r}"
-            )
             raise InputError(
-                f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; {owner} has none of that name: export as "
-                "csv, json, webots or mjcf"
+                f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; the robot of "
+                f"{result.problem.name!r} has none of that name: export as csv, json, webots or mjcf"
             )
-        write_naoqi(path, points)
+        write_json(path, to_naoqi(points))
     elif name == "mjcf":
-        plan = make_plan(result)
-        write_text(path, make_plan_model(plan, Drive()))
+        write_text(path, make_plan_model(make_plan(result), Drive()))
     elif name == "csv":
-        write_csv(path, sample_signals(result, period_ms / 1000.0))
+        write_signals_csv(path, sample_signals(result, period_ms / 1000.0))
     else:
-        write_json(path, result, sample_signals(result, period_ms / 1000.0))
+        write_signals_json(path, result, sample_signals(result, period_ms / 1000.0))
 
 
-def _motor_set_points(result: Result, period_ms: int) -> SetPoints:
-    """Set-points, if their joints are those of a robot."""
+def write_signals_csv(path: Path, signals: Signals) -> None:
+    """Write one row per sample, with a header like ``q LKneePitch [rad]``; raises InputError, OutputError."""
+    table = list(signals.named_columns())
+    header = [f"{name} [{unit}]" for name, unit, _ in table]
+    write_text(path, format_csv([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
+
+
+def write_signals_json(path: Path, result: Result, signals: Signals) -> None:
+    """Write the gait with its problem and all columns by name, each with its unit; raises InputError, OutputError."""
+    problem = result.problem
+    data = {
+        "schema": SCHEMA,
+        "problem": problem.address,
+        "options": dict(problem.options),
+        "parameters": dict(problem.values),
+        "x": problem.by_name(result.x),
+        "signals": {name: {"unit": unit, "values": values.tolist()} for name, unit, values in signals.named_columns()},
+    }
+    write_text(path, json.dumps(data, indent=1) + "\n")
+
+
+def write_npz(path: Path, signals: Signals) -> None:
+    """Write all arrays and the joint names (columns of q, qd, qdd and tau) to a ``.npz`` file; raises OutputError."""
+    with replace_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)
+
+
+def _make_motor_set_points(result: Result, period_ms: int) -> SetPoints:
+    """Return set-points, if their joints are those of a robot."""
     robot = result.problem.display.robot
     if robot is None:
         raise InputError(f"problem {result.problem.name!r} has no robot with motors; export it as csv or json")
-    points = set_points(result, period_ms)
+    points = make_set_points(result, period_ms)
     for joint in points.joints:
         robot.joint(joint)
     return points

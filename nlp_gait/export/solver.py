@@ -1,4 +1,4 @@
-"""A problem's NLP with its derivatives as plain C++ with a C header, for a solver on board: no dependency but libc and libm."""
+"""Export of a problem's NLP with its derivatives as C++ with a C header, for a solver on board; needs only libc and libm."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from nlp_gait.backends.derivatives.operations import format_number
 from nlp_gait.backends.derivatives.source import write_array, write_nlp_source
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
-from nlp_gait.export.c_files import comment, write_c_files
+from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 
-# Files of the export by the template that each is made from; the C++ file is put together from the plan.
+# Name of each file by its template; the C++ file is assembled from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
 BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"}
 WRAPPERS = """
@@ -38,14 +38,14 @@ extern "C" void @_second(void* memory, const double* w, const double* p, double 
 
 @lock_casadi
 def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
-    """Write source, header, example and build line of a problem's NLP; returns the files.
+    """Write source, header, example and build line of a problem's NLP; return the files.
 
     Args:
-        problem: with the parameter values that bounds and start are written for.
-        folder: made if it is missing.
+        problem: with the parameter values of the exported bounds and start.
+        folder: created if missing.
 
     Raises:
-        CompilerError: the NLP holds what has no C++ here.
+        CompilerError: the NLP has an operation without C++ code.
         OutputError: the folder cannot be written to.
     """
     model = build_nlp(problem)
@@ -57,7 +57,7 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
 
 
 def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
-    """The whole C++ file: the plan and what works through it, constants, the functions of the header."""
+    """Return the C++ file: the plan and its interpreter, constants, the functions of the header."""
     width = model.widths[-1]
     bounds = model.bounds(problem)
     constants = {
@@ -76,7 +76,7 @@ def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) 
             f'#pragma GCC visibility push(default)\n#include "{prefix}.h"\n#pragma GCC visibility pop',
             "#ifndef LANES\n#define LANES 1  // pairs of a sample and a direction at a time: 1, 2, 4 or 8\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
-            "namespace {  // so that several problems can stand in one program",
+            "namespace {  // so that a program can have several problems",
             write_nlp_source(found).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(
@@ -94,7 +94,7 @@ def _constant(kind: str, name: str, values: Iterable[object]) -> str:
 
 
 def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
-    """What stands for each place in the templates."""
+    """Return the text for each placeholder of the templates."""
     m, n = found.jacobian.shape
     return {
         "WHAT": f"{problem.address}: {problem.title}",
@@ -108,8 +108,10 @@ def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(FLAGS),
-        "VARIABLES": comment(f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)),
-        "PARAMETERS": comment(
+        "VARIABLES": format_comment(
+            f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)
+        ),
+        "PARAMETERS": format_comment(
             f"{k:4d}  {q.name} = {value:g} [{q.unit}]: {q.description}"
             for k, (q, value) in enumerate(zip(problem.parameters, problem.p, strict=True))
         ),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source
 from nlp_gait.backends.kernel.kernel_source import build_kernel, write_kernel_source
-from nlp_gait.export.c_files import comment, write_c_files
+from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance, OneSidedRows
 
@@ -94,11 +94,11 @@ def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(flag for flag in BASE_FLAGS if flag != "-w") + " -w",
         "BEST_X": ", ".join(map(repr, instance.best_x.tolist())),
-        "VARIABLES": comment(
+        "VARIABLES": format_comment(
             f"{k:4d}  {v.name} [{v.unit}] from {low:g} to {high:g}: {v.description}"
             for k, (v, low, high) in enumerate(zip(problem.variables, instance.lower, instance.upper, strict=True))
         ),
-        "PARAMETERS": comment(
+        "PARAMETERS": format_comment(
             f"{q.name} = {value:g} [{q.unit}]: {q.description}"
             for q, value in zip(problem.own_parameters, problem.p, strict=False)
         ),

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import nlp_gait
 from nlp_gait.errors import InputError
-from nlp_gait.export.setpoints import SetPoints, set_points
-from nlp_gait.export.webots import motion_text, parse_motion, read_motion, write_motion
+from nlp_gait.export.set_points import SetPoints, make_set_points
+from nlp_gait.export.webots import format_motion, parse_motion, read_motion, write_motion
 from nlp_gait.formulation import Result
 from nlp_gait.robots import load_robot
 
@@ -20,7 +20,7 @@ GOOD = "#WEBOTS_MOTION,V1.0,LKneePitch,RKneePitch\n00:00:000,Pose1,0.1,-0.2\n00:
 @pytest.fixture(scope="module")
 def points():
     problem = nlp_gait.load("nao-ssp")
-    return set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)))
+    return make_set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)))
 
 
 def by_the_grammar(text):
@@ -65,7 +65,7 @@ def test_set_points_are_the_planned_angles(points):
 
 def test_the_last_pose_is_the_end_of_the_phase():
     problem = nlp_gait.load("nao-ssp")
-    found = set_points(Result(problem=problem, x=problem.check_x((*OPTIMUM[:-1], 0.4567))))
+    found = make_set_points(Result(problem=problem, x=problem.check_x((*OPTIMUM[:-1], 0.4567))))
     assert found.times_ms[-3:] == (400, 440, 457)
 
 
@@ -76,7 +76,7 @@ def test_the_last_pose_is_the_end_of_the_phase():
 )
 def test_any_set_points_survive_the_round_trip(times, row):
     points = SetPoints(joints=("A", "B", "C"), times_ms=tuple(sorted(times)), angles=np.array([row] * len(times)))
-    text = motion_text(points)
+    text = format_motion(points)
     back = parse_motion(text, "any")
     assert back.times_ms == points.times_ms
     np.testing.assert_allclose(back.angles, points.angles, atol=HALF_A_DIGIT)
@@ -106,7 +106,7 @@ def test_what_webots_accepts_is_accepted():
         (GOOD.replace("*,1e-3", "*,"), r"line 3: expected an angle of RKneePitch.* got ''"),
         (GOOD.replace("1e-3", "nan"), r"line 3: expected an angle of RKneePitch.* got 'nan'"),
         (GOOD.replace("1e-3", "٣"), r"line 3: expected an angle"),
-        (GOOD.replace("00:00:040", "00:00:000"), r"line 3: time 0 ms does not come after 0 ms"),
+        (GOOD.replace("00:00:040", "00:00:000"), r"line 3: time 0 ms is not after 0 ms"),
         (GOOD.replace("00:00:040", "00:00:04.0"), r"line 3: expected a time"),
         (GOOD.replace("00:00:040", "1:2:3:4"), r"line 3: expected a time"),
         (GOOD.replace("00:00:040", "-5"), r"line 3: expected a time"),
@@ -133,4 +133,4 @@ def test_unreadable_files_are_refused(tmp_path):
 def test_the_period_is_whole_milliseconds(period):
     problem = nlp_gait.load("nao-ssp")
     with pytest.raises(InputError, match="whole number of milliseconds"):
-        set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)), period)
+        make_set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)), period)

@@ -17,7 +17,7 @@ from compare.study.settings import SolverSpec, StudySettings
 from compare.study.store import Store
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache
-from nlp_gait.export.tables import write_npz
+from nlp_gait.export.formats import write_npz
 from nlp_gait.files import make_writable_folder, write_json
 from nlp_gait.formulation import Signals
 from tests.compare.records import record
@@ -168,7 +168,7 @@ ALLOWED = {
     "nlp_gait/disk.py",
     "nlp_gait/files.py",
     "nlp_gait/backends/kernel/library_cache.py",  # in its workshop; what is kept goes through nlp_gait.disk
-    "nlp_gait/export/tables.py",
+    "nlp_gait/export/formats.py",
     "nlp_gait/simulation/film/video.py",
     "compare/bench/baseline.py",
     "compare/drawing/animation.py",

@@ -22,7 +22,7 @@ from compare.study.settings import StudySettings, read_settings
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
-from nlp_gait.export.webots import motion_text, parse_motion, read_motion
+from nlp_gait.export.webots import format_motion, parse_motion, read_motion
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check_certificate, read_certificate
@@ -167,7 +167,7 @@ def read_a_motion(path: Path) -> None:
         units = [1, 1000, 60_000]
         same(sum(unit * int(part) for unit, part in zip(units, reversed(clock.split(":")), strict=False)), time, "time")
         same([None if value == "*" else float(value) for value in values], replace_nan(angles), "angles")
-    again = parse_motion(motion_text(points), "again")
+    again = parse_motion(format_motion(points), "again")
     same((points.joints, points.times_ms), (again.joints, again.times_ms), "written again")
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
-from nlp_gait.export.tables import write_npz
+from nlp_gait.export.formats import write_npz
 from nlp_gait.files import replace_file, write_text
 from nlp_gait.formulation import Signals
 from nlp_gait.simulation.film.video import write_video

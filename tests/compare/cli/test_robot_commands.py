@@ -42,7 +42,7 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
     [
         (["export", "GAIT", "--format", "webot"], ["unknown format 'webot'", "webots"]),
         (["export", "absent.json", "--format", "csv"], ["'absent.json' cannot be read"]),
-        (["animate", "GAIT", "--out", "walk.avi"], ["ends in .gif or .mp4"]),
+        (["animate", "GAIT", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
         (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
         (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
         (["simulate", "GAIT", "--viewer", "--video", "walk.gif"], ["exclude each other"]),

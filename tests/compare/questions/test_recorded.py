@@ -11,7 +11,7 @@ from compare.questions import recorded as module
 from compare.questions.recorded import judge_gait
 from nlp_gait import load
 from nlp_gait.export.formats import write_as
-from nlp_gait.export.motions import read_gait
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.nao.recorded import make_recorded_gait
@@ -72,7 +72,7 @@ def test_wrong_use_is_one_sentence(arguments: list[str], words: str, gait: Path)
 
 def test_missing_results_are_explained(gait: Path) -> None:
     """A step on the spot has no optimum; a torso that leans at the beginning is not played."""
-    angles = read_gait(gait, load_robot("nao-v5"))
+    angles = read_joint_angles(gait, load_robot("nao-v5"))
     q = np.array(angles.q)
     q[:, [angles.joints.index(name) for name in ("LHipPitch", "RHipPitch")]] -= (
         0.1  # the torso leans over straight legs

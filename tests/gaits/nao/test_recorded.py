@@ -12,7 +12,7 @@ from compare.judge import Evaluation, evaluate
 from nlp_gait import load
 from nlp_gait.errors import GaitError
 from nlp_gait.export.formats import write_as
-from nlp_gait.export.motions import read_gait
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
@@ -55,7 +55,7 @@ def judged(gait: RecordedGait) -> Evaluation:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-cycle"])
 def test_a_planned_gait_that_comes_back_is_judged_as_it_was(name: str, tmp_path: Path) -> None:
-    gait = make_recorded_gait(read_gait(written(tmp_path, name, 5 if name == "nao-cycle" else 10), ROBOT))
+    gait = make_recorded_gait(read_joint_angles(written(tmp_path, name, 5 if name == "nao-cycle" else 10), ROBOT))
     assert gait.gait == name and not gait.motion.mirrored and gait.lean_deg < 1e-4
     own, before = judged(gait), evaluate(planned(name).problem, planned(name).x)
     share = 20 * SHARE if name == "nao-cycle" else SHARE
@@ -76,13 +76,13 @@ def test_its_own_limits_are_found_broken(tmp_path: Path) -> None:
     x = low.check_x((0.24, 0.0, 0.0, 0.3, 0.0025, 0.0, 0.0, 0.01, 0.3))
     path = tmp_path / "fast.csv"
     write_as("csv", path, Result(problem=low, x=x), 5)
-    broken = {row.name for row in judged(make_recorded_gait(read_gait(path, ROBOT))).violations}
+    broken = {row.name for row in judged(make_recorded_gait(read_joint_angles(path, ROBOT))).violations}
     assert {"hip_z_start", "hip_z_end", "hip_vx_start", "swing_height", "bounds[single_support_time_s]"} <= broken
     assert not any(name.startswith(("foot_stands", "feet_apart", "hip_vx_end")) for name in broken)
 
 
 def angles_of(path: Path) -> JointAngles:
-    return read_gait(path, ROBOT)
+    return read_joint_angles(path, ROBOT)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Joint angles over time, read from the files of other programs: CSV, and Webots' ``.motion``."""
+"""Joint angles over time from files of other programs: CSV, and Webots' ``.motion``."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from nlp_gait.export.webots import read_motion
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
-# ``q LKneePitch [rad]`` as `export --format csv` writes it, ``LKneePitch``, ``LKneePitch [deg]``, ``t``, ``time_s``.
+# ``q LKneePitch [rad]`` of `export --format csv`, ``LKneePitch``, ``LKneePitch [deg]``, ``t``, ``time_s``.
 COLUMN = re.compile(r"(?:(?P<what>\w+) )?(?P<name>\w+)(?: ?\[(?P<unit>[^\]]*)\])?")
 TIMES = ("t", "time", "time_s")
 FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
 
-def read_gait(path: Path, robot: Robot) -> JointAngles:
-    """Angles over time of the joints of a robot.
+def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
+    """Read angles over time of the joints of a robot.
 
     Args:
         path: a ``.motion`` file of Webots, or CSV with a column of times [s] and one of angles for each joint: ``t``,
-            ``LKneePitch``, or ``LKneePitch [deg]``; of what ``nlp-gait export --format csv`` writes, the angles.
+            ``LKneePitch``, or ``LKneePitch [deg]``; other columns of ``nlp-gait export --format csv`` are ignored.
         robot: with all its joints.
 
     Raises:
         InputError: the file cannot be read, or has no times.
-        UnknownNameError: a column that is no joint.
+        UnknownNameError: a column that is not a joint.
     """
     if path.suffix == ".motion":
         points = read_motion(path, robot.joints)
@@ -63,9 +63,5 @@ def read_gait(path: Path, robot: Robot) -> JointAngles:
             f"{table.owner} needs a header with a column t of times [s]; it has {', '.join(table.header) or 'none'}"
         )
     values = np.array(table.rows)
-    q = (
-        np.column_stack([values[:, k] * factor for k, factor in angles.values()])
-        if angles
-        else np.empty((len(values), 0))
-    )
+    q = np.reshape([values[:, k] * factor for k, factor in angles.values()], (len(angles), len(values))).T
     return JointAngles(owner=table.owner, joints=tuple(angles), t=values[:, times], q=q)

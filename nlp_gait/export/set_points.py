@@ -1,8 +1,9 @@
-"""Joint angles at the instants at which a robot or simulator is told them."""
+"""Set-points of joint angles for a robot or a simulator, and the arguments of NAOqi."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,6 +12,9 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
+APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
+# Both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name.
+COUPLED = ("RHipYawPitch",)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,8 +32,8 @@ class SetPoints:
     angles: Array
 
 
-def set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
-    """Planned joint angles at every period from time zero, and at the end rounded to the millisecond.
+def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
+    """Return planned joint angles at every period from time zero, and at the end, rounded to the millisecond.
 
     Raises:
         InputError: the problem has no time histories, or the period is not a whole number of milliseconds >= 1.
@@ -42,3 +46,11 @@ def set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
     times_ms = (*range(0, end_ms, period_ms), end_ms)
     angles = CubicSpline(signals.arrays["t"], signals.arrays["q"])(np.minimum(np.array(times_ms) / 1000.0, duration))
     return SetPoints(joints=signals.joints, times_ms=times_ms, angles=angles)
+
+
+def to_naoqi(points: SetPoints) -> dict[str, Any]:
+    """Return the arguments of ``ALMotion.angleInterpolation``: names, keys [rad] and times [s], in absolute angles."""
+    names = [name for name in points.joints if name not in COUPLED]
+    times = [round(APPROACH_S + time / 1000.0, 3) for time in points.times_ms]
+    keys = [points.angles[:, points.joints.index(name)].tolist() for name in names]
+    return {"names": names, "keys": keys, "times": [times for _ in names], "isAbsolute": True}
