@@ -1,4 +1,4 @@
-"""Tables of numbers from CSV files, as other programs write them."""
+"""Tables of numbers from CSV files of other programs."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ DELIMITERS = ",;\t"
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Numbers in rows.
+    """Table of numbers.
 
     Attributes:
         owner: the file, for messages.
         header: names of the columns; empty if the file has none.
         rows: of equal length; NaN where a cell is empty.
-        lines: of the file, one for each row.
+        lines: line of each row in the file.
     """
 
     owner: str
@@ -36,15 +36,15 @@ class Table:
         return len(self.rows[0])
 
     def column(self, name: str) -> tuple[float, ...] | None:
-        """Values under a name, None without such a column."""
+        """Return the values of a column; None if there is no such column."""
         return tuple(row[self.header.index(name)] for row in self.rows) if name in self.header else None
 
     def check_header(self, needed: Collection[str], allowed: Collection[str]) -> None:
-        """Refuse a column that is missing, or one that nobody reads.
+        """Check that the needed columns exist, and no others than the allowed ones.
 
         Raises:
-            InputError: one is missing.
-            UnknownNameError: one is not known.
+            InputError: a column is missing.
+            UnknownNameError: a column is unknown.
         """
         missing = [name for name in needed if name not in self.header]
         if missing:
@@ -56,7 +56,7 @@ class Table:
                 raise unknown(f"column of {self.owner}", name, [*needed, *allowed])
 
     def count(self, name: str, row: int, value: float, at_least: int = 0) -> int:
-        """A whole number of a cell; raises InputError."""
+        """Return the value of a cell as a whole number; raises InputError."""
         if not (math.isfinite(value) and value == int(value) and value >= at_least):
             raise InputError(
                 f"{self.owner}, line {self.lines[row]}: {name} must be a whole number >= {at_least}, got {value:g}"
@@ -65,10 +65,10 @@ class Table:
 
 
 def read_table(path: Path, what: str) -> Table:
-    """Numbers of a CSV file; commas, semicolons or tabs between them, and a header if its first line is not all numbers.
+    """Read a CSV file of numbers separated by commas, semicolons or tabs; a first line that is not all numbers is the header.
 
     Raises:
-        InputError: it cannot be read, has no row, or a cell that is no number.
+        InputError: the file cannot be read, has no row, or a cell that is not a number.
     """
     text = read_text(path, what)
     owner = f"{what} {str(path)!r}"

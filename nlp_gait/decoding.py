@@ -1,6 +1,6 @@
-"""Dataclasses from the plain data of files: no key missing or unknown, every value of the type that the dataclass states.
+"""Dataclasses from plain data of files: required keys, no unknown keys, and values of the declared types.
 
-A number that is not finite is written as null: where the dataclass has a ``float``, null becomes NaN.
+Numbers that are not finite are written as null, so null becomes NaN for a ``float``.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ def decode(
     unread: Collection[str] = (),
     ignore_unknown: bool = False,
 ) -> T:
-    """Instance of a dataclass.
+    """Return an instance of a dataclass.
 
     Args:
-        cls: its fields may be texts, numbers, booleans, tuples, mappings from text, dataclasses, literals, and unions.
-        raw: as JSON gives it.
+        cls: with fields of texts, numbers, booleans, tuples, mappings from text, dataclasses, literals and unions.
+        raw: data from JSON.
         where: place in the file, for messages.
-        given: fields that do not stand in the file.
-        unread: keys that may stand beside the fields.
+        given: fields that are not in the file.
+        unread: allowed keys that are not fields.
         ignore_unknown: allow all other keys, except those that look like a misspelled field.
 
     Raises:
@@ -63,7 +63,7 @@ def decode(
 
 
 def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[GaitError]) -> T:
-    """Instance of a dataclass from a JSON file.
+    """Return an instance of a dataclass from a JSON file.
 
     Args:
         cls: of the instance, see ``decode``.
@@ -72,7 +72,7 @@ def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[
         error: class to raise.
 
     Raises:
-        GaitError: of that class: the file cannot be read, or does not hold such a dataclass.
+        GaitError: of that class: the file cannot be read or decoded.
     """
     raw = read_json(path, what, error=error)
     with convert_errors(f"{what} {str(path)!r}", error):
@@ -81,19 +81,19 @@ def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[
 
 @cache
 def _fields(cls: Any) -> dict[str, tuple[Any, bool]]:
-    """Type of each field, and whether it is needed."""
+    """Return the type of each field and whether it is required."""
     hints = get_type_hints(cls)
     return {f.name: (hints[f.name], f.default is MISSING and f.default_factory is MISSING) for f in fields(cls)}
 
 
 def decode_value(kind: Any, raw: Any, where: str) -> Any:
-    """Value of a field's type; arguments and errors as ``decode``."""
+    """Return a value of a field's type; arguments and errors as ``decode``."""
     if kind is Any:
         return raw
     if kind is float:
-        return math.nan if raw is None else float(_checked((int, float), raw, where, WORDS[float]))
+        return math.nan if raw is None else float(_check_type((int, float), raw, where, WORDS[float]))
     if kind in WORDS:
-        return _checked((kind,), raw, where, WORDS[kind])
+        return _check_type((kind,), raw, where, WORDS[kind])
     if isinstance(kind, type) and is_dataclass(kind):
         return decode(kind, raw, where)
     origin, parts = get_origin(kind), get_args(kind)
@@ -102,9 +102,9 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
             raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {format_value(raw)}")
         return raw
     if origin is tuple:
-        return _tuple(parts, raw, where)
+        return _decode_tuple(parts, raw, where)
     if origin in (Union, UnionType):
-        return _of_union(parts, raw, where)
+        return _decode_union(parts, raw, where)
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where} must be an object, got {format_value(raw)}")
     keys, values = parts
@@ -114,8 +114,7 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
     }
 
 
-def _tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
-    """A list whose items are all alike, ``tuple[X, ...]``, or as many as there are types, ``tuple[X, Y]``."""
+def _decode_tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
     any_length = parts[-1] is ...
     if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
         count = "" if any_length else f" of {len(parts)} values"
@@ -126,7 +125,7 @@ def _tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
     )
 
 
-def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
+def _decode_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
     if type(raw) in parts:
         return raw
     others = [part for part in parts if part is not NoneType]
@@ -140,7 +139,7 @@ def _of_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
     return decode_value(others[-1], raw, where)
 
 
-def _checked(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:
+def _check_type(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:
     if not isinstance(raw, kinds) or (isinstance(raw, bool) and bool not in kinds):
         raise ValueError(f"{where} must be {wanted}, got {format_value(raw)}")
     return raw

@@ -1,7 +1,7 @@
-"""What is still there after a power cut: content, names and folders, flushed to the disk.
+"""Durable writes (fsync): files and folders that survive a power cut.
 
-An operating system keeps what is written in memory for some seconds, and a file's content, its name and its folder's name reach
-the disk each in its own time. Each function here returns when what it did is there for good.
+An operating system holds writes in memory for some seconds; the content of a file, its name and the name of its folder reach the
+disk independently. Each function here returns when its result is on the disk.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno
 
 
 def rename(path: Path, target: Path) -> None:
-    """Give a file another name in its folder, in place of what has that name, for good.
+    """Rename a file within its folder, durably, replacing an existing file.
 
     Raises:
         OSError: no permission, no such file.
@@ -29,14 +29,13 @@ def flush(path: Path) -> None:
     """Wait until a file's content, or the names in a folder, are on the disk.
 
     Raises:
-        OSError: the disk is full or broken. Where a folder cannot be flushed (Windows, some network file systems), its file
-            system decides when its names are safe.
+        OSError: the disk is full or broken. Folders that cannot be flushed (Windows, some network file systems) are ignored.
     """
     is_folder = path.is_dir()
     try:
         descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
         try:
-            _to_the_disk(descriptor)
+            _fsync(descriptor)
         finally:
             os.close(descriptor)
     except OSError as error:
@@ -44,8 +43,8 @@ def flush(path: Path) -> None:
             raise
 
 
-def _to_the_disk(descriptor: int) -> None:
-    if sys.platform == "darwin":  # where fsync stops at the disk's own memory
+def _fsync(descriptor: int) -> None:
+    if sys.platform == "darwin":  # where fsync does not flush the disk's cache
         import fcntl
 
         fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
@@ -54,7 +53,7 @@ def _to_the_disk(descriptor: int) -> None:
 
 
 def make_folder(path: Path, mode: int = 0o777) -> None:
-    """Make a folder with those above it, for good; nothing happens if it is there.
+    """Make a folder and its parents, durably; an existing folder is left alone.
 
     Raises:
         OSError: it cannot be made.

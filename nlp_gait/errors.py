@@ -1,4 +1,4 @@
-"""Errors that a user can act on: each says what, the value, what is allowed and the remedy."""
+"""Errors for users: each message gives what is wrong, the value, what is allowed and what to do."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numbers import Integral
 
 LONGEST_VALUE = 80  # characters of a value in a message
 
-# Warns in words and what they are about, as ``logging`` takes them, once in a process however often a file is read.
+# Takes the arguments of ``logging``; warns once per process, however often a file is read.
 warn_once = cache(logging.getLogger("nlp_gait").warning)
 
 
 class GaitError(Exception):
-    """Root of every error that this package raises on purpose; its message is one line, whatever the values in it are."""
+    """Base class of all errors that this package raises on purpose; the message is one line, whatever the values in it."""
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*(" ".join(part.splitlines()) if isinstance(part, str) else part for part in arguments))
@@ -38,7 +38,7 @@ class UserCodeError(InputError):
 
 
 class CompilerError(GaitError):
-    """The compiled backend was demanded and cannot be had."""
+    """The compiled backend was required and is not available."""
 
 
 class LiftedSenseError(GaitError):
@@ -46,19 +46,19 @@ class LiftedSenseError(GaitError):
 
 
 class MissingExtraError(GaitError):
-    """A feature that needs an optional package which is not installed."""
+    """A feature whose optional package is not installed."""
 
 
 class OutputError(GaitError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to the given place."""
 
 
 class WorkerError(GaitError):
-    """Worker processes die, or do not begin."""
+    """Worker processes die or do not start."""
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Error for an unknown name, with the nearest known ones.
+    """Return the error for an unknown name, with the nearest known ones.
 
     Args:
         kind: what was looked up, for example ``"problem"``.
@@ -66,35 +66,34 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
         known: all allowed names.
     """
     if not isinstance(name, str):
-        return UnknownNameError(f"the name of {_a(kind)} must be a text, got {format_value(name)}")
+        return UnknownNameError(f"the name of {_with_article(kind)} must be a text, got {format_value(name)}")
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
     return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
 
 
-def _a(kind: str) -> str:
-    """With its article."""
+def _with_article(kind: str) -> str:
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 def check_name(kind: str, name: object) -> None:
-    """Raise InputError unless what should name a problem, a solver or the like is a text."""
+    """Raise InputError unless the name of a problem, solver or the like is a text."""
     if not isinstance(name, str):
-        raise InputError(f"the name of {_a(kind)} must be a text, got {format_value(name)}")
+        raise InputError(f"the name of {_with_article(kind)} must be a text, got {format_value(name)}")
 
 
 def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:
-    """A whole number within limits, NumPy's too; True and False are none.
+    """Return a whole number within limits, also one of NumPy; True and False are refused.
 
     Args:
         name: of the argument, for the message.
-        value: as it was given.
-        at_least: smallest that is allowed.
+        value: of the argument.
+        at_least: smallest allowed value.
         at_most: largest; None for no limit.
 
     Raises:
-        InputError: it is something else.
+        InputError: it is not such a number.
     """
     whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if whole is None or whole < at_least or (at_most is not None and whole > at_most):
@@ -104,16 +103,16 @@ def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | N
 
 
 def format_value(value: object) -> str:
-    """A value in a message: short, and whatever it is."""
+    """Return a short text of any value, for messages."""
     try:
         text = repr(value)
-    except Exception:  # somebody else's class; or a whole number too long to print
+    except Exception:  # of a foreign class, or of an integer too long to print
         text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
 
 
 def describe_type(kind: type) -> str:
-    """What a value of a type is called to its user: ``a whole number`` for int."""
+    """Return a type in words, for messages: ``a whole number`` for int."""
     names = {
         bool: "true or false",
         int: "a whole number",

@@ -1,8 +1,8 @@
-"""Files of data: read strictly, written whole or not at all.
+"""Data files: read strictly, written atomically.
 
-Only regular files of valid UTF-8 are read. JSON must not repeat a key, nor hold a number that is beyond 64 bits or not finite,
-nor text that cannot be written again. A file is written under another name, flushed to the disk, and renamed in one step: a
-link of its name is replaced, never followed. Then its folder is flushed: what is written is still there after a power cut.
+Only regular files of valid UTF-8 are read. JSON must not repeat a key or contain numbers that exceed 64 bits or are not finite,
+or text that cannot be encoded. A file is written under another name, flushed to the disk and renamed; a link of its name is
+replaced, never followed. Then its folder is flushed, so that the file survives a power cut.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from typing import Any
 from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 
-LARGEST_FILE = 64 * 2**20  # bytes; a study's record has some 10 kB, a result with thousands of variables some MB
-DEEPEST = 32  # levels of objects and lists; the package's own files have six
+LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thousands of variables some MB
+DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
-# Writing one file takes far less; an older temporary file belongs to no running process.
+# Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
 
 
 def make_file_name(name: str) -> str:
-    """Name of a problem or solver as part of a file's name."""
+    """Return the name of a problem or solver as part of a file name."""
     return "".join(sign if sign.isalnum() or sign in "-_+." else "." for sign in name)
 
 
 def read_bytes(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> bytes:
-    """Content of a regular file.
+    """Return the content of a regular file.
 
     Args:
         path: of the file; a link to a regular file is followed.
@@ -70,29 +70,29 @@ def read_bytes(
 def read_text(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> str:
-    """Content of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
+    """Return the text of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
     content = read_bytes(path, what, error=error, at_most=at_most, remedy=remedy)
     with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
         text = content.decode("utf-8")
         if text.startswith(BYTE_ORDER_MARK):
-            raise ValueError("it begins with a byte-order mark; save it as UTF-8 without one")
+            raise ValueError("it starts with a byte-order mark; save it as UTF-8 without one")
     return text
 
 
 def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:
-    """Content of a JSON file, see ``check_plain``; a repeated key is refused too; arguments and errors as ``read_bytes``."""
+    """Return the data of a JSON file, see ``check_plain``; repeated keys are refused; arguments and errors as ``read_bytes``."""
     text = read_text(path, what, error=error, remedy=remedy)
     with convert_errors(f"{what} {str(path)!r} is not valid JSON", error, remedy):
-        data = json.loads(text, object_pairs_hook=_without_twins)
+        data = json.loads(text, object_pairs_hook=_reject_duplicate_keys)
         check_plain(data)
     return data
 
 
 def check_plain(data: Any) -> None:
-    """Refuse what is not plain data: texts, finite numbers, true and false, null, lists, objects.
+    """Check that data are plain: texts, finite numbers, true and false, null, lists, objects.
 
     Raises:
-        ValueError: with the place of what is not allowed.
+        ValueError: with the place of the first other value.
     """
     waiting: list[tuple[str, Any, int]] = [("", data, 1)]
     while waiting:
@@ -110,39 +110,31 @@ def check_plain(data: Any) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in one step.
-
-    Raises:
-        OutputError: no room, no permission, no folder.
-    """
+    """Write a text file atomically; raises OutputError (no space, no permission, no folder)."""
     with replace_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def format_csv(rows: Iterable[Sequence[object]]) -> str:
-    """Rows as comma-separated values, cells quoted where they must be, each line ended by a line feed."""
+    """Return rows as comma-separated values, cells quoted where necessary, lines ended by a line feed."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step; NaN and infinity are refused, for not every reader takes them: see ``replace_nan``.
-
-    Raises:
-        OutputError: no room, no permission, no folder.
-    """
+    """Write JSON atomically; raises OutputError as ``write_text``. NaN and infinity are refused, see ``replace_nan``."""
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Empty file beside ``path``, made by this process under a hidden name in ``.tmp``, that takes its name at the end.
+    """Yield a new empty file next to ``path`` with a hidden name in ``.tmp``, which replaces ``path`` at the end.
 
-    After that, a power cut leaves the new file whole, and before it, the older one or none.
+    A power cut leaves either the complete new file or the old state.
 
     Raises:
-        OutputError: no room, no permission, no folder.
+        OutputError: no space, no permission, no folder.
     """
     temporary = None
     try:
@@ -150,7 +142,7 @@ def replace_file(path: Path) -> Iterator[Path]:
             if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
                 raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
             unused = path.parent / f".{secrets.token_hex(8)}.tmp"
-            # With O_EXCL it cannot be a file or a link that somebody has put there.
+            # O_EXCL: it is not an existing file or link of another user.
             os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             temporary = unused
             yield temporary
@@ -163,7 +155,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def replace_nan(data: Any) -> Any:
-    """The same plain data with null for every number that is not finite."""
+    """Return the same plain data with null for every number that is not finite."""
     if isinstance(data, float):
         return data if math.isfinite(data) else None
     if isinstance(data, Mapping):
@@ -175,28 +167,28 @@ def replace_nan(data: Any) -> Any:
 
 @contextmanager
 def convert_errors(owner: str, error: type[GaitError], remedy: str = "") -> Iterator[None]:
-    """Raises what is wrong with a file or its content as another error, which says whose data it is and what to do."""
+    """Convert errors of a file or its content to another class, with their owner and what to do in the message."""
     try:
         yield
     except (OSError, ValueError, RecursionError) as reason:
-        said = getattr(reason, "strerror", None) or reason
-        raise error(f"{owner}: {said}{remedy and f'; {remedy}'}") from reason
+        message = getattr(reason, "strerror", None) or reason
+        raise error(f"{owner}: {message}{remedy and f'; {remedy}'}") from reason
 
 
-def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) != len(pairs):
         keys = [key for key, _ in pairs]
-        twin = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {twin[:SHOWN]!r} appears twice")
+        duplicate = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {duplicate[:SHOWN]!r} is duplicated")
     return found
 
 
 def _check_leaf(where: str, value: Any) -> None:
-    place = _shortened(where)
+    place = _shorten(where)
     if isinstance(value, str):
         if not value.isascii() and not value.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in value):
-            raise ValueError(f"{place!r} holds half a character, got {_shortened(value)!r}")
+            raise ValueError(f"{place!r} contains an unpaired surrogate, got {_shorten(value)!r}")
     elif isinstance(value, bool) or value is None:
         return
     elif isinstance(value, int):
@@ -208,19 +200,19 @@ def _check_leaf(where: str, value: Any) -> None:
         raise ValueError(f"{place!r} must be finite, got {value}")
 
 
-def _shortened(text: str) -> str:
+def _shorten(text: str) -> str:
     return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
 
 
 @contextmanager
 def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
-    """Folder for a while, removed at the end.
+    """Yield a temporary folder, removed at the end.
 
     Raises:
-        GaitError: of that class: the system has no folder for temporary files with room in it.
+        GaitError: of that class: the system has no folder for temporary files, or no space in it.
     """
     with convert_errors(
-        "no folder for temporary files", error, "free some disk space, or name another folder in TMPDIR"
+        "no folder for temporary files", error, "free some disk space, or set TMPDIR to another folder"
     ):
         folder = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
     with folder as name:
@@ -228,29 +220,21 @@ def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> 
 
 
 def check_name(path: Path) -> None:
-    """Refuse a path to write to that records, reports and messages could not name.
-
-    Raises:
-        OutputError: it is no valid UTF-8.
-    """
+    """Check that records and messages can contain an output path; raises OutputError if it is not valid UTF-8."""
     check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
 
 
 def check_path(path: str, owner: str, error: type[GaitError]) -> None:
-    """Refuse a path that records could not name; ``owner`` begins the message.
-
-    Raises:
-        GaitError: of that class: it is no valid UTF-8.
-    """
+    """Check that records can contain a path; raises ``error``, with ``owner`` in front, if it is not valid UTF-8."""
     if any("\ud800" <= sign <= "\udfff" for sign in path):
-        raise error(f"{owner}: its name is no valid UTF-8; choose another name")
+        raise error(f"{owner}: its name is not valid UTF-8; choose another name")
 
 
 def make_writable_folder(path: Path) -> Path:
-    """Make a folder, and prove now that files can be written there rather than after the work.
+    """Make a folder and check, before the work, that files can be written there.
 
     Raises:
-        OutputError: it cannot be made or written to, or its name is no valid UTF-8.
+        OutputError: it cannot be made or written to, or its name is not valid UTF-8.
     """
     check_name(path)
     with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
@@ -260,10 +244,10 @@ def make_writable_folder(path: Path) -> Path:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of ``replace_file`` that a killed process left behind, none that may still be in use."""
+    """Remove temporary files of ``replace_file`` that a killed process left; files that may be in use stay."""
     for path in folder.glob(".*.tmp"):
         try:
-            if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # from the future too: a clock was put back
+            if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # also from the future: the clock was set back
                 path.unlink(missing_ok=True)
         except OSError:
-            continue  # another process has removed it
+            continue  # removed by another process

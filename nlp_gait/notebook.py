@@ -1,4 +1,4 @@
-"""What results share in notebooks: small tables as HTML, and data frames where pandas is installed."""
+"""Display of results in notebooks: small HTML tables, and pandas for data frames."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nlp_gait.errors import MissingExtraError
 
 
 def format_html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
-    """A table without any style of its own, so that it takes that of the notebook, dark or light; all text is escaped."""
+    """Return a table without own style, so that it follows the notebook's, dark or light; all text is escaped."""
     heads = "".join(f"<th>{escape(name)}</th>" for name in header)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     below = f"<p>{escape(note)}</p>" if note else ""
@@ -21,11 +21,7 @@ def format_html_table(title: str, header: Sequence[str], rows: Iterable[Sequence
 
 
 def import_pandas() -> ModuleType:
-    """The package pandas, which nothing here needs but ``to_frame``.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
+    """Return the module pandas, which only ``to_frame`` needs; raises MissingExtraError if it is not installed."""
     try:
         import pandas as module
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""Variables in blocks: one value for every row (a link, a component) and every column (an instant)."""
+"""Blocks of variables: one value per row (a link, a component) and column (an instant)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Block:
         rows: names of the rows.
         columns: number of columns.
         limits: lower and upper bound of every row [unit].
-        description: what a row is.
+        description: of a row.
     """
 
     quantity: str
@@ -35,7 +35,7 @@ class Block:
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """Column by column."""
+        """Variables, column by column."""
         suffix = self.unit.replace("/", "_").replace("^", "")
         return tuple(
             Variable(
@@ -57,7 +57,7 @@ class Block:
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Blocks one after the other; the whole of x.
+    """Layout of x: consecutive blocks.
 
     Attributes:
         blocks: in the order of x.
@@ -71,7 +71,7 @@ class Layout:
         return tuple(variable for block in self.blocks for variable in block.variables)
 
     def split(self, point: Point) -> dict[str, MX]:
-        """Symbols of each block by quantity, (rows, columns)."""
+        """Return the symbols of each block by quantity, (rows, columns)."""
         ends = np.cumsum([0, *(block.size for block in self.blocks)])
         parts = ca.vertsplit(point.x, [int(end) for end in ends])
         return {
@@ -80,7 +80,7 @@ class Layout:
         }
 
     def values(self, x: Array) -> dict[str, Array]:
-        """Values of each block by quantity, (rows, columns), from x (n,)."""
+        """Return the values of each block by quantity, (rows, columns), from x (n,)."""
         ends = np.cumsum([block.size for block in self.blocks])[:-1]
         return {
             block.quantity: part.reshape(block.columns, len(block.rows)).T
@@ -88,10 +88,10 @@ class Layout:
         }
 
     def join(self, values: Mapping[str, Array]) -> Array:
-        """x (n,) from the values of each block (rows, columns)."""
+        """Return x (n,) from the values of each block (rows, columns)."""
         return np.concatenate([values[block.quantity].T.ravel() for block in self.blocks])
 
 
 def make_labels(rows: Sequence[str], columns: Sequence[int] | range) -> tuple[str, ...]:
-    """Row labels of a constraint on a (rows, columns) matrix in column-major order: ``"HK, 12"``."""
+    """Return row labels of a constraint on a (rows, columns) matrix in column-major order: ``"HK, 12"``."""
     return tuple(f"{row}, {k}" for k in columns for row in rows)

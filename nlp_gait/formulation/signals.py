@@ -19,7 +19,7 @@ JOINT_UNITS = {"q": "rad", "qd": "rad/s", "qdd": "rad/s^2", "tau": "Nm"}
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """What the columns of one time history are.
+    """Description of the columns of one time history.
 
     Attributes:
         unit: of all of them.
@@ -31,7 +31,7 @@ class Columns:
 
 
 def vector_columns(unit: str, axes: str = "xyz") -> Columns:
-    """Columns of a vector along axes of the world."""
+    """Return the columns of a vector along axes of the world."""
     return Columns(unit=unit, labels=tuple(axes))
 
 
@@ -62,7 +62,7 @@ class Signals:
         columns: unit and labels of every array but ``"t"`` and those of the joints.
 
     Raises:
-        InputError: an array whose columns are not described, or not as many as it has.
+        InputError: the columns of an array are not described, or their number differs.
     """
 
     joints: tuple[str, ...]
@@ -70,20 +70,19 @@ class Signals:
     columns: Mapping[str, Columns]
 
     def __post_init__(self) -> None:
-        """Refuse an array that nobody could read."""
         for name, _, labels, table in self._tables():
             if table.shape[1] != len(labels):
                 raise InputError(f"time history {name!r} has {table.shape[1]} columns, but {len(labels)} are described")
 
     def named_columns(self) -> Iterator[tuple[str, str, Array]]:
-        """Name, unit and values (T,) of every column, time first: for example ``q LKneePitch``, rad."""
+        """Yield name, unit and values (T,) of every column, time first: for example ``q LKneePitch``, rad."""
         yield "t", "s", self.arrays["t"]
         for name, unit, labels, table in self._tables():
             for label, column in zip(labels, table.T, strict=True):
                 yield f"{name} {label}".strip(), unit, column
 
     def __getitem__(self, name: str) -> Array:
-        """An array by its name, as ``"tau"``, or one column of it, as ``"tau LKneePitch"``; raises UnknownNameError."""
+        """Return an array by name (``"tau"``) or one of its columns (``"tau LKneePitch"``); raises UnknownNameError."""
         if name in self.arrays:
             return self.arrays[name]
         columns = {column: values for column, _, values in self.named_columns()}
@@ -92,7 +91,7 @@ class Signals:
         return columns[name]
 
     def to_frame(self) -> Any:
-        """A pandas data frame: a column for each of ``named_columns``, indexed by time; ``frame.attrs["units"]`` by column.
+        """Return a pandas data frame of ``named_columns``, indexed by time; ``frame.attrs["units"]`` has the units by column.
 
         Raises:
             MissingExtraError: pandas is not installed.
@@ -106,7 +105,6 @@ class Signals:
         return frame
 
     def __repr__(self) -> str:
-        """One line: how long, how many samples, and what there is."""
         t = self.arrays["t"]
         return f"<Signals over {t[-1] - t[0]:.4g} s in {len(t)} samples: {', '.join(self.arrays)}>"
 

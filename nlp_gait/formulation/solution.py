@@ -1,4 +1,4 @@
-"""What a solver hands back: numbers and names, no solver objects."""
+"""Results of solvers: numbers and names, no solver objects."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6
-SHOWN = 20  # variables, and rows with a price, that a notebook shows
+SHOWN = 20  # variables, and constraints with a price, in a notebook
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActiveConstraint:
-    """A bound that holds the optimum back.
+    """An active bound.
 
     Attributes:
         name: row or variable bound, for example ``"dbm_y_mean"`` or ``"bounds[hip_height_m]"``.
         side: ``"lower"`` or ``"upper"``.
         bound: value of the bound [unit].
         unit: of the bound.
-        price: change of the optimal objective per unit by which the bound is raised.
+        price: change of the optimal objective per unit of the bound.
         price_unit: for example ``"W per m"``.
     """
 
@@ -41,7 +41,7 @@ class ActiveConstraint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstraintValue:
-    """One constraint row at a point; a missing bound is None."""
+    """Value of one constraint at a point; a missing bound is None."""
 
     name: str
     value: float
@@ -66,7 +66,7 @@ class Evaluations:
         return Evaluations(**{kind: getattr(self, kind) + getattr(other, kind) for kind in asdict(self)})
 
     def by_kind(self) -> dict[str, int]:
-        """Counts by kind; of f alone for a solver that calls nothing else."""
+        """Return counts by kind; only f for a solver that calls nothing else."""
         return {"f": self.f} if self == Evaluations(f=self.f) else asdict(self)
 
 
@@ -80,7 +80,7 @@ class SolveTime:
 
 
 class Best(NamedTuple):
-    """Best point after a number of calls: its objective, None if nothing was feasible until then, and the time [s]."""
+    """Best point after a number of calls: its objective, None before the first feasible point, and the time [s]."""
 
     calls: int
     objective: float | None
@@ -89,13 +89,13 @@ class Best(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Guess:
-    """Primal and dual point of the lifted NLP, from which a neighbouring problem can be started warm.
+    """Primal and dual point of the lifted NLP, for a warm start of a neighbouring problem.
 
     Attributes:
         primal: scaled variables, then the lifted ones.
         bounds: multipliers of their bounds, positive at an upper bound.
-        rows: multipliers of all rows, the problem's first.
-        width: sigmoid width at which they were found.
+        rows: multipliers of all rows, those of the problem first.
+        width: sigmoid width of that NLP.
     """
 
     primal: Array
@@ -113,20 +113,20 @@ class Outcome:
         x0: (n,) start point.
         x: (n,) end point, within the bounds.
         claimed: the solver claims a solution.
-        status: how it ended, in words.
+        status: reason why it ended.
         objective: exact value at x, in the problem's sense.
-        cost: the same as it is minimised: negated if the problem maximises it.
+        cost: the minimised value: negated if the problem maximises the objective.
         violation: exact total violation at x.
-        iterations: over all stages, where the solver counts them.
+        iterations: over all stages, if the solver counts them.
         evaluations: over all stages.
         time_s: wall time of the run itself [s].
-        build_s: time to build the symbolic NLP, whenever that was [s].
-        compile_s: time to make the solver, with derivatives and their compilation, whenever that was [s].
+        build_s: time to build the symbolic NLP, also if an earlier run built it [s].
+        compile_s: time to make the solver, with derivatives and their compilation, also if an earlier run did [s].
         functions: ``"compiled"`` or ``"interpreted"``.
-        linear_solver: that was really used, where the solver says it.
-        guess: warm start with multipliers, where the solver has one.
-        history: best so far, where the solver keeps it.
-        objective_s: part of the time in the exact functions, NaN where it is not known [s].
+        linear_solver: used by the solver, if it reports it.
+        guess: warm start with multipliers, if the solver has one.
+        history: best so far, if the solver records it.
+        objective_s: part of the time in the exact functions, NaN if unknown [s].
     """
 
     solver: str
@@ -160,7 +160,7 @@ class Outcome:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Smaller is better: what succeeded by cost, then what is feasible by cost, then the rest by violation."""
+        """Smaller is better: converged runs by cost, then feasible ones by cost, then the rest by violation."""
         if self.feasible:
             return (0.0 if self.converged else 1.0), self.cost
         return 2.0, math.inf if math.isnan(self.violation) else self.violation
@@ -172,19 +172,21 @@ class Solution:
 
     Attributes:
         problem: name.
-        options: what the problem was built with.
+        options: of the problem.
         parameters: values that differ from the defaults.
         claimed: the solver claims that x is a solution.
-        status: in words; if nothing converged, what stands in the way.
-        objective: exact value, in the problem's sense; name and unit beside it.
+        status: reason why the best start ended, and the obstacle if none converged.
+        objective: exact value, in the problem's sense.
+        objective_name: for example ``"power"``.
+        objective_unit: for example ``"W"``.
         x: by variable name.
         violation: exact total violation.
         worst_violations: violated rows, worst first.
-        iterations: of the start that is reported.
+        iterations: of the best start.
         evaluations: over all starts.
         time_s: over all starts.
         solver: for example ``"ipopt"``.
-        linear_solver: that it really used; empty if it does not say.
+        linear_solver: used by the solver; empty if it does not report it.
         functions: ``"compiled"`` or ``"interpreted"``.
         active_constraints: bounds with a price, highest first.
         starts: outcome of every start.
@@ -223,7 +225,6 @@ class Solution:
         return self.claimed and self.feasible
 
     def __repr__(self) -> str:
-        """One line: what was found, and from how many starts."""
         found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
         converged = sum(start.converged for start in self.starts)
         return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
@@ -233,25 +234,25 @@ class Solution:
         x = [(name, f"{value:.6g}", bounds.pop(f"bounds[{name}]", "")) for name, value in list(self.x.items())[:SHOWN]]
         rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
         left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
-        note = self.status + (f"; {left_out} more rows in .x and .active_constraints" if left_out else "")
+        note = self.status + (f"; {left_out} more in .x and .active_constraints" if left_out else "")
         return format_html_table(
-            repr(self)[1:-1], ("variable or row", "value", "price of raising its bound"), [*x, *rows], note
+            repr(self)[1:-1], ("variable or constraint", "value", "price of raising its bound"), [*x, *rows], note
         )
 
     def signals(self, problem: GaitProblem | None = None) -> Signals:
-        """Time histories at x.
+        """Return time histories at x.
 
         Args:
-            problem: that was solved; None to load it by its name, which one of your own may not have.
+            problem: that was solved; None to load it by name, which a user-defined problem may not have.
 
         Raises:
             UnknownNameError: no problem has that name.
             InputError: the problem has no time histories.
         """
-        return self._of(problem).signals(self.x)
+        return self._restore(problem).signals(self.x)
 
     def plot(self, problem: GaitProblem | None = None) -> Any:
-        """The gait as a Matplotlib figure: stick figures from the side, power and balance margin over time.
+        """Plot the gait with Matplotlib: stick figures from the side, power and balance margin over time.
 
         Args:
             problem: as in ``signals``.
@@ -261,16 +262,15 @@ class Solution:
             InputError: the problem has no time histories.
         """
         plot_gait: Any = import_object(FUNCTIONS["plot_gait"])
-        return plot_gait(self._of(problem), self.x, self.solver)
+        return plot_gait(self._restore(problem), self.x, self.solver)
 
-    def _of(self, problem: GaitProblem | None) -> GaitProblem:
-        """The problem that was solved, with the values that it had."""
+    def _restore(self, problem: GaitProblem | None) -> GaitProblem:
         from nlp_gait.formulation.registry import load
 
         return (problem or load(self.problem, **self.options)).with_values(**self.parameters)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers, with the schema version of results."""
+        """Return plain dictionaries, lists and numbers, with the schema version of results."""
         starts = [
             {
                 "index": index,

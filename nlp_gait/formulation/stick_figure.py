@@ -1,4 +1,4 @@
-"""What is drawn of a gait: lines between joints, soles, the ground, centre of mass and zero-moment point over time."""
+"""Stick figures of a gait: lines between joints, soles, ground, centre of mass and zero-moment point over time."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limb:
-    """Joints from one end to the other.
+    """Chain of joints from end to end.
 
     Attributes:
-        side: left, right or trunk; it gives the colour.
+        side: left, right or trunk; determines the colour.
         points: (T, K, 3) [m].
     """
 
@@ -33,7 +33,7 @@ class Sole:
     Attributes:
         side: left or right.
         corners: (T, K, 3) [m].
-        supports: (T,) whether it bears load.
+        supports: (T,) whether it carries load.
     """
 
     side: str
@@ -43,7 +43,7 @@ class Sole:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Skeleton:
-    """A gait as it is drawn; x forward, y left, z up.
+    """Drawing of a gait; x forward, y left, z up.
 
     Attributes:
         t: (T,) [s].
@@ -52,7 +52,7 @@ class Skeleton:
         ground: (K, 2) line (x, z) of the floor or stair, seen from the side [m].
         com: (T, 3) centre of mass [m], if known.
         zmp: (T, 3) zero-moment point on the ground [m], if known.
-        planar: only the side view means anything.
+        planar: only the side view is meaningful.
         title: one line.
     """
 
@@ -66,15 +66,15 @@ class Skeleton:
     title: str = ""
 
     def support(self, k: int) -> Array | None:
-        """(M, 2) support polygon at a sample: the hull of the loaded soles, seen from above [m]; None if there is none."""
+        """Return the support polygon (M, 2) at a sample, the hull of the loaded soles from above [m]; None without one."""
         loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
         return _hull(np.concatenate(loaded)) if loaded else None
 
     def margin(self) -> Array:
-        """(T,) distance of the zero-moment point from the nearest edge of the support polygon [m], negative outside of it.
+        """Return the distance (T,) of the zero-moment point from the nearest edge of the support polygon [m], negative outside.
 
-        NaN where it is not known, or nothing bears load. At the first and the last instant the soles that bear load are those of
-        the instant beside it: a foot that just touches the ground there bears none over the gait.
+        NaN where it is unknown or no sole carries load. The first and the last instant use the loaded soles of their neighbour: a
+        foot that only touches the ground there carries no load.
         """
         if self.zmp is None:
             return np.full(len(self.t), np.nan)
@@ -99,24 +99,24 @@ class Skeleton:
         return -float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
 
     def box(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinates of everything that moves, (3,) each [m]."""
+        """Return the smallest and largest coordinates of everything that moves, (3,) each [m]."""
         parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
         everything = np.concatenate([part.reshape(-1, 3) for part in parts])
         return everything.min(axis=0), everything.max(axis=0)
 
 
 def _hull(points: Array) -> Array | None:
-    """(M, 2) corners of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
+    """Return corners (M, 2) of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
     from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
 
     try:
         return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:  # soles of no width, as in a planar model
+    except QhullError:  # soles without width, as in a planar model
         return None
 
 
 def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
-    """A gait on a floor, with the centre of mass and the zero-moment point of its time histories."""
+    """Return a gait on a flat floor, with the centre of mass and the zero-moment point of its time histories."""
     arrays = signals.arrays
     return Skeleton(
         t=arrays["t"],
@@ -129,16 +129,16 @@ def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[
 
 
 def make_flat_ground(*points: Array) -> Array:
-    """Line (x, z) at height zero below all points (..., 3)."""
+    """Return a line (x, z) at height zero below all points (..., 3)."""
     x = np.concatenate([p[..., 0].ravel() for p in points])
     return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
 
 
 def make_rectangle(back: float, front: float, right: float, left: float) -> Array:
-    """(4, 3) corners at height zero."""
+    """Return corners (4, 3) at height zero."""
     return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
 
 
 def append_zero_height(zmp: Array) -> Array:
-    """(T, 3) from (T, 2)."""
+    """Return (T, 3) from (T, 2)."""
     return np.column_stack([zmp, np.zeros(len(zmp))])

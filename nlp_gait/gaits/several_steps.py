@@ -1,4 +1,4 @@
-"""A walk of several steps from one cycle: every second step is the mirror image of the one before, a step further."""
+"""Walks of several steps from one cycle: each step is the mirror image of the previous one, one step length ahead."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIDES_SWAPPED = {
     for side, other in (("left", "right"), ("right", "left"))
     for what in ("foot", "bears", "force", "moment")
 }
-# What stays where it is when a walk goes on, and what a reflection at the plane y = 0 does to a quaternion (w, x, y, z).
+# Arrays that do not move along with the walk; a reflection at the plane y = 0 of a quaternion (w, x, y, z).
 UNMOVED = (
     *JOINT_ARRAYS,
     "attitude",
@@ -27,13 +27,13 @@ MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
-    """Time histories of so many steps.
+    """Return time histories of several steps.
 
     Args:
-        cycle: of one step that begins on the left foot and ends in the mirror image of its beginning.
+        cycle: one step that starts on the left foot and ends in the mirror image of its start.
         robot: whose joints are mirrored.
         steps: at least 1.
-        rise_m: how far a step leads up.
+        rise_m: height gained per step.
 
     Raises:
         InputError: no step.
@@ -42,19 +42,19 @@ def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
     image = mirror(cycle, robot)
     advance, period = np.array([step_length(cycle), 0.0, rise_m]), float(cycle.arrays["t"][-1])
-    parts = [_moved(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
+    parts = [_move(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
     arrays = {name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]}
     return replace(cycle, arrays=arrays)
 
 
 def step_length(cycle: Signals) -> float:
-    """How far a cycle moves the hip forward [m]."""
+    """Return the distance that a cycle moves the hip forward [m]."""
     hip = cycle.arrays["hip"]
     return float(hip[-1, 0] - hip[0, 0])
 
 
 def mirror(signals: Signals, robot: Robot) -> Signals:
-    """Time histories with left and right exchanged. Torques are those of a robot that is itself symmetric."""
+    """Return time histories with left and right exchanged; torques are right for a symmetric robot."""
     images = partners(robot)
     columns = [signals.joints.index(images[name]) for name in signals.joints]
     signs = np.array([mirror_sign(robot, name, images[name]) for name in signals.joints])
@@ -67,18 +67,18 @@ def mirror(signals: Signals, robot: Robot) -> Signals:
         elif name == "attitude":
             arrays[name] = array * MIRRORED_ATTITUDE
         else:
-            # A reflection turns a moment, as any turning, the other way than a force.
+            # A reflection changes the sign of a moment relative to a force (pseudovector).
             reflected = np.array([1.0, -1.0, 1.0]) * (-1.0 if signals.columns[name].unit == "Nm" else 1.0)
             arrays[SIDES_SWAPPED.get(name, name)] = array * reflected[: array.shape[1]]
     return replace(signals, arrays=arrays)
 
 
-def _moved(signals: Signals, way: Array, delay: float) -> dict[str, Array]:
-    """Arrays with all positions moved by (x, y, z) [m] and all times delayed [s]."""
+def _move(signals: Signals, distance: Array, delay: float) -> dict[str, Array]:
+    """Return arrays with all positions moved by (x, y, z) [m] and all times delayed [s]."""
     arrays = {}
     for name, array in signals.arrays.items():
         if name in UNMOVED:
             arrays[name] = array
         else:
-            arrays[name] = array + (delay if name == "t" else way[: array.shape[1]])
+            arrays[name] = array + (delay if name == "t" else distance[: array.shape[1]])
     return arrays

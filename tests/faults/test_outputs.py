@@ -87,7 +87,7 @@ def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
 def test_a_name_that_is_no_text_is_refused_before_the_work(arguments: str, tmp_path: Path) -> None:
     done = shell(f"$gait {arguments} \"$(printf '{tmp_path}/f\\377')\"")
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
-    assert "its name is no valid UTF-8; choose another name" in done.stderr
+    assert "its name is not valid UTF-8; choose another name" in done.stderr
     assert list(tmp_path.iterdir()) == [] and done.stdout == ""
 
 
@@ -97,7 +97,7 @@ def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -
     (folder / "mine.json").write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
     (folder / "own.py").write_text("from nlp_gait import load\nwalk = load('walk12')\n")
     for problem, options in (("nao-dsp", {"robot": f"{folder}/mine.json"}), (f"{folder}/own.py:walk", {})):
-        with pytest.raises(GaitError, match="no valid UTF-8; choose another name"):
+        with pytest.raises(GaitError, match="not valid UTF-8; choose another name"):
             load(problem, **options)
 
 
