@@ -1,8 +1,6 @@
 """Command line: ``nlp-gait COMMAND``.
 
-From the problems to the comparison: ``list | evaluate | solve | search | compare | report | sweep | reproduce | walk``. From a
-result to a robot: ``simulate | export | animate``. Questions past the papers: ``prices | pareto | certainty | motors | motions |
-robust``. To and from other packages: ``import | bench | logs | export-objective | export-solver``.
+``PANELS`` lists the commands.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
@@ -16,16 +14,14 @@ import typer
 
 import nlp_gait
 from compare.cli.animate import animate
+from compare.cli.bench import bench
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
-from compare.cli.exchange.bench import bench
-from compare.cli.exchange.export_objective import export_objective
-from compare.cli.exchange.export_solver import export_solver
-from compare.cli.exchange.import_results import import_results
-from compare.cli.exchange.logs import logs
-from compare.cli.export import export
+from compare.cli.export import export, export_objective, export_solver
+from compare.cli.import_results import import_results
 from compare.cli.list import list_problems
+from compare.cli.logs import logs
 from compare.cli.questions.certainty import certainty
 from compare.cli.questions.motions import motions
 from compare.cli.questions.motors import motors
@@ -56,22 +52,22 @@ app = typer.Typer(
 )
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         print(nlp_gait.__version__)
         raise typer.Exit
 
 
 @app.callback()
-def options_of_all(
+def take_common_options(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_print_version)
     ] = False,
 ) -> None:
-    """Take what belongs to no command."""
+    """Options without a command."""
 
 
-# Commands whose names Python has taken, or does not allow.
+# Commands whose names are taken or not allowed in Python.
 NAMES = {
     list_problems: "list",
     import_results: "import",

@@ -19,9 +19,9 @@ SHEET = ".png"
 def animate(
     stored: StoredGait,
     out: Annotated[
-        Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF beside the result.")
+        Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF next to the result.")
     ] = None,
-    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second.")] = 12.5,
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames per second.")] = 12.5,
     speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
     poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
 ) -> None:
@@ -42,7 +42,7 @@ def animate(
         if target.suffix.lower() == SHEET:
             write_contact_sheet(skeleton, target, poses)
         else:
-            played_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
-            check_frames(played_s, frames_per_s)
-            write_video(target, draw_frames(skeleton), (len(skeleton.t) - 1) / played_s)
+            duration_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
+            check_frames(duration_s, frames_per_s)
+            write_video(target, draw_frames(skeleton), (len(skeleton.t) - 1) / duration_s)
     print_written(target)

@@ -1,7 +1,7 @@
-"""A command: its groups of options, and how its errors end it.
+"""Commands: groups of options, and exit by errors.
 
-Several commands take the same options. Such a group is a frozen dataclass whose fields are annotated as the parameters of a Typer
-command are; a command that has a parameter of that type gets every field as an option, and the dataclass when it is called.
+Options of several commands form a group: a frozen dataclass whose fields are annotated like parameters of a Typer command. A
+command with a parameter of that type has every field as an option, and receives the dataclass.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from nlp_gait.interrupts import raise_interrupts
 
 R = TypeVar("R")
 
-PLAIN = "nlp-gait-plain"  # how characters are written that an output's encoding does not have
-# Errors of the system where a file cannot grow.
-NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
+# Errors of the system if a file cannot grow.
+NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 
 def command(function: Callable[..., R]) -> Callable[..., R]:
-    """Function that Typer can call: groups become options, expected errors one sentence on stderr and the right status."""
+    """Make a function a Typer command: groups become options, expected errors one sentence on stderr and an exit status."""
     parameters = inspect.signature(function, eval_str=True).parameters.values()
     groups: dict[str, Any] = {p.name: p.annotation for p in parameters if is_dataclass(p.annotation)}
 
@@ -45,14 +45,14 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
                 result = function(**given)
-                sys.stdout.flush()  # a failure to write is reported here, not by the interpreter at its end
+                sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
             return result
         except (GaitError, SearchError) as error:
             fail(str(error))
         except KeyboardInterrupt as interrupt:
-            end_interrupted(str(interrupt) or "interrupted; files that were written are whole")
+            end_interrupted(str(interrupt) or "interrupted; all written files are complete")
         except OSError as error:
-            _say(error)
+            _report_os_error(error)
             raise typer.Exit(1) from None
 
     options: list[inspect.Parameter] = []
@@ -65,7 +65,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
 
 
 def _options(group: Any) -> Iterator[inspect.Parameter]:
-    """A parameter for each field of a group, in their order."""
+    """Yield a parameter for each field of a group."""
     hints = get_type_hints(group, include_extras=True)
     for field in fields(group):
         default = inspect.Parameter.empty if field.default is MISSING else field.default
@@ -75,34 +75,34 @@ def _options(group: Any) -> Iterator[inspect.Parameter]:
 
 
 def run_app(app: Callable[[], object]) -> None:
-    """Run the command line with outputs that take whatever it prints; help that cannot be written is said too."""
+    """Run the command line with outputs that accept all characters; report help that cannot be written."""
     _open_outputs()
     try:
         app()
     except OSError as error:
-        _say(error)
+        _report_os_error(error)
         sys.exit(1)
 
 
-def _say(error: OSError) -> None:
-    """The sentence for what could not be written; none where the output's reader has gone, as with ``| head``.
+def _report_os_error(error: OSError) -> None:
+    """Report a failed write; nothing if the output's reader has ended, as with ``| head``.
 
     Raises:
-        OSError: it is another one.
+        OSError: another error.
     """
-    if error.errno not in (*NO_ROOM, errno.EPIPE):
+    if error.errno not in (*NO_SPACE, errno.EPIPE):
         raise error
-    gone = error.errno == errno.EPIPE and _readers_gone()
-    # What is left in the buffers is dropped, so that the interpreter does not fail on it at its end.
+    closed = error.errno == errno.EPIPE and _is_output_closed()
+    # Drop the buffers, so that the interpreter does not fail on them at exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
         say_error(f"cannot write the output: {error.strerror}")
-    elif not gone:
-        say_error("a process that this one began has ended before its time")
+    elif not closed:
+        say_error("a child process exited unexpectedly")
 
 
-def _readers_gone() -> bool:
-    """Whether an output is a pipe that nobody reads any more."""
+def _is_output_closed() -> bool:
+    """Return whether an output is a pipe without a reader."""
     outputs = select.poll()
     for stream in (sys.stdout, sys.stderr):
         outputs.register(stream.fileno(), select.POLLOUT)
@@ -110,10 +110,10 @@ def _readers_gone() -> bool:
 
 
 def _open_outputs() -> None:
-    """Outputs that are open and write every character, as plainly as their encoding needs.
+    """Open the outputs and make them write every character, in ASCII where necessary.
 
-    A closed standard output is refused: the next file opened would take its place, and whatever is printed would go there. A
-    closed standard error is opened on nothing.
+    A closed standard output is rejected: the next file opened would get its descriptor and the printed text. A closed
+    standard error is opened on the null device.
     """
     if sys.stderr is None:
         nothing = os.open(os.devnull, os.O_WRONLY)
@@ -121,17 +121,17 @@ def _open_outputs() -> None:
             os.dup2(nothing, 2)
         sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
     if sys.stdout is None:
-        sys.stdout = sys.stderr  # for the interpreter's end
+        sys.stdout = sys.stderr  # for the interpreter's exit
         say_error("standard output is closed; send it to a file or to /dev/null")
         sys.exit(1)
-    codecs.register_error(PLAIN, _plain)
+    codecs.register_error(PLAIN, _encode_plainly)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=PLAIN)
 
 
-def _plain(error: UnicodeError) -> tuple[str, int]:
-    """The nearest ASCII of what cannot be encoded, as a space for a narrow one; else its escape."""
+def _encode_plainly(error: UnicodeError) -> tuple[str, int]:
+    """Return the nearest ASCII characters, such as a space for a narrow one, or else an escape."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]

@@ -1,4 +1,4 @@
-"""What commands print: tables, results, progress, and the one sentence that a command ends with where it fails."""
+"""Output of commands: tables, results, progress, errors."""
 
 from __future__ import annotations
 
@@ -23,43 +23,43 @@ from nlp_gait.files import check_name, make_writable_folder, replace_nan
 
 T = TypeVar("T")
 
-# Characters of an error; a value in it can be a whole file.
+# Characters of an error message, in which a value can be a whole file.
 LONGEST_SENTENCE = 2000
-STACKED_WIDTH = 60  # up to here a table is stacked: a block of lines for each row
-LONGEST_CELL = 24  # characters up to which a cell is kept on one line
-LOG_PERIOD_S = 30.0  # between two lines of progress in a log
-GAP = 3  # columns of a terminal between two columns of a table
+STACKED_WIDTH = 60  # of terminals on which tables are stacked: a block of lines per row
+LONGEST_CELL = 24  # characters of a cell on one line
+LOG_PERIOD_S = 30.0  # between lines of progress in a log
+GAP = 3  # characters between two columns of a table
 
 
 class PlainConsole(Console):
-    """Console on which text is text: no markup, and control characters are shown, not obeyed."""
+    """Console without markup, on which control characters are shown as escapes."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text as it is printed, titles and cells of tables included."""
-        return super().render_str(harmless(text), **options)
+        """Render text, titles and cells of tables included."""
+        return super().render_str(escape_controls(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """As any console; where there is no terminal, a sentence is one line, so that a program can look for it."""
+        """Print; without a terminal, each sentence is one line, so that programs can search for it."""
         if not self.is_terminal and all(isinstance(item, str) for item in objects):
             options.setdefault("soft_wrap", True)
         super().print(*objects, **options)
 
 
-def harmless(text: str) -> str:
-    """Text with escapes in place of control characters and of what is not a character at all.
+def escape_controls(text: str) -> str:
+    """Replace control characters and invalid characters by escapes.
 
-    Spaces of another width, as between thousands, stay although Python does not call them printable.
+    Spaces of other widths, as between thousands, remain, although Python does not consider them printable.
     """
-    kept = {sign for sign in text if sign in "\n\t" or sign.isprintable() or unicodedata.category(sign) == "Zs"}
-    return "".join(sign if sign in kept else repr(sign)[1:-1] for sign in text)
+    allowed = {sign for sign in text if sign in "\n\t" or sign.isprintable() or unicodedata.category(sign) == "Zs"}
+    return "".join(sign if sign in allowed else repr(sign)[1:-1] for sign in text)
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
-stdout = PlainConsole(highlight=False, markup=False)  # 80 columns where no terminal says otherwise
+stdout = PlainConsole(highlight=False, markup=False)  # 80 columns without a terminal
 
 
 def end_interrupted(sentence: str) -> NoReturn:
-    """End with status 130 and one sentence that says what was kept."""
+    """End with status 130 and one sentence about the stored results."""
     fail(sentence, status=130)
 
 
@@ -70,48 +70,48 @@ def fail(message: str, status: int = 1) -> NoReturn:
 
 
 def say_error(message: str) -> None:
-    """The sentence of an error on stderr."""
-    said = " ".join(message.split())
-    shown = said if len(said) <= LONGEST_SENTENCE else f"{said[:LONGEST_SENTENCE]} ..."
-    stderr.print(f"nlp-gait: {shown}", soft_wrap=True)
+    """Print the sentence of an error on stderr."""
+    text = " ".join(message.split())
+    text = text if len(text) <= LONGEST_SENTENCE else f"{text[:LONGEST_SENTENCE]} ..."
+    stderr.print(f"nlp-gait: {text}", soft_wrap=True)
 
 
 def say(sentence: str) -> None:
-    """A sentence on stderr, beside what a command prints."""
+    """Print a sentence on stderr."""
     stderr.print(sentence, soft_wrap=True)
 
 
 def print_json(data: Any) -> None:
-    """One JSON object on stdout; what is not finite is null, because not every reader accepts NaN."""
+    """Print a JSON object on stdout; numbers that are not finite are null, as not every reader accepts NaN."""
     sys.stdout.write(json.dumps(replace_nan(data), indent=1, allow_nan=False) + "\n")
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Table on stdout, never wider than the terminal; numbers are right-aligned, but for the first column.
+    """Print a table on stdout, not wider than the terminal; numbers are right-aligned, except in the first column.
 
-    What does not fit beside the first column follows in a second table with that column again; on narrow terminals there
-    is a block of lines for each row.
+    Columns that do not fit follow in another table with the first column repeated; narrow terminals get a block of
+    lines per row.
     """
     if stdout.width <= STACKED_WIDTH and len(header) > 2:
         _print_stacked(title, header, rows)
         return
-    header, rows = [harmless(name) for name in header], [[harmless(text) for text in row] for row in rows]
-    needs = [_needed(name, [row[i] for row in rows]) for i, name in enumerate(header)]
+    header, rows = [escape_controls(name) for name in header], [[escape_controls(text) for text in row] for row in rows]
+    needs = [_measure_column(name, [row[i] for row in rows]) for i, name in enumerate(header)]
     groups: list[list[int]] = [[0]]
-    room = stdout.width - needs[0] - GAP - 1
-    left = room
+    space = stdout.width - needs[0] - GAP - 1
+    left = space
     for i in range(1, len(header)):
         if needs[i] + GAP > left and len(groups[-1]) > 1:
             groups.append([0])
-            left = room
+            left = space
         groups[-1].append(i)
         left -= needs[i] + GAP
     for k, group in enumerate(groups):
         stdout.print(title if k == 0 else f"{title}, continued")
         table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
         for i in group:
-            need = min(needs[i], room)
-            justify: Literal["left", "right"] = "right" if i and all(_number(row[i]) for row in rows) else "left"
+            need = min(needs[i], space)
+            justify: Literal["left", "right"] = "right" if i and all(_is_number(row[i]) for row in rows) else "left"
             flexible = any(len(row[i]) > LONGEST_CELL for row in rows)
             table.add_column(
                 header[i], justify=justify, overflow="fold", min_width=need, width=None if flexible else need
@@ -121,12 +121,12 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         stdout.print(table)
 
 
-def _number(text: str) -> bool:
+def _is_number(text: str) -> bool:
     return len(text) <= LONGEST_CELL and (not text or text[0] in "+-.0123456789")
 
 
-def _needed(name: str, column: Sequence[str]) -> int:
-    """Width of a column whose heading is wrapped at spaces, and long cells too."""
+def _measure_column(name: str, column: Sequence[str]) -> int:
+    """Return the width of a column whose heading and long cells are wrapped at spaces."""
     words = [name.split(), *([text] if len(text) <= LONGEST_CELL else text.split() for text in column)]
     return max((len(word) for line in words for word in line), default=1)
 
@@ -140,12 +140,12 @@ def _print_stacked(title: str, header: Sequence[str], rows: Sequence[Sequence[st
 
 
 def print_rows(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> None:
-    """Table on stdout with a row for each item: under each heading, what it says of the item."""
+    """Print a table on stdout with a row per item; columns map headings to functions of the item."""
     print_table(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
 
 
 def print_result(as_json: bool, data: Mapping[str, Any], written: Iterable[Path], tables: Callable[[], object]) -> None:
-    """What a command found and the files that it wrote: as one JSON object, or as its tables and a line for each file."""
+    """Print results and written files: as one JSON object, or as tables and a line per file."""
     if as_json:
         print_json({**data, "files": [str(path) for path in written]})
         return
@@ -154,14 +154,14 @@ def print_result(as_json: bool, data: Mapping[str, Any], written: Iterable[Path]
 
 
 def print_written(*paths: Path) -> None:
-    """A line for each file that was written."""
+    """Print a line for each written file."""
     for path in paths:
         stdout.print(f"wrote {path}", soft_wrap=True)
 
 
 @contextmanager
 def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
-    """Progress on stderr, of unknown length if total is None; the function inside advances it by one and shows a note."""
+    """Show progress on stderr, of unknown length if total is None; the yielded function adds one step with a note."""
     if not stderr.is_terminal:
         yield _Log(description, total)
         return
@@ -174,28 +174,30 @@ def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str]
         TextColumn("{task.fields[note]}", markup=False),
     )
     with Progress(*columns, console=stderr, transient=True) as progress:
-        task = progress.add_task(harmless(description), total=total, note="")
-        yield lambda note: progress.update(task, advance=1, note=harmless(note))
+        task = progress.add_task(escape_controls(description), total=total, note="")
+        yield lambda note: progress.update(task, advance=1, note=escape_controls(note))
 
 
 class _Log:
-    """Progress where there is no terminal: a line now and then, so that the log of long work is not empty."""
+    """Progress without a terminal: an occasional line for the log of long work."""
 
     def __init__(self, description: str, total: int | None) -> None:
         self.description, self.total, self.done = description, total, 0
-        self.began = self.said = time.monotonic()
+        self.started = self.reported = time.monotonic()
 
     def __call__(self, note: str) -> None:
         self.done += 1
         now = time.monotonic()
-        if now - self.said >= LOG_PERIOD_S:
-            self.said = now
+        if now - self.reported >= LOG_PERIOD_S:
+            self.reported = now
             of = "" if self.total is None else f" of {self.total}"
-            stderr.print(f"{self.description}: {self.done}{of} after {now - self.began:.0f} s; {note}", soft_wrap=True)
+            stderr.print(
+                f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}", soft_wrap=True
+            )
 
 
 def output_file(path: Path) -> Path:
-    """Path that can be written to, checked before the work."""
+    """Check before the work that a path can be written to, and return it."""
     check_name(path)
     make_writable_folder(path.parent)
     try:

@@ -14,7 +14,7 @@ import typer
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, say_error, stdout
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, name_all, parse_names
-from compare.cli.report import plain_plays, play_best, print_plays
+from compare.cli.report import plain_simulations, print_simulations, simulate_best
 from compare.cli.search_options import SearchOptions
 from compare.study.settings import SolverSpec, read_settings, resolve_user_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
 ALL, ALL_GRADIENT, BAYES = "all", (IPOPT, "slsqp"), BayesianOptimisation.name
-# Options that say how and where a study runs; all others decide what it computes and stand in a study file.
-OF_THE_SESSION = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
+# Options for how and where a study runs; all others decide what it computes and are part of a study file.
+SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
 
 @command
@@ -45,37 +45,37 @@ def compare(
     algorithms: Annotated[
         str,
         typer.Option(
-            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` is every search that is "
-            f"installed (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
+            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` stands for every installed "
+            f"search (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
-        int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is one run.")
+        int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is a run.")
     ] = 20,
     searches: SearchOptions,
     options: ProblemOptions,
     config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
     out: Annotated[
-        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are kept.")
+        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are reused.")
     ] = RESULTS,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out, whatever it was.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out.")] = False,
     jobs: Jobs = None,
     code: Code = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
     engine: Annotated[
-        bool, typer.Option("--engine", help="Then play every solver's best gait in MuJoCo (extra sim).")
+        bool, typer.Option("--engine", help="Also simulate every solver's best gait in MuJoCo (extra sim).")
     ] = False,
     as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
-    """Put IPOPT and search algorithms side by side: one record a run, tables, figures and a report.
+    """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 
-    Every finished run is kept: the same call, or `--resume`, continues a study that was stopped in any way. More runs, solvers,
-    problems or a larger budget in the same folder continue it too; runs whose algorithm, problem or robot was edited are made
-    again. Problems and algorithms of your own take part as `FILE.py:NAME`.
-    With `--engine` the report says how each solver's best gait fares in a physics engine, and whether that confirms the model.
+    Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
+    or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited are recomputed. Your own
+    problems and algorithms are named as `FILE.py:NAME`.
+    With `--engine` the report includes every solver's best gait in a physics engine, and whether it confirms the model.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
@@ -91,27 +91,25 @@ def compare(
     if engine:
         load_mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
-        _refuse_others(context, "--config" if config is not None else "--resume")
+        _reject_study_options(context, "--config" if config is not None else "--resume")
     name_all(code)
     if config is not None:
         settings = read_settings(config)
     elif resume:
         known = read_manifest(out).settings
         if known is None:
-            raise InputError(f"{str(out)!r} holds no study to resume (study.json); leave --resume out to begin one")
+            raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
         settings = resolve_user_code(known, f"the study in {str(out)!r}")
     else:
         specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
-        solvers = chosen_solvers(algorithms, starts, searches)
+        solvers = choose_solvers(algorithms, starts, searches)
         settings = searches.make_study(specs, solvers, max(starts, 1))
     study = Study(
         tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
     check_study(study)  # before the manifest names it
     if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
-        raise InputError(
-            f"no gait of {', '.join(p.title for p in settings.problems)} can be played; leave out --engine"
-        )
+        raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
     command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     write_manifest(out, settings, Session.begin(command_line, scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
@@ -127,55 +125,53 @@ def compare(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
     records += read_imported_records(out, records)
-    plays = play_best(out, records, Drive()) if engine else []
+    gaits = simulate_best(out, records, Drive()) if engine else []
     written = write_report(out, records, read_manifest(out), as_csv=as_csv)
-    data = {"problems": summaries_of(records), **plain_plays(plays)} if as_json else {}
+    data = {"problems": summarise_problems(records), **plain_simulations(gaits)} if as_json else {}
 
     def tables() -> None:
         print_summaries(records)
-        print_plays(plays)
+        print_simulations(gaits)
 
     print_result(as_json, data, written, tables)
     end_if_none_left(records)
 
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:
-    """Say on stderr whose runs failed, and end with status 1 if a solver has no run left on some problem."""
+    """Report failed runs on stderr, and end with status 1 if a solver has no result on some problem."""
     from compare.analysis.failures import find_failures
 
-    nothing_left = []
+    without_result = []
     for failure in find_failures(records):
         if failure.failed == failure.runs:
-            nothing_left.append(failure.solver)
+            without_result.append(failure.solver)
         say_error(failure.sentence)
-    if nothing_left:
+    if without_result:
         fail(
-            f"without any result: {', '.join(nothing_left)}; mend the reason, and delete the failed records to run them again"
+            f"without any result: {', '.join(without_result)}; fix the cause, and delete the failed records to run them again"
         )
 
 
 def _advance_by(advance: Callable[[str], None], count: int) -> None:
     for _ in range(count):
-        advance("kept from before")
+        advance("stored")
 
 
-def summaries_of(records: Sequence[RunRecord]) -> dict[str, Any]:
-    """By problem, what the table of solvers says, as plain data."""
+def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
+    """Return the table of solvers by problem as plain data."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.solver_table import summarise
 
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
-# What the first table on a narrow terminal holds, in the order in which it is to be read.
+# First columns on a narrow terminal, in reading order.
 READ_FIRST = ("solver", "feasible", "median gap", "median", "evaluations", "time per run")
-HOW_TO_READ = (
-    "Read from the left: runs that the judge finds feasible, how far the median is from the best known, what it cost."
-)
+HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best known, costs."
 
 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
-    """Table of solvers for each problem, under its name unless another title is given."""
+    """Print the table of solvers for each problem, titled by the problem unless a title is given."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.failures import find_failures
     from compare.analysis.solver_table import HEADER, format_cells, summarise
@@ -198,18 +194,16 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     stdout.print(HOW_TO_READ)
 
 
-def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
-    """The named solvers with IPOPT before them; without starts, those that need none.
+def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
+    """Return IPOPT and the named solvers; without starts, only searches.
 
-    Bayesian optimisation is one of all only where it can use up the budget.
+    `all` includes Bayesian optimisation only for budgets that it can use.
     """
     names = parse_names(algorithms)
     if ALL in names:
         every = [*ALL_GRADIENT, *installed_algorithms()]
         if searches.evaluations > MOST_OF_BAYES and BAYES in every and BAYES not in names:
-            say(
-                f"without {BAYES}, which is for at most {MOST_OF_BAYES} evaluations; name it beside {ALL} to have it run"
-            )
+            say(f"skipped {BAYES}, which takes at most {MOST_OF_BAYES} evaluations; add it to {ALL} to run it")
             every.remove(BAYES)
         names = [*dict.fromkeys([*every, *(name for name in names if name != ALL)])]
     if starts == 0:
@@ -219,12 +213,12 @@ def chosen_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
     return [SolverSpec(name=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
 
 
-def _refuse_others(context: typer.Context, flag: str) -> None:
-    """Raise if an option is given that a study file or an earlier session has decided already."""
+def _reject_study_options(context: typer.Context, flag: str) -> None:
+    """Reject options that a study file or an earlier session determines."""
     for parameter in context.command.params:
         name = str(parameter.name)
         source = context.get_parameter_source(name)
         given = source is not None and source.name == "COMMANDLINE"
-        if name not in OF_THE_SESSION and given and context.params.get(name) not in (None, [], ()):
-            flagged = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
-            raise InputError(f"{flag} decides what the study computes; leave out {flagged}")
+        if name not in SESSION_OPTIONS and given and context.params.get(name) not in (None, [], ()):
+            option = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
+            raise InputError(f"{flag} determines what the study computes; omit {option}")

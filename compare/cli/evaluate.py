@@ -39,7 +39,7 @@ def evaluate(
     x: Annotated[
         str | None,
         typer.Option(
-            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate a row."
+            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate per row."
         ),
     ] = None,
     motion: Annotated[
@@ -47,16 +47,17 @@ def evaluate(
         typer.Option(help="Joint angles over time instead: a CSV with columns t and joints, or a Webots .motion."),
     ] = None,
     touch_down: Annotated[
-        float | None, typer.Option(help="Of a cycle in --motion: when the swing foot lands [s] (default: found).")
+        float | None,
+        typer.Option(help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred)."),
     ] = None,
-    engine: Annotated[bool, typer.Option(help="Play a motion in the physics engine too (extra sim).")] = True,
+    engine: Annotated[bool, typer.Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
     *,
     problem: AnyProblem,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
     table: Annotated[Path | None, typer.Option("--csv", help="Write the judged points to this CSV file.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Evaluate candidates by the exact functions, on the problem's samples and on a dense grid.
+    """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 
     Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`,
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
@@ -132,7 +133,7 @@ def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_
 
 
 def _print_gait(judged: JudgedGait) -> None:
-    """The gait beside the optimum, the limits that it breaks, and what the engine says."""
+    """Print the gait and the optimum, violated limits, and results of the engine."""
     gait = judged.recorded
     times = ", ".join(
         f"{name} {value:.4g} s" for name, value in zip(gait.problem.display.durations, gait.x, strict=False)
@@ -141,7 +142,7 @@ def _print_gait(judged: JudgedGait) -> None:
     for note in judged.notes:
         stdout.print(note, soft_wrap=True)
     print_table(
-        "Beside the optimum at the same step and time",
+        "Compared with the optimum at the same step and times",
         ("index", "this gait", "optimum"),
         [(name, f"{value:z.6f}", "-" if math.isnan(best) else f"{best:z.6f}") for name, value, best in judged.rows()],
     )
@@ -158,7 +159,7 @@ def _print_gait(judged: JudgedGait) -> None:
 
 
 def _print_many(judged: Sequence[Evaluation]) -> None:
-    """A row for each candidate; what is violated most names the reason."""
+    """Print a row per candidate with its largest violation."""
     objective = judged[0].objective
     print_table(
         f"{judged[0].problem}: {len(judged)} candidates",
@@ -169,7 +170,7 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
             "feasible",
             "between samples",
             "guaranteed",
-            "violated most",
+            "largest violation",
         ),
         [
             (
@@ -187,7 +188,7 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
 
 
 def _write(path: Path, judged: Sequence[Evaluation]) -> None:
-    """One row a candidate: its variables, what the judge found, and the indexes."""
+    """Write one row per candidate: variables, verdict and indexes."""
     found = ("violation", "feasible", "feasible_between_samples", "guaranteed")
     name = judged[0].objective["name"]
     indexes = [index for index in judged[0].indexes if index != name]
@@ -222,7 +223,7 @@ def _print(evaluation: Evaluation) -> None:
     ]
     grid = f"{evaluation.dense_intervals} intervals" if evaluation.dense else "no dense grid"
     columns = 4 if means else 3
-    header = ("index", "own samples", grid, "proven over time")[:columns]
+    header = ("index", "samples", grid, "proven over time")[:columns]
     print_table("Indexes", header, [row[:columns] for row in rows])
     _print_violations(evaluation)
     if evaluation.guaranteed is not None:
@@ -230,15 +231,15 @@ def _print(evaluation: Evaluation) -> None:
 
 
 def _print_violations(evaluation: Evaluation) -> None:
-    for title, violated in (("own samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
+    for title, violated in (("samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
         if not violated:
-            stdout.print(f"feasible on the {title}" if title == "own samples" or evaluation.dense else "")
+            stdout.print(f"feasible on the {title}" if title == "samples" or evaluation.dense else "")
             continue
         print_rows(
-            f"Infeasible on the {title}: {len(violated)} rows, worst first",
+            f"Infeasible on the {title}: {len(violated)} violated constraints, worst first",
             violated[:SHOWN_VIOLATIONS],
             {
-                "row": lambda v: v.name,
+                "constraint": lambda v: v.name,
                 "value": lambda v: f"{v.value:.6g}",
                 "lower": lambda v: with_unit(v.lower, "1", ".6g"),
                 "upper": lambda v: with_unit(v.upper, "1", ".6g"),

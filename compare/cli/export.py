@@ -1,4 +1,4 @@
-"""``nlp-gait export``."""
+"""``nlp-gait export``, ``export-objective`` and ``export-solver``."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import output_file, print_written
-from compare.cli.options import StoredGait
+from compare.cli.common import output_file, print_result, print_written
+from compare.cli.options import AsJson, NamedProblem, StoredGait
 from nlp_gait.export.set_points import PERIOD_MS
 
 
@@ -18,11 +18,11 @@ def export(
     stored: StoredGait,
     format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
     out: Annotated[
-        Path | None, typer.Option(help="File; by default beside the result, with the format's ending.")
+        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix.")
     ] = None,
     period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows [ms].")] = PERIOD_MS,
 ) -> None:
-    """Write a gait in a format that other tools read.
+    """Write a gait in a format of other tools.
 
     Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
     """
@@ -32,3 +32,41 @@ def export(
     target = output_file(out or stored.result.with_name(stored.result.stem + FORMATS.get(format_, "")))
     write_as(format_, target, loaded, period_ms)
     print_written(target)
+
+
+@command
+def export_objective(
+    instance: Annotated[str, typer.Argument(metavar="INSTANCE", help="Of GaitBench, for example ssp-v5.")],
+    to: Annotated[Path, typer.Option("--to", help="Folder for the files.")],
+    as_json: AsJson = False,
+) -> None:
+    """Write an instance of GaitBench as plain C++ with a C header, for C, MATLAB, Octave and Julia.
+
+    The files need only libc and libm: source, header, build script, an example in C, and callers for the others.
+
+    Example: `nlp-gait export-objective ssp-v5 --to DIR`, then `sh DIR/build.sh && DIR/main < /dev/null`
+    """
+    from nlp_gait import gaitbench
+    from nlp_gait.gaitbench.c_export import export_objective as export
+
+    written = export(gaitbench.load(instance), to)
+    print_result(as_json, {"instance": instance}, written, lambda: None)
+
+
+@command
+def export_solver(
+    to: Annotated[Path, typer.Option("--to", help="Folder for the files.")],
+    *,
+    problem: NamedProblem,
+    as_json: AsJson = False,
+) -> None:
+    """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
+
+    The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
+
+    Example: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`
+    """
+    from nlp_gait.export.solver import export_solver as write
+
+    loaded = problem.spec().load()
+    print_result(as_json, {"problem": loaded.address}, write(loaded, to), lambda: None)

@@ -23,21 +23,21 @@ def list_problems(
         str | None,
         typer.Argument(
             metavar="[NAME]",
-            help="Of a problem: show its variables, parameters and options; of an algorithm or solver: its settings.",
+            help="A problem, for its variables, parameters and options; an algorithm or solver, for its settings.",
         ),
     ] = None,
     algorithms: Annotated[
         bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
     ] = False,
     robot: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Show what is understood of a robot: URDF, JSON, or a name.")
+        str | None, typer.Option(metavar="FILE", help="Show a robot as read: URDF, MJCF (.xml), JSON, or a name.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="With --robot: a picture of the robot and its soles, as PNG and SVG.")
+        Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List problems, algorithms and robots; or what one problem, algorithm or solver can be told, or is known of a robot.
+    """List problems, algorithms and robots, or describe one of them.
 
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`
@@ -48,7 +48,7 @@ def list_problems(
         _robot(robot, out, as_json)
         return
     if out is not None:
-        raise InputError("--out is the picture of a robot; name one with --robot FILE")
+        raise InputError("--out is the figure of a robot; name one with --robot FILE")
     known = list_described_names()
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
@@ -69,7 +69,7 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
         stdout.print(f"{one.name}: {one.title}")
         if one.settings:
             rows = [(setting.name, setting.default, setting.meaning) for setting in one.settings]
-            print_table(f"{one.name}: settings", ("name", "default", "what"), rows)
+            print_table(f"{one.name}: settings", ("name", "default", "description"), rows)
         if one.source:
             stdout.print(f"Source: {one.source}\n")
 
@@ -81,7 +81,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
     target = None if out is None else output_file(out)
     log = logging.getLogger("nlp_gait")
     level = log.level
-    log.setLevel(logging.ERROR)  # its warnings are among the notes below
+    log.setLevel(logging.ERROR)  # its warnings are printed as notes below
     try:
         body = make_humanoid(name)
     finally:
@@ -90,11 +90,11 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
     if as_json:
         print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}, "notes": list(notes)})
     else:
-        print_table(f"What I understood of robot {body.biped.full.name}", ("what", "found"), facts)
+        print_table(f"Robot {body.biped.full.name} as read", ("item", "value"), facts)
         for note in notes:
             stdout.print(f"note: {note}")
         stdout.print(
-            "anything of it can be said otherwise in the JSON file beside it: docs/custom-robots.md; gaits: humanoid-ssp, "
+            "override any of this in a JSON file next to the model, see docs/custom-robots.md; gaits: humanoid-ssp, "
             f"humanoid-dsp and humanoid-cycle with --robot {name}"
         )
     if target is not None:
@@ -124,7 +124,7 @@ def _overview(as_json: bool) -> None:
         )
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
-    print_table("Problems", ("name", "what", "variables", "parameters"), rows)
+    print_table("Problems", ("name", "description", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(list_solvers())}")
     stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
@@ -132,7 +132,7 @@ def _overview(as_json: bool) -> None:
         if listed:
             packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
             stdout.print(f"{kind} of other installed packages: {packages}")
-    stdout.print("your own problem or algorithm stands wherever a name does: FILE.py:NAME or MODULE:NAME")
+    stdout.print("your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME")
 
 
 def _details(name: str, as_json: bool) -> None:
@@ -148,11 +148,11 @@ def _details(name: str, as_json: bool) -> None:
         )
         return
     rows = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
-    print_table(f"{name}: variables", ("name", "lower", "upper", "unit", "what"), rows)
+    print_table(f"{name}: variables", ("name", "lower", "upper", "unit", "description"), rows)
     limits = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
-    print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "what"), limits)
+    print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "description"), limits)
     options = ", ".join(f"{key}={value}" for key, value in problem.options.items())
-    stdout.print(f"options: {options}\na variable's bounds are parameters too: --set {problem.names[0]}.lower=...")
+    stdout.print(f"options: {options}\nbounds of variables are parameters: --set {problem.names[0]}.lower=...")
 
 
 def _chosen(items: Iterable[object], *attributes: str) -> list[dict[str, Any]]:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 
 ENGINE_TABLE = (
-    "Model and engine: mean power over a phase, or energy of ten steps for each planned metre of a cycle; rank: first the "
-    "model's, then the engine's; fate: a cycle walks that part of the planned way."
+    "Model and engine: mean power over a phase, or energy of ten steps per planned metre of a cycle; ranks of model and "
+    "engine; fate: a cycle walks that share of the planned distance."
 )
 
 
@@ -33,25 +33,25 @@ def report(
     *,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     gradient_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a first derivative counts as (default n + 1).")
+        float | None, typer.Option(min=0.0, help="Evaluations counted for a first derivative (default n + 1).")
     ] = None,
     hessian_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations that a Hessian counts as (default (n + 1)(n + 2)/2).")
+        float | None, typer.Option(min=0.0, help="Evaluations counted for a Hessian (default (n + 1)(n + 2)/2).")
     ] = None,
     engine: Annotated[
         bool,
-        typer.Option("--engine", help="Play every solver's best gait in MuJoCo (extra sim), those not played yet."),
+        typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored."),
     ] = False,
     code: Code = None,
-    servos: DriveOptions,
+    drive_options: DriveOptions,
     as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a study's report anew from all records of its folder, without running a solver.
+    """Rewrite a study's report from all records of its folder, without running a solver.
 
-    Solvers that a later call left out are there too; runs of an earlier definition stand under a name that says how it differs.
+    It includes solvers that a later call omitted; runs of earlier definitions have names that say how they differ.
 
-    With `--engine` the best gaits are played, and the report says whether the engine confirms the model; what it found is kept.
+    With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model.
 
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
@@ -61,23 +61,23 @@ def report(
     from compare.report import rebuild_report
     from compare.study.record_files import read_records
 
-    if not engine and servos != DriveOptions():
-        raise InputError("the drive is that of gaits that are played: give --engine as well")
+    if not engine and drive_options != DriveOptions():
+        raise InputError("the drive applies to simulated gaits: add --engine")
     for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
         if weight is not None and not math.isfinite(weight):
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     name_all(code)
-    plays = play_best(folder, label_editions(read_records(folder)), servos.make()) if engine else []
+    simulated = simulate_best(folder, label_editions(read_records(folder)), drive_options.make()) if engine else []
     written = rebuild_report(folder, weighting, as_csv=as_csv)
-    print_result(as_json, plain_plays(plays), written, lambda: print_plays(plays))
+    print_result(as_json, plain_simulations(simulated), written, lambda: print_simulations(simulated))
 
 
-def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
-    """Play every solver's best gait, those that have not been played yet.
+def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
+    """Simulate every solver's best gait, unless stored.
 
     Raises:
-        InputError: none of the problems can be played.
+        InputError: none of the problems can be simulated.
     """
     from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.simulations import simulate_records
@@ -85,30 +85,30 @@ def play_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[
     gaits = select_best_gaits(records)
     try:
         with progress_bar("gaits", len(gaits)) as advance:
-            plays = simulate_records(folder, gaits, drive, advance)
+            simulated = simulate_records(folder, gaits, drive, advance)
     except KeyboardInterrupt:
         end_interrupted(
-            f"interrupted while gaits were played; those that ended are kept; continue with `nlp-gait report --engine {folder}`"
+            f"interrupted while simulating; finished simulations are stored; continue with `nlp-gait report --engine {folder}`"
         )
-    if gaits and not plays:
+    if gaits and not simulated:
         names = ", ".join(dict.fromkeys(record.problem for record in gaits))
-        raise InputError(f"no gait of {names} can be played in the engine; leave out --engine")
-    return plays
+        raise InputError(f"no gait of {names} can be simulated in the engine; omit --engine")
+    return simulated
 
 
-def plain_plays(plays: Sequence[SimulatedGait]) -> dict[str, Any]:
-    """What was played, by problem, and how far the engine confirms the model, as plain data; nothing if nothing was."""
+def plain_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
+    """Return simulated gaits by problem, and their agreement with the model, as plain data; empty without any."""
     from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
 
     found = {
         problem: {"gaits": [asdict(played) for played in own], "agreement": asdict(measure_agreement(own))}
-        for problem, own in group_by_problem(plays).items()
+        for problem, own in group_by_problem(simulated).items()
     }
     return {"engine": found} if found else {}
 
 
-def print_plays(plays: Sequence[SimulatedGait]) -> None:
-    """A table for each problem, and how far the engine confirms the model."""
+def print_simulations(simulated: Sequence[SimulatedGait]) -> None:
+    """Print a table per problem, and the agreement of engine and model."""
     from compare.analysis.simulated_gaits import (
         HEADER,
         describe_drive,
@@ -117,8 +117,8 @@ def print_plays(plays: Sequence[SimulatedGait]) -> None:
         measure_agreement,
     )
 
-    for problem, own in group_by_problem(plays).items():
-        print_table(f"{problem} played: {describe_drive(own[0].drive)}", HEADER, make_engine_rows(own))
+    for problem, own in group_by_problem(simulated).items():
+        print_table(f"{problem} simulated: {describe_drive(own[0].drive)}", HEADER, make_engine_rows(own))
         stdout.print(measure_agreement(own).describe())
-    if plays:
+    if simulated:
         stdout.print(ENGINE_TABLE)

@@ -29,14 +29,14 @@ def search(
     searches: SearchOptions,
     problem: NamedProblem,
     out: Annotated[
-        Path | None, typer.Option(help="Keep one record file a run in this folder; continue from it.")
+        Path | None, typer.Option(help="Store one record file per run in this folder; continue from it.")
     ] = None,
     jobs: Jobs = 1,
     as_json: AsJson = False,
 ) -> None:
-    """Search a problem with a metaheuristic on the compiled exact functions.
+    """Search a problem with a metaheuristic and the compiled exact functions.
 
-    Runs whose objective fails altogether are listed with the reason; exit status 1 if all of them do.
+    Failed runs are listed with the reason; exit status 1 if all runs fail.
 
     Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
     `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
@@ -73,16 +73,16 @@ def search(
                 "seed": lambda r: str(r.seed),
                 loaded.objective.name: lambda r: with_unit(r.verdict.objective, loaded.objective.unit),
                 "violation": lambda r: f"{r.verdict.violation:.3g}",
-                "why it ended": lambda r: r.status,
+                "status": lambda r: r.status,
             },
         )
         print_summaries(records, "All runs")
-        stdout.print("objective and violation are the judge's: the exact functions on the problem's own samples")
+        stdout.print("objective and violation are found by the judge: the exact functions at the problem's samples")
         if out is not None:
             stdout.print(f"wrote {len(records)} records to {out}", soft_wrap=True)
     if stopped:
-        kept = "printed, but kept nowhere: name a folder with --out" if out is None else f"kept in {out}"
-        end_interrupted(f"{stopped}; finished runs are {kept}" + (out is not None) * "; the same command continues")
+        kept = "printed, but not stored: name a folder with --out" if out is None else f"stored in {out}"
+        end_interrupted(f"{stopped}; finished runs are {kept}" + (out is not None) * "; rerun the command to continue")
     if not any(record.x for record in records):
         fail(f"no run has a result; the first {records[0].status}")
 
@@ -92,9 +92,9 @@ def _is_polish(record: RunRecord) -> bool:
 
 
 def _run(record: RunRecord) -> dict[str, Any]:
-    """What scripts rely on."""
+    """Return a run as plain data for scripts."""
     plain = record.to_json()
-    same = ("run", "seed", "objective", "violation", "failed_evaluations", "status", "x", "verdict")
+    same = ("run", "seed", "claimed_objective", "claimed_violation", "failed_evaluations", "status", "x", "verdict")
     return {
         **{key: plain[key] for key in same},
         "evaluations": plain["evaluations"]["f"],

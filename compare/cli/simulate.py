@@ -39,17 +39,17 @@ if TYPE_CHECKING:
 def simulate(
     stored: StoredGait,
     *,
-    steps: Annotated[int | None, typer.Option(help="Play this many steps of a gait that repeats.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Simulate this many steps of a gait that repeats.")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and picture.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and figure.")] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
-    servos: DriveOptions,
+    drive_options: DriveOptions,
     share_loads: Annotated[
-        bool, typer.Option("--share-loads", help="Share load anew in double support for least power (extra qp).")
+        bool, typer.Option("--share-loads", help="Redistribute loads in double support for least power (extra qp).")
     ] = False,
     load_rate: Annotated[
-        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load, weights a second.")
+        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load [robot weights/s].")
     ] = 12.5,
     film: FilmOptions,
     robustness: Annotated[
@@ -57,7 +57,7 @@ def simulate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play a gait in MuJoCo, in open loop or with balance feedback, and compare it with the model's predictions.
+    """Simulate a gait in MuJoCo, open loop or with balance feedback, and compare it with the model's predictions.
 
     Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
     `nlp-gait simulate best.json --video walk.mp4`,
@@ -72,7 +72,7 @@ def simulate(
     from nlp_gait.simulation.film.video import check_frames, check_video_path
     from nlp_gait.simulation.film.viewer import show_in_window
     from nlp_gait.simulation.load_sharing import Sharing
-    from nlp_gait.simulation.load_sharing import share_loads as anew
+    from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.robustness import measure_robustness as sweep
@@ -80,46 +80,46 @@ def simulate(
 
     load_mujoco(pictures=film.video is not None)
     if viewer and film.video is not None:
-        fail("--viewer and --video exclude each other; film it in a second run")
+        fail("--viewer and --video exclude each other; write the film in a second run")
     if film.beside is not None and film.video is None:
-        fail("--beside puts a second gait into a film; name the film with --video FILE.mp4 or FILE.gif")
+        fail("--beside adds a second gait to a film; name the film with --video FILE.mp4 or FILE.gif")
     size = parse_picture_size(film.size)
     target = None if film.video is None else output_file(check_video_path(film.video))
     folder = None if out is None else make_writable_folder(out)
-    drive, conditions = servos.make(), world.make()
+    drive, conditions = drive_options.make(), world.make()
     gaits = [(stored.result, stored.load())]
     gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
     plans = [make_plan(gait, steps) for _, gait in gaits]
     if share_loads:
-        plans = [anew(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
+        plans = [redistribute(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
     if film.video is not None:
         for each in plans:
             check_frames((each.duration_s + SETTLE_TIME) / film.speed, film.frames_per_s)
     plan, players = plans[0], [partial(simulate_plan, plan, conditions, drive, sole) for plan in plans]
     if target is not None:
         titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]
-        traces = _filmed(film, target, size, list(zip(titles, plans, players, strict=True)))
+        traces = _write_film(film, target, size, list(zip(titles, plans, players, strict=True)))
     else:
         traces = [show_in_window(players[0]) if viewer else players[0]()]
-    measured = [_measured(plan, trace, drive, steps) for plan, trace in zip(plans, traces, strict=True)]
+    measured = [_measure(plan, trace, drive, steps) for plan, trace in zip(plans, traces, strict=True)]
     survival = None
     data = {"schema": 1, **_plain(*measured[0])}
     if film.beside is not None:
         data["beside"] = _plain(*measured[1])
     written = [] if target is None else [target]
     if folder is not None:
-        written += [folder / name for name in ("report.json", "model.xml", "playback.npz")]
+        written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
         write_json(folder / "report.json", replace_nan(data))
         write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
-        write_npz(folder / "playback.npz", traces[0].signals(plan.joints))
-        written += plot_simulation(plan, traces[0], drive, folder / "playback")
+        write_npz(folder / "simulation.npz", traces[0].signals(plan.joints))
+        written += plot_simulation(plan, traces[0], drive, folder / "simulation")
     if robustness:
         try:
             survival = sweep(plan, drive)
         except KeyboardInterrupt:
             lost = "nothing was written; name a folder with --out"
-            kept = lost if folder is None else f"the playback is kept in {folder}"
-            end_interrupted(f"interrupted in the tests of robustness; {kept}")
+            where = lost if folder is None else f"the simulation is stored in {folder}"
+            end_interrupted(f"interrupted in the tests of robustness; {where}")
         data["robustness"] = asdict(survival)
         if folder is not None:
             write_json(folder / "report.json", replace_nan(data))
@@ -135,10 +135,10 @@ def simulate(
         print_written(*written)
 
 
-def _filmed(
+def _write_film(
     film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Simulator]]
 ) -> list[Simulation]:
-    """Play the gaits and write the film."""
+    """Simulate the gaits and write the film."""
     from nlp_gait.simulation.film.film import draw_pictures
     from nlp_gait.simulation.film.recording import record_film
     from nlp_gait.simulation.film.video import write_video
@@ -146,17 +146,17 @@ def _filmed(
     interval_s = film.speed / film.frames_per_s
     recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
 
-    def watched() -> Iterator[Frame]:
-        with progress_bar("pictures", max(len(recording.t) for recording in recordings)) as advance:
+    def with_progress() -> Iterator[Frame]:
+        with progress_bar("frames", max(len(recording.t) for recording in recordings)) as advance:
             for picture in draw_pictures(recordings, size, film.note):
                 yield picture
                 advance("")
 
-    write_video(target, watched(), film.frames_per_s)
+    write_video(target, with_progress(), film.frames_per_s)
     return [recording.simulation for recording in recordings]
 
 
-def _measured(plan: Plan, trace: Simulation, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
+def _measure(plan: Plan, trace: Simulation, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
     from nlp_gait.simulation.measurements import measure, measure_walk
 
     if steps is None:
@@ -188,7 +188,7 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
     }
     rows = [(name, millimetres(value)) for name, value in lengths.items()]
     tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
-    print_table("Against the plan", ("", "measured"), [*rows, ("tracking error of the joints", tracking)])
+    print_table("Compared with the plan", ("", "measured"), [*rows, ("tracking error of the joints", tracking)])
     if report.earliest_landing_s is not None and report.landing_speed_m_s is not None:
         early = 1000.0 * report.earliest_landing_s
         stdout.print(
@@ -196,23 +196,23 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
             f"at {report.landing_speed_m_s:.3f} m/s or less"
         )
     for joint, share in report.beyond_limit.items():
-        stdout.print(f"{joint} is planned to give up to {share:.2f} times its torque limit")
+        stdout.print(f"{joint} needs up to {share:.2f} times its torque limit in the plan")
     for joint, share in report.saturated.items():
         stdout.print(f"{joint} is at its torque limit for {share:.2%} of the time")
     for joint in report.joint_limits:
-        stdout.print(f"{joint} goes beyond its mechanical range")
+        stdout.print(f"{joint} exceeds its mechanical range")
     if survival is not None:
         for title, unit, found in (("push", "N s", survival.push_Ns), ("slope", "degrees", survival.slope_deg)):
-            listed = ", ".join(f"{direction} {value:g}" for direction, value in found.items())
-            stdout.print(f"Largest {title} survived [{unit}]: {listed}", markup=False)
+            values = ", ".join(f"{direction} {value:g}" for direction, value in found.items())
+            stdout.print(f"Largest {title} survived [{unit}]: {values}", markup=False)
         for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
-            listed = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
-            stdout.print(f"{title}: {listed}")
+            values = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
+            stdout.print(f"{title}: {values}")
 
 
 def _print_course(walk: Walk) -> None:
     if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
-        stdout.print(f"{walk.steps_done} of {walk.steps} steps done before it fell")
+        stdout.print(f"{walk.steps_done} of {walk.steps} steps completed before the fall")
         return
     stdout.print(
         f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "

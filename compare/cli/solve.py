@@ -35,7 +35,7 @@ def solve(
     starts: Annotated[
         int | None,
         typer.Option(
-            min=1, max=100_000, help="Random starts within the bounds (default: 20, fewer where each takes long)."
+            min=1, max=100_000, help="Random starts within the bounds (default: 20, fewer for slow problems)."
         ),
     ] = None,
     seed: Seed = 0,
@@ -43,13 +43,14 @@ def solve(
     problem: NamedProblem,
     solver: Annotated[str, typer.Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
     linear_solver: Annotated[
-        str | None, typer.Option(help="IPOPT's, for example ma57 if its library is there (default: mumps).")
+        str | None,
+        typer.Option(help="Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."),
     ] = None,
     jobs: Jobs = None,
     out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Solve a problem with an NLP solver from several random starts; the best is judged by the exact functions.
+    """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
 
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
@@ -82,10 +83,10 @@ def solve(
         "guaranteed": None if proven is None else asdict(proven),
         "proven_bound": proven_bound(definition),
     }
-    try:  # before printing, so that a reader who has gone does not take the file with him
+    try:  # write before printing: a broken pipe must not lose the file
         if target is not None:
             write_json(target, replace_nan(data))
-    finally:  # nor a full disk what is printed
+    finally:  # print even if the disk is full
         if as_json:
             print_json(data)
         else:
@@ -98,7 +99,7 @@ def solve(
                 print_written(target)
     if stopped:
         where = "printed" if target is None else f"in {target}"
-        end_interrupted(f"{stopped}; the best point until then is {where}")
+        end_interrupted(f"{stopped}; the best point so far is {where}")
     if not solution.converged:
         fail(solution.status)
 
@@ -114,13 +115,13 @@ def _print(solution: Solution) -> None:
     print_table(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
         print_rows(
-            "What holds it back",
+            "Active constraints",
             solution.active_constraints,
             {
                 "bound": lambda a: a.name,
                 "side": lambda a: a.side,
                 "at": lambda a: with_unit(a.bound, a.unit, "g"),
-                "price of raising it": lambda a: f"{a.price:.4g} {a.price_unit}",
+                "price": lambda a: f"{a.price:.4g} {a.price_unit}",
             },
         )
     counts = solution.evaluations

@@ -208,7 +208,7 @@ def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(robustness, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
     done = run("simulate", gait, "--robustness", "--out", str(tmp_path))
     assert f"interrupted in the tests of robustness; the playback is kept in {tmp_path}" in done.stderr
-    assert {"report.json", "model.xml", "playback.npz"} <= {path.name for path in tmp_path.iterdir()}
+    assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}
     assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
 
 

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from compare.cli import common
-from compare.cli.common import PlainConsole, harmless
+from compare.cli.common import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, new_figure, render_svg, style
 from compare.report.document import Figure, iterate_leaves
 from compare.report.study_report import make_study_document
@@ -125,7 +125,7 @@ def test_names_of_robots_are_escaped_in_models() -> None:
     ],
 )
 def test_the_terminal_shows_control_characters_and_markup(text: str, shown: str) -> None:
-    assert harmless(text) == shown
+    assert escape_controls(text) == shown
     out = io.StringIO()
     console = PlainConsole(file=out, markup=False, highlight=False, force_terminal=True, width=200)
     console.print(text, soft_wrap=True, end="")

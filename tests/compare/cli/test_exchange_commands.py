@@ -63,7 +63,7 @@ def test_bench_gives_an_algorithm_of_ones_own_its_place(mine: Path, tmp_path: Pa
     out = tmp_path / "out"
     call = ("bench", "--algorithm", f"{mine}:{name}", "--instances", ID, "--runs", "3", "--jobs", "1", "--out", out)
     found = as_json(*call)
-    assert 1 <= found["place"] <= 13 and found["instances"] == [ID]
+    assert 1 <= found["rank"] <= 13 and found["instances"] == [ID]
     assert {s["solver"] for s in found["standings"]} == {*BASELINE, found["solver"]}
     assert (out / "leaderboard.html").is_file() and (out / "gaitbench-runtime.png").is_file()
     records = list((out / "records").glob("*/*.json"))
@@ -92,7 +92,7 @@ def test_bench_gives_an_algorithm_of_ones_own_its_place(mine: Path, tmp_path: Pa
 
 def test_bench_shows_the_baseline_alone(tmp_path: Path) -> None:
     found = as_json("bench", "--instances", ID, "--out", tmp_path)
-    assert found["place"] is None and len(found["standings"]) == 12
+    assert found["rank"] is None and len(found["standings"]) == 12
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pyte
     done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
     assert "left out, for no baseline records of them are shipped yet: walk12-w015, ssp-v5," in done.stderr
     found = json.loads(done.stdout)
-    assert found["instances"] == ["walk12-w100"] and len(found["left_out"]) == 9
+    assert found["instances"] == ["walk12-w100"] and len(found["skipped"]) == 9
 
 
 def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tests.compare.cli.calls import as_json
 ROOT = Path(__file__).parents[3]
 HEADER = (
     "solver",
-    "judged feasible",
+    "feasible",
     "best known objective",
     "worst of all runs",
     "evaluations",
@@ -47,7 +47,7 @@ def test_no_table_is_wider_than_the_terminal_and_none_loses_a_cell(monkeypatch, 
 
 def test_at_sixty_columns_a_table_is_stacked(monkeypatch, capsys):
     text = printed(monkeypatch, capsys, 60)
-    assert "solver aco\n  judged feasible: 3/3\n  best known objective: 0.531886 W\n" in text
+    assert "solver aco\n  feasible: 3/3\n  best known objective: 0.531886 W\n" in text
 
 
 def test_help_shows_every_command_in_a_panel_and_the_version_is_the_package_s():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.cli.compare import chosen_solvers
+from compare.cli.compare import choose_solvers
 from compare.cli.search_options import SearchOptions
 from tests.compare.cli.calls import as_json, one_sentence, process
 
@@ -92,7 +92,7 @@ def test_search_stops_for_the_reason_asked_for_and_polishes() -> None:
 def test_all_are_those_that_can_use_up_the_budget(
     algorithms: str, evaluations: int, takes_part: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules[chosen_solvers.__module__], "installed_algorithms", lambda: ("pso", "bayes"))
-    solvers = chosen_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
+    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "installed_algorithms", lambda: ("pso", "bayes"))
+    solvers = choose_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
     names = [solver.name for solver in solvers]
     assert ("bayes" in names) == takes_part and {"ipopt", "pso"} <= set(names)

@@ -51,7 +51,7 @@ def test_the_command_judges_plays_and_sets_it_beside_the_optimum(gait: Path, tmp
 
 def test_tighter_limits_are_named(gait: Path) -> None:
     shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
-    assert "Infeasible on the own samples" in shown and "torque_change[" in shown and "In the engine" not in shown
+    assert "Infeasible on the samples" in shown and "torque_change[" in shown and "In the engine" not in shown
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,7 @@ def test_the_command_walks(tmp_path: Path) -> None:
     assert gait["walk"]["walked_m"] == pytest.approx(gait["walk"]["planned_m"], rel=0.3)
     assert (tmp_path / "nao-cycle-cost.png").exists() and (tmp_path / "nao-cycle.svg").exists()
     page = (tmp_path / "nao-cycle-walk.md").read_text()
-    assert "Energy of 2 steps in the physics engine" in page and "1 gait was played, none fell" in page
+    assert "Energy of 2 steps in the physics engine" in page and "1 gait was simulated, none fell" in page
     error = gait["walk"]["engine_J_per_planned_m"] / gait["walk"]["model_J_per_m"] - 1.0
     assert f"{100 * error:+.2f} %" in page
 

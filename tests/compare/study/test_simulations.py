@@ -106,7 +106,7 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
     write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
     refused = CliRunner().invoke(app, ["report", str(tmp_path), "--engine"])
-    assert refused.exit_code == 1 and "no gait of nao-dsp can be played" in refused.stderr
+    assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated" in refused.stderr
 
 
 def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
@@ -143,5 +143,5 @@ def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
     loaded = task._load
     monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), display=Display()))
     refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
-    assert refused.exit_code == 1 and "no gait of nao-dsp can be played; leave out --engine" in refused.stderr
+    assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated; omit --engine" in refused.stderr
     assert not (tmp_path / "study.json").exists()

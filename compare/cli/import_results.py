@@ -9,7 +9,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import print_result
-from compare.cli.compare import print_summaries, summaries_of
+from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.options import RESULTS, AsCsv, AsJson, NamedProblem
 
 
@@ -21,19 +21,22 @@ def import_results(
         Path,
         typer.Argument(
             metavar="FINALS.csv",
-            help="One row a run: the variables, and run, seed, objective, violation, evaluations, time_s where known.",
+            help="One row per run: the variables, and optionally run, seed, objective, violation, evaluations, time_s.",
         ),
     ],
     history: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="Best so far: run, evaluations, objective and maybe time_s.")
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="Best so far: run, evaluations, objective and optionally time_s."),
     ] = None,
-    label: Annotated[str, typer.Option("--as", help='What the report calls it, for example "GA (MATLAB)".')],
-    evaluations: Annotated[int | None, typer.Option(min=1, help="Of every run, where neither file says it.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder of a study, new or not.")] = RESULTS,
+    label: Annotated[str, typer.Option("--as", help='Name in the report, for example "GA (MATLAB)".')],
+    evaluations: Annotated[
+        int | None, typer.Option(min=1, help="Evaluations of every run, if neither file has them.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of a new or existing study.")] = RESULTS,
     as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
-    """Take results from elsewhere into a study: judged like everything else, beside the others in its report.
+    """Import results of other programs into a study, judged and reported like all others.
 
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
@@ -50,4 +53,4 @@ def import_results(
     everything = label_editions(read_records(out))
     written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
     shown = [record for record in everything if record.problem == spec.title]
-    print_result(as_json, {"problems": summaries_of(shown)}, written, lambda: print_summaries(shown))
+    print_result(as_json, {"problems": summarise_problems(shown)}, written, lambda: print_summaries(shown))

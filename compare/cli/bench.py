@@ -21,24 +21,24 @@ def bench(
     algorithm: Annotated[
         str | None,
         typer.Option(
-            help="Yours as my.py:MyAlgo or module:name, or one by name; without it the baseline alone is shown."
+            help="Your algorithm as my.py:MyAlgo or module:name, or a name; without it, only the baseline is shown."
         ),
     ] = None,
     suite: Annotated[Literal["small", "full"], typer.Option(help="small (ten instances, minutes) or full.")] = "small",
     instances: Annotated[
-        str | None, typer.Option(help="Only these instances, separated by commas, in place of a suite.")
+        str | None, typer.Option(help="Only these instances, separated by commas, instead of a suite.")
     ] = None,
-    label: Annotated[str, typer.Option(help="What the page calls your algorithm (default: its own name).")] = "",
+    label: Annotated[str, typer.Option(help="Name of your algorithm on the page (default: its own name).")] = "",
     runs: Annotated[int, typer.Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS,
     out: Annotated[
-        Path, typer.Option(help="Folder for the page and the records; finished runs in it are kept.")
+        Path, typer.Option(help="Folder for the page and the records; finished runs in it are reused.")
     ] = Path("bench"),
     jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
-    """Give an algorithm its place on GaitBench: run it on the suite, and rank it among the shipped baseline.
+    """Run an algorithm on GaitBench and rank it with the shipped baseline.
 
-    Every run has 10 000 evaluations; run k has the seed k, as those of the baseline have.
+    Every run has 10 000 evaluations; run k has the seed k, like the baseline.
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm pso --label pso-again`
@@ -54,7 +54,7 @@ def bench(
 
     chosen = gaitbench.names(suite) if instances is None else tuple(parse_names(instances))
     for id in chosen:
-        gaitbench.load(id)  # says what is unknown
+        gaitbench.load(id)  # raises for unknown ids
     known = list_instances()
     missing = [id for id in chosen if id not in known]
     if missing and (instances is not None or len(missing) == len(chosen)):
@@ -63,7 +63,7 @@ def bench(
             f"--instances {','.join(known)}"
         )
     if missing:
-        stderr.print(f"left out, for no baseline records of them are shipped yet: {', '.join(missing)}", soft_wrap=True)
+        stderr.print(f"skipped (no baseline records shipped): {', '.join(missing)}", soft_wrap=True)
         chosen = tuple(id for id in chosen if id in known)
     make_writable_folder(out)
     records: list[RunRecord] = []
@@ -77,14 +77,14 @@ def bench(
         )
         name = study.tasks[0].title
         if name in BASELINE:
-            raise InputError(f"{name!r} is a solver of the baseline; call yours otherwise with --label")
+            raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
         with progress_bar(f"{name} runs", len(study.tasks)) as advance:
             records, stopped = until_interrupted(
                 lambda: run_study(study, progress=lambda task, _: advance(task.problem.title)), nothing=""
             )
         if stopped:
-            end_interrupted(f"{stopped}; finished runs are kept in {out}: the same command continues")
+            end_interrupted(f"{stopped}; finished runs are stored in {out}; rerun the command to continue")
     board = rank_solvers(chosen, records)
     suite_name = (
         f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
@@ -94,7 +94,7 @@ def bench(
     def tables() -> None:
         print_table(
             f"GaitBench 1, {suite_name}: {len(chosen)} instances",
-            ("place", "solver", "mean rank", "targets solved", "runs feasible"),
+            ("rank", "solver", "mean rank", "targets solved", "runs feasible"),
             [
                 (str(k), s.solver, f"{s.mean_rank:.2f}", f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %")
                 for k, s in enumerate(board.standings, start=1)
@@ -106,9 +106,9 @@ def bench(
     data = {
         "suite": suite_name,
         "instances": list(chosen),
-        "left_out": missing,
+        "skipped": missing,
         "solver": name,
-        "place": None if name is None else board.place(name),
+        "rank": None if name is None else board.place(name),
         "standings": [
             {"solver": s.solver, "mean_rank": s.mean_rank, "solved": s.solved, "feasible": s.feasible}
             for s in board.standings

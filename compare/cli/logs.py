@@ -25,7 +25,7 @@ def logs(
 ) -> None:
     """Write a study's runs as logs that iohinspector and IOHanalyzer read.
 
-    What is logged is the relative gap to the best objective known, and equivalent evaluations.
+    The logs contain the relative gap to the best known objective, and equivalent evaluations.
 
     Example: `nlp-gait logs results --to logs --format ioh`
     """
