@@ -59,7 +59,7 @@ def test_solve_search_and_compare(tmp_path):
         "runs"
     ]
     assert [run["seed"] for run in runs] == [3, 4]
-    assert all({"objective", "violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
+    assert all({"claimed_objective", "claimed_violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
     out = tmp_path / "study"
     nlp_gait("compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--out", str(out))
     assert (out / "report.md").read_text().count("| pso | 2 |") == 1
@@ -82,7 +82,7 @@ def test_same_seed_same_result_with_one_or_two_processes():
         runs = as_json("search", "nao-ssp", "--algorithm", "ga", "--runs", "3", "--evaluations", "600", "--jobs", jobs)[
             "runs"
         ]
-        return [(run["seed"], run["objective"], run["x"]) for run in runs]
+        return [(run["seed"], run["claimed_objective"], run["x"]) for run in runs]
 
     assert search("1") == search("1") == search("2")
 

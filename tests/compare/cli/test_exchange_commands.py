@@ -71,7 +71,7 @@ def test_bench_gives_an_algorithm_of_ones_own_its_place(mine: Path, tmp_path: Pa
     times = [path.stat().st_mtime_ns for path in records]
     shown = nlp_gait(*call).stdout
     assert [path.stat().st_mtime_ns for path in records] == times
-    assert f"takes place {found['place']} of 13" in shown
+    assert f"takes place {found['rank']} of 13" in shown
     assert (
         max(
             len(line)
@@ -114,7 +114,7 @@ def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pyte
     )
     assert list_instances()
     done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
-    assert "left out, for no baseline records of them are shipped yet: walk12-w015, ssp-v5," in done.stderr
+    assert "skipped (no baseline records shipped): walk12-w015, ssp-v5," in done.stderr
     found = json.loads(done.stdout)
     assert found["instances"] == ["walk12-w100"] and len(found["skipped"]) == 9
 
