@@ -79,7 +79,7 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
     assert solution.converged and solution.status == "tried" and solution.objective == pytest.approx(1.5)
     assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
     ends = run_starts(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
-    assert ends.success.all() and ends.objective == pytest.approx([1.5] * 3)
+    assert ends.feasible.all() and ends.objective == pytest.approx([1.5] * 3)
 
 
 def test_what_needs_multipliers_says_which_solver_gives_none() -> None:
