@@ -45,7 +45,7 @@ PROBLEMS.update(
         "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
         "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
         "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
-        "walk12": "nlp_gait.gaits.walk12.problem:walk12",
+        "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
         "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
         "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
         "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",

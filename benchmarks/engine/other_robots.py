@@ -16,7 +16,7 @@ from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
 from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, find_row
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.walk12 import simulation_model as walk12_model
+from nlp_gait.gaits.walk12 import walk12_display
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, Walk, measure, measure_walk
 from nlp_gait.simulation.plan import make_plan
@@ -122,14 +122,14 @@ def other_gains() -> Iterator[str]:
 @contextmanager
 def spheres(name: str, value: float) -> Iterator[None]:
     """Another way to make bodies of the 12-joint biped's point masses."""
-    before = getattr(walk12_model, name)
-    setattr(walk12_model, name, value)
-    walk12_model.rigid_bodies.cache_clear()
+    before = getattr(walk12_display, name)
+    setattr(walk12_display, name, value)
+    walk12_display.make_rigid_bodies.cache_clear()
     try:
         yield
     finally:
-        setattr(walk12_model, name, before)
-        walk12_model.rigid_bodies.cache_clear()
+        setattr(walk12_display, name, before)
+        walk12_display.make_rigid_bodies.cache_clear()
 
 
 def fate(m: Measurements) -> str:

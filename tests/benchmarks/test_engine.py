@@ -11,8 +11,8 @@ from compare.judge import evaluate  # noqa: E402
 from compare.papers.walk12.walk12_paper import find_row  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.formulation import Result  # noqa: E402
-from nlp_gait.gaits.walk12.robot import point_mass_biped  # noqa: E402
-from nlp_gait.gaits.walk12.simulation_model import rigid_bodies  # noqa: E402
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped  # noqa: E402
+from nlp_gait.gaits.walk12.walk12_display import make_rigid_bodies  # noqa: E402
 
 
 @pytest.mark.slow
@@ -44,7 +44,7 @@ def test_the_engine_ranks_random_gaits_of_double_support_as_the_model_does(monke
 
 def test_point_masses_are_built_otherwise_only_within_the_block():
     def inertia() -> float:
-        robot = rigid_bodies(point_mass_biped())
+        robot = make_rigid_bodies(load_point_mass_biped())
         return float(robot.links["left foot"].inertia_com_kgm2[0])
 
     usual = inertia()

@@ -12,8 +12,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.stairs.display import compute_ground_force
 from nlp_gait.gaits.stairs.planar_biped import MOVING
-from nlp_gait.gaits.walk12.locomotion import locomotion
-from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
@@ -90,7 +90,9 @@ def test_small_spheres_need_the_point_masses_pressure_and_the_engines_torques(x:
     assert np.abs(torques).max() > 0.1
     np.testing.assert_allclose(torques, plan.signals.arrays["tau"], atol=AGREEMENT_NM)
     pressure = np.column_stack([-wrench[:, 4], wrench[:, 3]]) / wrench[:, 2:3]
-    model = locomotion(point_mass_biped(), np.array(x), steps=1, intervals=1000, zmp="moment-free").arrays["zmp_foot"]
+    model = compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=1000, zmp="moment-free").arrays[
+        "zmp_foot"
+    ]
     assert np.ptp(model, axis=0).min() > 0.02
     assert np.abs(pressure - model).max() < POINT_MASSES_M
 

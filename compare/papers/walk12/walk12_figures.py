@@ -14,8 +14,8 @@ from compare.papers.walk12.walk12_findings import Walk12Findings
 from compare.papers.walk12.walk12_paper import find_row
 from compare.papers.walk12.walk12_runs import GA, PAPER, PathPoint
 from compare.study.record import RunRecord
-from nlp_gait.gaits.walk12.locomotion import locomotion
-from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +77,7 @@ def _draw_angles(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10
     figure = new_figure(6.3, 5.2)
     grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
     for label, x in gaits.items():
-        arrays = locomotion(point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
+        arrays = compute_steps(load_point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
         for row, pair in zip(grid, pairs, strict=True):
             for axes, joint in zip(row, pair, strict=True):
                 degrees = np.degrees(arrays["q"][:, joint - 1])
@@ -94,12 +94,12 @@ def _draw_angles(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10
 
 def _draw_zmp(gaits: Gaits) -> Figure:
     """Figs. 12 to 17: the ZMP over one step, in the plane of the sole and over time."""
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
     figure = new_figure(6.3, 3.0)
     plane, time = figure.subplots(1, 2)
     _sole(plane, robot)
     for label, x in gaits.items():
-        arrays = locomotion(robot, np.array(x), steps=1, intervals=400).arrays
+        arrays = compute_steps(robot, np.array(x), steps=1, intervals=400).arrays
         zmp = MILLIMETRES * arrays["zmp_foot"]
         colour = _colour(label)
         plane.plot(zmp[:, 0], zmp[:, 1], color=colour, label=label)
@@ -149,9 +149,9 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
 
 def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     """Footprints and the waist's path over one full circle, seen from above."""
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
     steps = int(np.ceil(2 * np.pi / turn_rad))
-    arrays = locomotion(robot, np.array(x), steps=steps, intervals=20, turn_rad=turn_rad).arrays
+    arrays = compute_steps(robot, np.array(x), steps=steps, intervals=20, turn_rad=turn_rad).arrays
     figure = new_figure(3.6, 3.4)
     axes = figure.subplots()
     axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")

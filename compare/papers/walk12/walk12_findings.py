@@ -24,8 +24,8 @@ from compare.papers.walk12.walk12_runs import (
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.gaits.walk12.locomotion import locomotion
-from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 
 STEP_M = 1e-4  # of a difference quotient
 
@@ -83,8 +83,8 @@ class StableShare:
 
 def compute_stable_share(x: tuple[float, ...]) -> StableShare:
     """Return when a gait is statically stable."""
-    robot = point_mass_biped()
-    arrays = locomotion(robot, np.array(x), steps=1, intervals=1000).arrays
+    robot = load_point_mass_biped()
+    arrays = compute_steps(robot, np.array(x), steps=1, intervals=1000).arrays
     zmp_x, zmp_y = arrays["zmp_foot"].T
     inside = (-robot.foot_back_m <= zmp_x) & (zmp_x <= robot.foot_front_m) & (np.abs(zmp_y) <= robot.foot_width_m / 2)
     times = arrays["t"][inside]
@@ -114,7 +114,7 @@ def compute_hip_miss() -> float:
     (2) takes theta_B, the complement of the angle at the ankle, from an arccosine that is never negative; below
     sqrt(d1^2 - d2^2) that angle exceeds a right one.
     """
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
     d1, d2, distance = robot.thigh_m, robot.shank_m, robot.leg_m - 2 * CORNER_M
     theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
     ankle = math.pi / 2 - math.acos(d1 * math.sin(theta_a) / distance)

@@ -39,9 +39,9 @@ from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
-from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
-from nlp_gait.gaits.walk12.model import Zmp
-from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import Zmp
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
@@ -62,7 +62,7 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
     tables = []
     for name, weight, turn_rad in (("walk-straight", 0.15, 0.0), ("walk-circle", TURNING_WEIGHT, TURN_RAD)):
         x = np.array(get_point(findings.optimum(PAPER, weight)))
-        arrays = locomotion(point_mass_biped(), x, intervals=50, turn_rad=turn_rad).arrays
+        arrays = compute_steps(load_point_mass_biped(), x, intervals=50, turn_rad=turn_rad).arrays
         rows = np.column_stack([arrays[signal] for signal in ("t", "q", "zmp", "left_stance")]).tolist()
         tables.append(Table(name=name, columns=dict.fromkeys(header, ""), rows=rows))
     return tables
@@ -79,7 +79,7 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
 
 
 def _compute_settings(findings: Walk12Findings) -> dict[str, Any]:
-    problem, robot, effort = load("walk12"), point_mass_biped(), findings.effort
+    problem, robot, effort = load("walk12"), load_point_mass_biped(), findings.effort
     lengths = _get_step_lengths()
     return {
         "ga_evaluations": GA_EVALUATIONS,

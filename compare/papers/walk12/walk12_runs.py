@@ -17,7 +17,7 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 from nlp_gait.backends.optima.continuation import Continuation
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.walk12.problem import Horizon
+from nlp_gait.gaits.walk12.walk12_problem import Horizon
 
 PAPER, MODEL = "paper", "model"  # whose f1max
 HORIZONS: tuple[Horizon, ...] = get_args(Horizon)

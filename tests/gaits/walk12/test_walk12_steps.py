@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
-from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 
 X = np.array([0.13, 0.109, 0.014, 0.020])
 N = 20
@@ -15,7 +15,7 @@ ROLLS = [JOINTS.index(name) for name in ("theta_1", "theta_6", "theta_7", "theta
 
 
 def test_the_second_step_mirrors_the_first() -> None:
-    arrays = locomotion(point_mass_biped(), X, intervals=N).arrays
+    arrays = compute_steps(load_point_mass_biped(), X, intervals=N).arrays
     signs = np.ones(12)
     signs[ROLLS] = -1.0
     for name in ("q", "qd", "qdd"):
@@ -26,7 +26,7 @@ def test_the_second_step_mirrors_the_first() -> None:
 
 
 def test_angles_and_feet_go_on_where_steps_meet() -> None:
-    arrays = locomotion(point_mass_biped(), X, steps=3, intervals=2000).arrays
+    arrays = compute_steps(load_point_mass_biped(), X, steps=3, intervals=2000).arrays
     for name in ("q", "waist", "left_ankle", "right_ankle", "com"):
         assert np.abs(np.diff(arrays[name], axis=0)).max() < 2e-3, name
     assert arrays["left_ankle"][-1] == pytest.approx([X[0], 0.0, 0.0], abs=1e-12)
@@ -34,7 +34,7 @@ def test_angles_and_feet_go_on_where_steps_meet() -> None:
 
 
 def test_rates_are_the_derivatives_of_the_angles() -> None:
-    arrays = locomotion(point_mass_biped(), X, steps=1, intervals=2000, step_time_s=0.8).arrays
+    arrays = compute_steps(load_point_mass_biped(), X, steps=1, intervals=2000, step_time_s=0.8).arrays
     t = arrays["t"]
     for name, rate in (("q", "qd"), ("qd", "qdd")):
         slope = np.gradient(arrays[name], t, axis=0)[2:-2]
@@ -43,7 +43,7 @@ def test_rates_are_the_derivatives_of_the_angles() -> None:
 
 def test_each_step_of_a_circle_turns_by_k() -> None:
     turn, steps = np.radians(7.5), 48
-    arrays = locomotion(point_mass_biped(), X, steps=steps + 1, intervals=2, turn_rad=turn).arrays
+    arrays = compute_steps(load_point_mass_biped(), X, steps=steps + 1, intervals=2, turn_rad=turn).arrays
     assert arrays["q"][:3, JOINTS.index("theta_9")] == pytest.approx(turn)
     assert arrays["q"][3:5, JOINTS.index("theta_4")] == pytest.approx(turn)
     assert not arrays["q"][:3, JOINTS.index("theta_4")].any()
@@ -55,7 +55,7 @@ def test_each_step_of_a_circle_turns_by_k() -> None:
 
 def test_turning_moves_the_zmp_a_little_only() -> None:
     straight, turned = (
-        locomotion(point_mass_biped(), X, turn_rad=k).arrays["zmp_foot"] for k in (0.0, np.radians(8.0))
+        compute_steps(load_point_mass_biped(), X, turn_rad=k).arrays["zmp_foot"] for k in (0.0, np.radians(8.0))
     )
     difference = np.abs(turned - straight).max()
     assert 0.0 < difference < 0.01

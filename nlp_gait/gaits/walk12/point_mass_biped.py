@@ -11,7 +11,7 @@ from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import check_numbers
 
-DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "robot.json"
+DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "point_mass_biped.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class PointMassBiped:
     foot_width_m: float
 
     def __post_init__(self) -> None:
-        """Every mass and every length is positive."""
+        """Check that every mass and every length is positive."""
         numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
         check_numbers(f"robot {self.name!r}", self, positive=numbers)
 
@@ -69,10 +69,10 @@ class PointMassBiped:
 
 
 @cache
-def point_mass_biped(path: str = "") -> PointMassBiped:
-    """Robot from a JSON file with the fields of ``PointMassBiped``; by default that of the paper.
+def load_point_mass_biped(path: str = "") -> PointMassBiped:
+    """Read a robot from a JSON file with the fields of ``PointMassBiped``; by default the paper's.
 
     Raises:
-        RobotDataError: the file cannot be read, lacks a field or has one too many, or a value is not allowed.
+        RobotDataError: the file cannot be read, has a missing or an unknown field, or a value is not allowed.
     """
     return read_dataclass(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

@@ -1,4 +1,4 @@
-"""Walking on: steps of the 12-joint biped one after the other, stance and swing exchanged, straight or in a circle.
+"""Consecutive steps of the 12-joint biped with exchanged stance and swing legs, straight or in a circle.
 
 The left leg (theta 1 to 6, ankle to hip) stands first. Every second step is the mirror image of the first: the legs change
 roles, roll angles and the side of all positions change sign. On a circle the swing leg is yawed by K at its hip, theta 9 in
@@ -17,8 +17,8 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Columns, Signals, vector_columns
-from nlp_gait.gaits.walk12.model import Zmp, legs, mass_motion, masses, zero_moment_point
-from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
+from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_legs, compute_mass_motion, compute_zmp, list_masses
 from nlp_gait.symbolic.nonsmooth import Exact
 
 JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
@@ -33,7 +33,7 @@ COLUMNS_OF = {
 MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
 
 
-def locomotion(
+def compute_steps(
     robot: PointMassBiped,
     x: Array,
     *,
@@ -44,27 +44,27 @@ def locomotion(
     intervals: int = 20,
     zmp: Zmp = "exact",
 ) -> Signals:
-    """Time histories over some steps.
+    """Compute time histories over some steps.
 
-    Where two steps meet, the sample belongs to the earlier one. The printed trajectories leave jumps there: in the hip's
-    lateral velocity (by n pi / T), and with a turn in theta 4 and theta 9, which the paper takes as constant over a step.
+    Where two steps meet, the sample belongs to the earlier one. The printed trajectories jump there: the hip's lateral velocity
+    (by n pi / T), and with a turn also theta 4 and theta 9, which the paper takes as constant over a step.
 
     Args:
         robot: lengths and masses.
         x: (4,) variables of the problem [m].
         step_time_s: T.
         turn_rad: K.
-        reach_margin_rad: kappa; matters only where a leg is out of reach.
+        reach_margin_rad: kappa; has an effect only where a leg is out of reach.
         steps: number of steps.
         intervals: of each step.
-        zmp: reading of the zero-moment point.
+        zmp: definition of the zero-moment point.
 
     Returns:
         t [s]; q, qd, qdd (columns theta_1 to theta_12); zmp, waist (between the hips), com, left_ankle and right_ankle in the
         world, whose origin is the first stance ankle [m]; zmp_foot, the ZMP relative to the stance ankle in the foot's
         axes [m]; left_stance, 1 where the left leg stands.
     """
-    sample = _sample_function(robot, zmp).map(intervals + 1)
+    sample = _make_sample_function(robot, zmp).map(intervals + 1)
     phases = np.linspace(0.0, 1.0, intervals + 1)
     ankle, heading = np.zeros(3), 0.0
     parts: list[dict[str, Array]] = []
@@ -75,8 +75,8 @@ def locomotion(
         local = dict(
             zip(sample.name_out(), (np.array(v.full().T) for v in sample(*columns, phases[None, :])), strict=True)
         )
-        part = _joints(local, side, turn_rad)
-        part |= _positions(local, side, ankle, heading)
+        part = _arrange_joints(local, side, turn_rad)
+        part |= _place_in_world(local, side, ankle, heading)
         part |= {"t": (step + phases) * step_time_s, "left_stance": np.full(intervals + 1, 0.5 + 0.5 * side)}
         first = 0 if step == 0 else 1
         parts.append({name: array[first:] for name, array in part.items()})
@@ -85,8 +85,8 @@ def locomotion(
     return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
 
 
-def _joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:
-    """q, qd, qdd (N + 1, 12) of a step; side is 1 if the left leg stands, else -1."""
+def _arrange_joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:
+    """Return q, qd, qdd (N + 1, 12) of a step; side is 1 if the left leg stands, else -1."""
     stance, swing = ("left", "right") if side > 0 else ("right", "left")
     signs = np.ones(5) if side > 0 else MIRRORED_ROLLS
     joints: dict[str, Array] = {}
@@ -99,8 +99,8 @@ def _joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Arra
     return joints
 
 
-def _positions(local: dict[str, Array], side: float, ankle: Array, heading: float) -> dict[str, Array]:
-    """Points of a step in the world, from its stance ankle (3,) and heading."""
+def _place_in_world(local: dict[str, Array], side: float, ankle: Array, heading: float) -> dict[str, Array]:
+    """Return points of a step in the world, from its stance ankle (3,) and heading."""
     mirror = np.array([1.0, side, 1.0])
     rotation = np.array(
         [[np.cos(heading), -np.sin(heading), 0.0], [np.sin(heading), np.cos(heading), 0.0], [0.0, 0.0, 1.0]]
@@ -121,17 +121,17 @@ def _positions(local: dict[str, Array], side: float, ankle: Array, heading: floa
 
 
 @cache
-def _sample_function(robot: PointMassBiped, reading: Zmp) -> ca.Function:
-    """One sample of a step with the left leg standing: (x, T, K, reach margin of a cosine, phase) to its quantities."""
+def _make_sample_function(robot: PointMassBiped, reading: Zmp) -> ca.Function:
+    """Return the function of one sample with the left leg standing: (x, T, K, reach margin of a cosine, phase)."""
     x = SX.sym("x", 4)
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
-    stance, swing = legs(x, phase, T, turn, margin, robot, Exact())
-    m = masses(robot)
+    stance, swing = compute_legs(x, phase, T, turn, margin, robot, Exact())
+    m = list_masses(robot)
     outputs = {
         **dict(zip(("stance_q", "stance_qd", "stance_qdd"), stance.joints, strict=True)),
         **dict(zip(("swing_q", "swing_qd", "swing_qdd"), swing.joints, strict=True)),
-        "zmp": zero_moment_point(stance, swing, robot, reading),
-        "com": mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
+        "zmp": compute_zmp(stance, swing, robot, reading),
+        "com": compute_mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
         "waist": (stance.hip.position + swing.hip.position) / 2,
         "swing_ankle": swing.ankle.position,
     }

@@ -10,7 +10,7 @@ import pytest
 import metaheuristics
 import nlp_gait
 from nlp_gait.backends.solve import solve
-from tests.gaits.walk12.oracle import TABLE_3
+from tests.gaits.walk12.walk12_oracle import TABLE_3
 
 OPTIMUM_TOLERANCE = 2e-4  # the reference values have four digits
 STARTS, LEAST_AGREEING = 20, 18

@@ -1,8 +1,8 @@
-"""The 12-joint biped as rigid bodies that an engine can take, and its steps in their terms.
+"""The 12-joint biped for the engine, as rigid bodies, and for drawings, as a stick figure.
 
-Point masses on links without mass are not a body: a joint between two such links has nothing to turn. What is built keeps every
-mass where the model has it, as a small sphere, and spreads it over the links that meet there. Only the foot's mass cannot wholly
-ride on the shank: a share of it is the sole's and the ankle's, at the same height above the ankle.
+An engine cannot simulate point masses on links without mass: a joint between two such links has no inertia. The rigid bodies keep
+every mass in its place, as a small sphere, and divide it among the links that meet there. Only a part of the foot's mass cannot
+stay on the shank: it belongs to the sole and the ankle, at the same height above the ankle.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from casadi import SX
 
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import SIMULATED
-from nlp_gait.gaits.walk12.locomotion import JOINTS, locomotion
-from nlp_gait.gaits.walk12.model import GRAVITY, Zmp
-from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.formulation.stick_figure import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
+from nlp_gait.gaits.walk12.walk12_model import GRAVITY, Zmp
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 from nlp_gait.robots import Foot, Joint, Link, Robot
 from nlp_gait.robots.inertia import inertia_moments, point_inertia
 from nlp_gait.robots.robot import Vector
@@ -26,11 +27,11 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 
 SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
-SOLE_SHARE = 0.1  # of the foot's mass that is the sole's; as much is the ankle's
-# The paper says nothing of its servos. The largest torque of each is the robot's weight at a lever as long as what the joint
-# moves: leg, shank, front of the foot. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
+SOLE_SHARE = 0.1  # of the foot's mass that belongs to the sole; the ankle has the same share
+# The paper says nothing about its drives. The largest torque of each is the robot's weight times the length of what the joint
+# moves: leg, shank, front of the foot. NAO's motors have 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
 RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
-RATE_LIMIT = 100.0  # [rad/s], likewise; nothing reads it
+RATE_LIMIT = 100.0  # [rad/s], likewise; not used
 FINE_INTERVALS = 1000  # of a step
 BEARINGS = {  # joint by side with its axis: hip yaw, roll, pitch, knee, ankle pitch, ankle roll; pitches lean back (eqs. 2, 3)
     "left": ("theta_4", "theta_6", "theta_5", "theta_3", "theta_2", "theta_1"),
@@ -40,12 +41,12 @@ AXES: tuple[Vector, ...] = ((0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1,
 PARTS = ("yaw", "roll", "thigh", "shank", "ankle", "foot")  # links behind these joints
 
 
-def simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
-    """How steps of the biped are played."""
-    bodies = rigid_bodies(robot)
+def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
+    """Return the biped's steps for the engine."""
+    bodies = make_rigid_bodies(robot)
 
     def motion(at: NumericPoint, steps: int) -> Signals:
-        walked = locomotion(
+        walked = compute_steps(
             robot,
             at.x.full().ravel(),
             step_time_s=float(at["step_time_s"]),
@@ -60,7 +61,7 @@ def simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
         still = np.zeros_like(heading)
         arrays = {
             **{name: walked[name] for name in ("t", "q", "qd", "qdd", "zmp")},
-            "tau": _torques(bodies, walked, left),
+            "tau": _compute_torques(bodies, walked, left),
             "hip": walked["waist"],
             "attitude": np.column_stack([np.cos(heading / 2), still, still, np.sin(heading / 2)]),
             "left_foot": walked["left_ankle"],
@@ -72,15 +73,15 @@ def simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
 
 
 @cache
-def rigid_bodies(robot: PointMassBiped) -> Robot:
-    """Links with small spheres as masses; the root is the waist, between the hips, and the ankles lie on the ground."""
+def make_rigid_bodies(robot: PointMassBiped) -> Robot:
+    """Return links with small spheres as masses; the root is the waist, between the hips, and the ankles are on the ground."""
     thigh_end, shank_end = -robot.thigh_m, -robot.shank_m
     hip, knee, foot = robot.hip_mass_kg, robot.knee_mass_kg, robot.foot_mass_kg
     up = robot.foot_com_height_m
     across = robot.hip_distance_m / 2
     weight = GRAVITY * (2 * (knee + foot + hip) + robot.waist_mass_kg)
     levers = (robot.leg_m,) * 3 + (robot.shank_m,) + (robot.foot_front_m,) * 2
-    # By link: masses with their places in its axes; the three links that meet at a hip share its mass, two a knee's.
+    # By link: masses with their places in its axes. The three links at a hip share its mass, the two at a knee share the knee's.
     contents: dict[str, list[tuple[float, Vector]]] = {
         "waist": [(robot.waist_mass_kg, (0, 0, 0)), (hip / 3, (0, across, 0)), (hip / 3, (0, -across, 0))]
     }
@@ -129,14 +130,13 @@ def rigid_bodies(robot: PointMassBiped) -> Robot:
         description=robot.description,
         sources={"masses and lengths": robot.source},
         root="waist",
-        links={name: _link(name, held) for name, held in contents.items()},
+        links={name: _make_link(name, held) for name, held in contents.items()},
         joints={name: joints[name] for name in JOINTS},
         feet=feet,
     )
 
 
-def _link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
-    """Link of small spheres."""
+def _make_link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
     masses, places = np.array([mass for mass, _ in held]), np.array([place for _, place in held], dtype=float)
     total = float(masses.sum())
     com = masses @ places / total
@@ -147,16 +147,46 @@ def _link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
     return Link(name=name, mass_kg=total, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(tensor))
 
 
-def _torques(bodies: Robot, walked: Mapping[str, Array], left: np.ndarray) -> Array:
-    """(T, 12) torques of the joints with the stance foot still and nothing below the other [Nm]."""
+def _compute_torques(bodies: Robot, walked: Mapping[str, Array], left: np.ndarray) -> Array:
+    """Return (T, 12) torques of the joints with the stance foot still and the other foot free [Nm]."""
     given = [walked[name].T for name in ("q", "qd", "qdd")]
-    by_side = [np.array(_inverse_dynamics(bodies, side).map(len(left))(*given)).T for side in ("left", "right")]
+    by_side = [np.array(_make_inverse_dynamics(bodies, side).map(len(left))(*given)).T for side in ("left", "right")]
     return np.where(left[:, None], *by_side)
 
 
 @cache
-def _inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
+def _make_inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
     motion = [SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd")]
     q, qd, qdd = (dict(zip(JOINTS, ca.vertsplit(part), strict=True)) for part in motion)
     torques, _ = newton_euler(tree_from(bodies, bodies.feet[side].link), q, qd, qdd, GRAVITY)
     return ca.Function("torques", motion, [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS)))])
+
+
+def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+    """Return the stick figure of a motion; the robot turns to the left by ``turn_rad`` after each step."""
+    arrays = signals.arrays
+    waist, left_stands = arrays["waist"], arrays["left_stance"] > 0.5
+    steps = np.concatenate([[0], np.cumsum(np.diff(left_stands.astype(int)) != 0)])
+    heading = steps * parameters["turn_rad"]
+    forward = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+    across = np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=1)
+    outline = make_rectangle(-robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2)
+    limbs, soles = [], []
+    for side, sign, stands in ((LEFT, 0.5, left_stands), (RIGHT, -0.5, ~left_stands)):
+        hip, ankle = waist + sign * robot.hip_distance_m * across, arrays[f"{side}_ankle"]
+        knee = _place_knee(hip, ankle, forward, robot.thigh_m, robot.shank_m)
+        limbs.append(Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
+        corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
+        soles.append(Sole(side=side, corners=corners, supports=stands))
+    return make_flat_skeleton(signals, limbs, soles)
+
+
+def _place_knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:
+    """Return the knee (T, 3), bent forward in the plane of the leg and the forward axis [m]; a leg out of reach is straight."""
+    leg = ankle - hip
+    length = np.linalg.norm(leg, axis=1, keepdims=True)
+    along = leg / length
+    down = (thigh**2 - shank**2 + length**2) / (2 * length)
+    ahead = forward - (forward * along).sum(axis=1, keepdims=True) * along
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return np.asarray(hip + down * along + np.sqrt(np.maximum(thigh**2 - down**2, 0.0)) * ahead)

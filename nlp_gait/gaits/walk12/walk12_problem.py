@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Literal
 
 import casadi as ca
@@ -26,11 +27,10 @@ from nlp_gait.formulation import (
     maker,
     parameters,
 )
-from nlp_gait.gaits.walk12.locomotion import locomotion
-from nlp_gait.gaits.walk12.model import Zmp, legs, reaches, zero_moment_point
-from nlp_gait.gaits.walk12.robot import PointMassBiped, point_mass_biped
-from nlp_gait.gaits.walk12.simulation_model import simulation_model
-from nlp_gait.gaits.walk12.skeleton import skeleton
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
+from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_knee_cosines, compute_legs, compute_zmp
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Horizon = Literal["step", "1s"]
@@ -65,7 +65,7 @@ PARAMETERS = parameters(
 
 @maker
 def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
-    """Gait of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
+    """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
         intervals: of Simpson's rule over a step; even.
@@ -80,21 +80,21 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     """
     if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, _zmp_function(robot, ops, zmp), robot, intervals, horizon)
+        return _assemble(point, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon)
 
     def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-        zmp_at = _sampled(_zmp_function(robot, ops, zmp), point, phases)
+        zmp_at = _sample_zmp(_make_zmp_function(robot, ops, zmp), point, phases)
         Q = point["step_time_s"] * ca.sum1(ca.sum2(zmp_at**2)) / phases.shape[1]
         indexes = {"Q_m2s": Q} if horizon == "step" else {}
         return Assembly(
-            objective=MX(0), constraints=(_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
+            objective=MX(0), constraints=(_limit_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
         )
 
     def motion(at: NumericPoint) -> Signals:
-        return locomotion(
+        return compute_steps(
             robot,
             at.x.full().ravel(),
             step_time_s=float(at["step_time_s"]),
@@ -112,7 +112,9 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
         objective=Objective(name="f", unit="1", sense="maximise"),
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(motion=motion, skeleton=skeleton(robot), simulation_model=simulation_model(robot, zmp)),
+        display=Display(
+            motion=motion, skeleton=partial(make_skeleton, robot), simulation_model=make_simulation_model(robot, zmp)
+        ),
         rows_over_time=(
             RowsOverTime(
                 assemble=at_phases,
@@ -120,13 +122,13 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
                 means=("Q_m2s",) if horizon == "step" else (),
             ),
         ),
-        # From 640 random starts all converge; with the exact Hessian, 5 fail.
+        # All of 640 random starts converge; with the exact Hessian, 5 fail.
         hints=SolverHints(hessian="limited-memory"),
     )
 
 
-def simpson_weights(intervals: int) -> DM:
-    """(N + 1, 1) weights of Simpson's rule on [0, 1] with N intervals, N even."""
+def make_simpson_weights(intervals: int) -> DM:
+    """Return (N + 1, 1) weights of Simpson's rule on [0, 1] with N intervals, N even."""
     weights = np.full(intervals + 1, 2.0)
     weights[1::2] = 4.0
     weights[[0, -1]] = 1.0
@@ -136,29 +138,31 @@ def simpson_weights(intervals: int) -> DM:
 def _assemble(point: Point, zmp_at: ca.Function, robot: PointMassBiped, intervals: int, horizon: Horizon) -> Assembly:
     T, s = point["step_time_s"], point["step_length_m"]
     phases = DM(np.linspace(0.0, 1.0, intervals + 1)).T
-    weights = simpson_weights(intervals)
-    zmp = _sampled(zmp_at, point, phases)
+    weights = make_simpson_weights(intervals)
+    zmp = _sample_zmp(zmp_at, point, phases)
     Q = T * ca.sum1(zmp**2) @ weights  # (eq. 9)
     if horizon == "1s":
         steps = ca.floor(1 / T)
-        begun = 1 / T - steps  # share of the last step that falls within the second
-        Q = steps * Q + begun * T * ca.sum1(_sampled(zmp_at, point, begun * phases) ** 2) @ weights
+        begun = 1 / T - steps  # share of the last step within the second
+        Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
     f1 = 1 / Q  # (eq. 10)
     f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
-    indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_stability(zmp, robot)}
-    return Assembly(objective=f, constraints=(_reach(point, robot, *_panels(intervals // 2)),), indexes=indexes)
+    indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_measure_stability(zmp, robot)}
+    return Assembly(
+        objective=f, constraints=(_limit_reach(point, robot, *_make_panels(intervals // 2)),), indexes=indexes
+    )
 
 
-def _panels(intervals: int) -> tuple[DM, list[str]]:
-    """Phases (1, n) of the ends of Simpson's panels, with their names."""
+def _make_panels(intervals: int) -> tuple[DM, list[str]]:
+    """Return phases (1, n) of the ends of Simpson's panels, with their names."""
     n = intervals + 1
     return DM(np.linspace(0.0, 1.0, n)).T, [f"{k / intervals:g} T" for k in range(n)]
 
 
-def _reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
-    """Knees bent by at least kappa, at the ends of Simpson's panels or other phases: near-straight legs make the ZMP spike."""
+def _limit_reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
+    """Bend the knees by at least kappa at the given phases: nearly straight legs make the ZMP spike."""
     x, phase = SX.sym("x", len(VARIABLES)), SX.sym("phase")
-    cosines = ca.Function("reach", [x, phase], ca.cse([reaches(x, phase, robot)]))
+    cosines = ca.Function("reach", [x, phase], ca.cse([compute_knee_cosines(x, phase, robot)]))
     n = len(names)
     limit = ca.cos(point["reach_margin_rad"])
     return Constraint(
@@ -173,8 +177,8 @@ def _reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str
     )
 
 
-def _stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
-    """ZMP (2, N + 1) against the sole of the stance foot (eq. 8); the share is one of the step's time."""
+def _measure_stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
+    """Return margins of the ZMP (2, N + 1) on the sole of the stance foot (eq. 8); the stable share is of the step's time."""
     x, y = zmp[0, :], zmp[1, :]
     half = robot.foot_width_m / 2
     margin = ca.fmin(ca.fmin(x + robot.foot_back_m, robot.foot_front_m - x), ca.fmin(y + half, half - y))
@@ -191,17 +195,17 @@ def _stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
     }
 
 
-def _zmp_function(robot: PointMassBiped, ops: Nonsmooth, reading: Zmp) -> ca.Function:
-    """One sample: (x, T, K, reach margin of a cosine, phase) to the ZMP (2,) relative to the stance ankle [m]."""
+def _make_zmp_function(robot: PointMassBiped, ops: Nonsmooth, reading: Zmp) -> ca.Function:
+    """Return the function of one sample: (x, T, K, reach margin of a cosine, phase) to the ZMP (2,) from the stance ankle [m]."""
     x = SX.sym("x", len(VARIABLES))
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
-    stance, swing = legs(x, phase, T, turn, margin, robot, ops)
-    point = zero_moment_point(stance, swing, robot, reading)
+    stance, swing = compute_legs(x, phase, T, turn, margin, robot, ops)
+    point = compute_zmp(stance, swing, robot, reading)
     return ca.Function("zmp", [x, T, turn, margin, phase], ca.cse([point]))
 
 
-def _sampled(zmp_at: ca.Function, point: Point, phases: MX | DM) -> MX:
-    """(2, n) ZMP at phases (1, n); mapped, never unrolled."""
+def _sample_zmp(zmp_at: ca.Function, point: Point, phases: MX | DM) -> MX:
+    """Return (2, n) the ZMP at phases (1, n); mapped, never unrolled."""
     margin = 1 - ca.cos(point["reach_margin_rad"])
     inputs = (point.x, point["step_time_s"], point["turn_rad"], margin)
     n = phases.shape[1]

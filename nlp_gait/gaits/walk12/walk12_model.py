@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.walk12.robot import PointMassBiped
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.symbolic.balance import zmp_of_point_masses
 from nlp_gait.symbolic.inverse_kinematics import knee_cosine, leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation
@@ -25,7 +25,7 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, 
 
 GRAVITY = 9.81  # [m/s^2]
 
-# How the ZMP is read: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
+# Definition of the ZMP: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
 # corrected or (A1) as printed; or the point about which the moment of gravity and inertia vanishes.
 Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
 
@@ -51,8 +51,8 @@ class LegMotion(NamedTuple):
 Shank: TypeAlias = Callable[[LegMotion, DM], Motion]
 
 
-def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
-    """Positions (3,) of the swing ankle P12 and of the stance hip P6 over the first step [m].
+def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
+    """Return positions (3,) of the swing ankle P12 and of the stance hip P6 over the first step [m].
 
     Args:
         x: (4,) step length s, frontal shift n, foot lift H, bending height h [m].
@@ -77,10 +77,10 @@ def ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> 
     return map_motion(swing_ankle, time), map_motion(stance_hip, time)
 
 
-def legs(
+def compute_legs(
     x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
 ) -> tuple[LegMotion, LegMotion]:
-    """Stance leg and swing leg.
+    """Return the stance leg and the swing leg.
 
     Args:
         x: (4,) variables [m].
@@ -91,36 +91,38 @@ def legs(
         robot: lengths.
         ops: interpretation of acos.
     """
-    swing_ankle, hip = ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
+    swing_ankle, hip = compute_ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
     swing_hip = hip._replace(position=hip.position + _across(robot))
-    stance = _leg(stance_ankle, hip, margin, robot, ops)
-    return stance, _turned(_leg(swing_ankle, swing_hip, margin, robot, ops), turn)
+    stance = _solve_leg(stance_ankle, hip, margin, robot, ops)
+    return stance, _turn_leg(_solve_leg(swing_ankle, swing_hip, margin, robot, ops), turn)
 
 
-def reaches(x: SX, phase: SX, robot: PointMassBiped) -> SX:
-    """(2,) cosines of the stance and the swing knee, without the angles: cheap rows for a constraint."""
-    ankle, hip = ankle_and_hip(x, Motion(phase, SX(1), SX(0)), SX(1), robot)
+def compute_knee_cosines(x: SX, phase: SX, robot: PointMassBiped) -> SX:
+    """Return (2,) cosines of the stance and the swing knee, without the angles: cheap rows for a constraint."""
+    ankle, hip = compute_ankle_and_hip(x, Motion(phase, SX(1), SX(0)), SX(1), robot)
     swing = ankle.position - hip.position - _across(robot)
     return ca.vertcat(*(knee_cosine(ca.sumsqr(v), robot.thigh_m, robot.shank_m) for v in (hip.position, swing)))
 
 
-def masses(robot: PointMassBiped) -> DM:
-    """(7,) masses [kg]: stance foot, stance knee, stance hip, waist, swing hip, swing knee, swing foot."""
+def list_masses(robot: PointMassBiped) -> DM:
+    """Return (7,) masses [kg]: stance foot, stance knee, stance hip, waist, swing hip, swing knee, swing foot."""
     foot, knee, hip = robot.foot_mass_kg, robot.knee_mass_kg, robot.hip_mass_kg
     return DM([foot, knee, hip, robot.waist_mass_kg, hip, knee, foot])
 
 
-def mass_motion(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, shank: Shank | None = None) -> Motion:
-    """(3, 7) motion of the masses [m], in the order of ``masses``; by exact forward kinematics unless told otherwise."""
+def compute_mass_motion(
+    stance: LegMotion, swing: LegMotion, robot: PointMassBiped, shank: Shank | None = None
+) -> Motion:
+    """Return (3, 7) the motion of the masses [m], in the order of ``list_masses``; by default with exact forward kinematics."""
     heights = DM([robot.foot_com_height_m, robot.shank_m]).T
-    near, far = (_from_ankle(leg, (shank or exact_shank)(leg, heights)) for leg in (stance, swing))
+    near, far = (_shift_to_ankle(leg, (shank or place_on_exact_shank)(leg, heights)) for leg in (stance, swing))
     orders = zip(near, stance.hip, swing.hip, far, strict=True)
     return Motion(*(ca.horzcat(a, p6, (p6 + other) / 2, other, b[:, 1], b[:, 0]) for a, p6, other, b in orders))
 
 
-def exact_shank(leg: LegMotion, heights: DM) -> Motion:
-    """Points of the shank by forward kinematics; see ``Shank``."""
+def place_on_exact_shank(leg: LegMotion, heights: DM) -> Motion:
+    """Return points of the shank by forward kinematics; see ``Shank``."""
 
     def points(angles: SX) -> SX:
         roll, pitch = angles[0], angles[1]
@@ -129,8 +131,8 @@ def exact_shank(leg: LegMotion, heights: DM) -> Motion:
     return map_motion(points, _ankle_angles(leg))
 
 
-def appendix_shank(leg: LegMotion, heights: DM) -> Motion:
-    """Points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
+def place_on_appendix_shank(leg: LegMotion, heights: DM) -> Motion:
+    """Return points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
     upward = Motion(*(hip - ankle for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     lean = map_motion(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
 
@@ -142,14 +144,16 @@ def appendix_shank(leg: LegMotion, heights: DM) -> Motion:
     return map_motion(points, stack(_ankle_angles(leg), lean))
 
 
-def zero_moment_point(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:
-    """(2,) zero-moment point relative to the stance ankle, on the height of that ankle [m].
+def compute_zmp(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:
+    """Return (2,) the zero-moment point relative to the stance ankle, on the height of that ankle [m].
 
     Source:
         Eqs. (12)-(14), (A1)-(A6). As printed, (A1) sums the swing leg with the angles of the stance leg, from x_r.
     """
-    m = masses(robot)
-    motion = mass_motion(stance, swing, robot, appendix_shank if reading.startswith("appendix") else exact_shank)
+    m = list_masses(robot)
+    motion = compute_mass_motion(
+        stance, swing, robot, place_on_appendix_shank if reading.startswith("appendix") else place_on_exact_shank
+    )
     static_load = reading != "moment-free"
     point = zmp_of_point_masses(m, motion.position, motion.acceleration, GRAVITY, static_load=static_load)
     if reading != "appendix-as-printed":
@@ -165,8 +169,8 @@ def _across(robot: PointMassBiped) -> DM:
     return DM([0.0, -robot.hip_distance_m, 0.0])
 
 
-def _leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> LegMotion:
-    """Joint angles (2), (3) from the closed form that NAO's legs have too; unlike (2), it holds for a folded knee."""
+def _solve_leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> LegMotion:
+    """Solve joint angles (2), (3) by the closed form of NAO's legs; unlike (2), it is valid for a folded knee."""
     hip_to_ankle = Motion(*(to - origin for to, origin in zip(ankle, hip, strict=True)))
     angles = leg_angles(hip_to_ankle, robot.thigh_m, robot.shank_m, margin, ops).joints
     # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
@@ -174,18 +178,16 @@ def _leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Non
     return LegMotion(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
 
 
-def _turned(leg: LegMotion, turn: SX) -> LegMotion:
-    """The leg yawed at its hip."""
+def _turn_leg(leg: LegMotion, turn: SX) -> LegMotion:
     heading = axis_rotation((0.0, 0.0, 1.0), turn)
     ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     return leg._replace(ankle=ankle, heading=heading)
 
 
-def _from_ankle(leg: LegMotion, points: Motion) -> Motion:
+def _shift_to_ankle(leg: LegMotion, points: Motion) -> Motion:
     pairs = zip(leg.ankle, points, strict=True)
     return Motion(*(ca.repmat(ankle, 1, 2) + leg.heading @ offsets for ankle, offsets in pairs))
 
 
 def _ankle_angles(leg: LegMotion) -> Motion:
-    """(2,) roll and pitch."""
     return Motion(*(part[:2] for part in leg.joints))

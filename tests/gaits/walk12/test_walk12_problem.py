@@ -14,9 +14,9 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.walk12.locomotion import locomotion
-from nlp_gait.gaits.walk12.robot import point_mass_biped
-from tests.gaits.walk12 import oracle
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+from tests.gaits.walk12 import walk12_oracle as oracle
 
 TABLE_TOLERANCE = 2e-4  # the reference values have four digits
 MOMENT_TOLERANCE = 1e-6  # [Nm]; the difference stencil alone is good to 1e-8
@@ -49,9 +49,9 @@ def test_objective_at_the_papers_rows(row: tuple[float, ...]) -> None:
 
 
 def test_angles_equal_the_printed_inverse_kinematics() -> None:
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
     for x in random_gaits(10, seed=1):
-        arrays = locomotion(robot, x, steps=1, intervals=20).arrays
+        arrays = compute_steps(robot, x, steps=1, intervals=20).arrays
         for t, q in zip(arrays["t"], arrays["q"], strict=True):
             stance, swing = oracle.legs(x, t)
             for leg, columns in ((stance, [0, 1, 2, 4, 5]), (swing, [11, 10, 9, 7, 6])):
@@ -63,15 +63,15 @@ def test_a_deeply_bent_leg_closes_where_the_printed_one_does_not() -> None:
     x = np.array([0.13, 0.13, 0.13, 0.13])  # the corner that (2) turns into a local maximum
     swing = oracle.legs(x, 0.5)[1]
     assert np.linalg.norm(oracle.hip_by_forward_kinematics(swing) - swing.hip) > 0.01
-    arrays = locomotion(point_mass_biped(), x, steps=1, intervals=2).arrays
+    arrays = compute_steps(load_point_mass_biped(), x, steps=1, intervals=2).arrays
     closed = oracle.Leg(swing.ankle, swing.hip, arrays["q"][1, [11, 10, 9, 7, 6]])
     assert oracle.hip_by_forward_kinematics(closed) == pytest.approx(swing.hip, abs=1e-12)
 
 
 def test_moment_of_gravity_and_inertia_vanishes_about_the_moment_free_point() -> None:
     for x in random_gaits(10, seed=2):
-        free = locomotion(point_mass_biped(), x, steps=1, intervals=20, zmp="moment-free").arrays
-        printed = locomotion(point_mass_biped(), x, steps=1, intervals=20, zmp="exact").arrays
+        free = compute_steps(load_point_mass_biped(), x, steps=1, intervals=20, zmp="moment-free").arrays
+        printed = compute_steps(load_point_mass_biped(), x, steps=1, intervals=20, zmp="exact").arrays
         for k, t in enumerate(free["t"]):
             assert oracle.moment(x, t, free["zmp"][k])[:2] == pytest.approx(0.0, abs=MOMENT_TOLERANCE)
             # (14) divides by the weight, not by the load: what remains is the vertical inertia force about the ankle.
@@ -85,7 +85,8 @@ def test_moment_of_gravity_and_inertia_vanishes_about_the_moment_free_point() ->
 def test_appendix_against_its_print(reading: Any, misprinted: bool) -> None:
     for x in random_gaits(5, seed=3):
         for t, zmp in zip(
-            *(locomotion(point_mass_biped(), x, steps=1, zmp=reading).arrays[k] for k in ("t", "zmp")), strict=True
+            *(compute_steps(load_point_mass_biped(), x, steps=1, zmp=reading).arrays[k] for k in ("t", "zmp")),
+            strict=True,
         ):
             stance, swing = oracle.legs(x, t)
             if np.linalg.norm(swing.hip - swing.ankle) ** 2 < oracle.D1**2 - oracle.D2**2:
@@ -136,7 +137,7 @@ def test_f1_at_the_rows_of_table_4(step_time: float, x: list[float], per_step: f
 
 def test_stability_condition_at_the_papers_most_stable_gait() -> None:
     _, *x, _, _, _ = oracle.TABLE_3[-1]
-    arrays = locomotion(point_mass_biped(), x, steps=1, intervals=1000).arrays
+    arrays = compute_steps(load_point_mass_biped(), x, steps=1, intervals=1000).arrays
     zmp_x, zmp_y = arrays["zmp_foot"].T
     stable = (-0.03 <= zmp_x) & (zmp_x <= 0.07) & (np.abs(zmp_y) <= 0.0275)
     inside = arrays["t"][stable]

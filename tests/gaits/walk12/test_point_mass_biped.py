@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.gaits.walk12.robot import point_mass_biped
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 
 
 def test_table_1() -> None:
-    robot = point_mass_biped()
+    robot = load_point_mass_biped()
     masses = (robot.knee_mass_kg, robot.waist_mass_kg, robot.foot_mass_kg, robot.hip_mass_kg)
     assert masses == (0.07, 0.02, 0.14, 0.21)
     assert robot.leg_m == pytest.approx(0.34)
@@ -32,9 +32,9 @@ def test_table_1() -> None:
 )
 def test_damaged_data(tmp_path: Path, change: dict[str, object], message: str) -> None:
     file = tmp_path / "robot.json"
-    file.write_text(json.dumps(asdict(point_mass_biped()) | change))
+    file.write_text(json.dumps(asdict(load_point_mass_biped()) | change))
     with pytest.raises(RobotDataError, match=message):
-        point_mass_biped(str(file))
+        load_point_mass_biped(str(file))
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
@@ -42,4 +42,4 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     file.write_text("{")
     for path in (file, tmp_path / "none.json"):
         with pytest.raises(RobotDataError, match="cannot be read|is not valid JSON"):
-            point_mass_biped(str(path))
+            load_point_mass_biped(str(path))
